@@ -1,4 +1,4 @@
-"""Recordings: what went over a robot's doors and what the robot saw and did, in one MCAP file; and what reads them.
+"""Recordings: a robot's exchanges at its doors, its sensor data and its actions in one MCAP file; and their readers.
 
-Knows the tap, events and components of the model, and no door.
+Knows the model's tap, events and components, and no door.
 """

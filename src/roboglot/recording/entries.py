@@ -1,4 +1,4 @@
-"""Entries that wait to be written: values as they were handed over, and their encoding by kind."""
+"""Entries to be written: values as they were handed over, and their encoding by kind."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Entry(NamedTuple):
 
     @property
     def weight(self) -> int:
-        """About how many bytes of memory it takes."""
+        """Approximate size in memory, bytes."""
         return len(self.value.payload) + 500 if isinstance(self.value, Exchange) else SCAN_BYTES
 
 
@@ -38,12 +38,12 @@ class EntryKind:
 
     @property
     def is_protobuf(self) -> bool:
-        """True for messages of Foxglove's."""
+        """True if the schema is one of Foxglove's protobuf messages."""
         return self.schema in foxglove.TYPES
 
     @property
     def schema_data(self) -> bytes:
-        """Schema as the file has it."""
+        """Schema as written to the file."""
         return foxglove.schema(self.schema) if self.is_protobuf else messages.SCHEMAS[self.schema]
 
 
@@ -71,7 +71,7 @@ KINDS = {
 
 
 def encoded(entry: Entry, redaction: Redaction) -> bytes:
-    """Return an entry as a message, without what must stay secret."""
+    """Return an entry as a message, with secrets redacted."""
     kind, value = KINDS[entry.kind], entry.value
     if entry.kind == "exchange":
         value = redaction.exchange(value)

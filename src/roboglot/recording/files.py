@@ -28,7 +28,7 @@ CHUNK_BYTES = 4 << 20  # of a second's messages before compression; more go into
 
 @dataclass(frozen=True, slots=True)
 class Attachment:
-    """A file that goes into the recording as it is."""
+    """A file attached to the recording unchanged."""
 
     name: str
     media_type: str
@@ -45,7 +45,7 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """A part ends at so many bytes or so much robot time (s); all parts together keep to ``total`` bytes."""
+    """Maximum size (bytes) and duration (s of robot time) of a part; maximum size of all parts together (bytes)."""
 
     part_bytes: int = 256 << 20
     part_seconds: float = 3600.0
@@ -53,7 +53,7 @@ class Limits:
 
 
 class OpenChunk:
-    """Messages that wait to be handed over to the library's writer at once: that takes a fifth of the time."""
+    """Messages collected for the library's writer: handing them over together takes a fifth of the time."""
 
     def __init__(self, writer: Writer) -> None:
         inside = vars(writer)
@@ -63,14 +63,14 @@ class OpenChunk:
         self.size = 0  # bytes
 
     def add(self, channel: int, at: int, data: bytes, wall: int, sequence: int) -> None:
-        """Take a message along."""
+        """Add a message; ``at`` and ``wall`` in ns."""
         size = len(data)
         self._records += (_message(Opcode.MESSAGE, size + 22, channel, sequence, at, wall), data)
         self._index.setdefault(channel, []).extend((at, self.size))
         self.size += size + 31
 
     def hand_over(self) -> None:
-        """Hand all of them over; the writer's next ``flush`` or ``finish`` writes them."""
+        """Hand all messages to the writer; its next ``flush`` or ``finish`` writes them."""
         if not self._records:
             return
         chunk, figures = self._chunk, self._figures
@@ -99,7 +99,7 @@ class _PackedIndex(MessageIndex):
 
 
 class PartWriter:
-    """One MCAP file. What ``flush`` has returned from survives the death of the process."""
+    """One MCAP file. Entries survive the death of the process once ``flush`` has returned."""
 
     def __init__(self, path: Path, origin: Origin, redaction: Redaction, at: int, part: int = 1) -> None:
         self.path, self._redaction = path, redaction
@@ -119,12 +119,12 @@ class PartWriter:
         self.flush()
 
     def write(self, entry: Entry) -> None:
-        """Add one."""
+        """Add an entry."""
         self._sequence += 1
         self._add(entry, self._sequence)
 
     def repeat(self, entry: Entry) -> None:
-        """Add one that an earlier part has, too: readers of both pass over it."""
+        """Add an entry that an earlier part has, too; readers of both parts skip it."""
         self._add(entry, REPEATED)
 
     def _add(self, entry: Entry, sequence: int) -> None:
@@ -161,9 +161,9 @@ class PartWriter:
 
 
 class Files:
-    """The parts of one recording: ``PATH.mcap``, then ``PATH-002.mcap`` and so on; in a folder they get names.
+    """The parts of one recording: ``PATH.mcap``, then ``PATH-002.mcap`` and so on; in a folder, names are generated.
 
-    Each begins with how things stand, so that it can be read when those before it are deleted.
+    Each part begins with the standing values, so that it can be read without the parts before it.
     """
 
     def __init__(self, path: Path, origin: Origin, redaction: Redaction, limits: Limits) -> None:
@@ -178,21 +178,21 @@ class Files:
 
     @property
     def path(self) -> Path:
-        """Path of the part that is written now, or will be."""
+        """Path of the current part, or of the first one before ``open``."""
         suffix = f"-{self._number:03}" if self._number > 1 else ""
         return self._base.with_name(f"{self._base.name}{suffix}{SUFFIX}")
 
     @property
     def size(self) -> int:
-        """Bytes of all parts that are kept."""
+        """Size of all kept parts, bytes."""
         return sum(size for _, size in self._closed) + (self._part.size if self._part else 0)
 
     def open(self, at: int) -> None:
-        """Make the first part, so that a path that cannot be written is refused at once. Raises OSError."""
+        """Create the first part, so that an unwritable path fails at once. Raises OSError."""
         self._next(at)
 
     def write(self, entry: Entry) -> None:
-        """Add one entry; begins the next part where this one is full. Raises OSError."""
+        """Add an entry; begin the next part if this one is full. Raises OSError."""
         part = self._part or self._next(entry.at)
         full = part.size > self._limits.part_bytes or entry.at - part.first > self._limits.part_seconds * NANO
         if full:
@@ -212,7 +212,7 @@ class Files:
             self._part = None
             try:
                 part.close()
-            finally:  # a full disk has kept what was flushed
+            finally:  # flushed entries are in the file even if the disk is full
                 self._closed.append((part.path, part.path.stat().st_size))
 
     def _next(self, at: int) -> PartWriter:

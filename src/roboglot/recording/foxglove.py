@@ -1,4 +1,4 @@
-"""The messages that Foxglove and its kin draw, from the model's values; protobuf, as their schemas have them.
+"""Messages for Foxglove and similar viewers, made from the model's values; protobuf, by Foxglove's schemas.
 
 Frames are per robot: ``a/map -> a/odom -> a/base_link -> a/laser``; the truth is in ``world``.
 """
@@ -54,7 +54,7 @@ _four_doubles = Struct("<BBBdBdBBBdBd").pack
 
 @cache
 def schema(name: str) -> bytes:
-    """Return the descriptors of a message and of all that it is made of."""
+    """Return the descriptors of a message and of its dependencies."""
     files: dict[str, FileDescriptor] = {}
 
     def collect(file: FileDescriptor) -> None:
@@ -78,20 +78,20 @@ def _place(message: PoseMessage, pose: Pose, z: float = 0.0) -> None:
     message.orientation.z, message.orientation.w = math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)
 
 
-# Poses, transforms and scans come ten times a second from each robot. Their bytes are put together here, in a third of
-# the time that the library's messages take; tests/recording/test_messages.py holds them to be the library's.
+# Poses, transforms and scans come ten times a second from each robot. They are encoded by hand, in a third of the
+# library's time; tests/recording/test_messages.py compares the bytes with the library's.
 
 
 @lru_cache(maxsize=16)  # all robots are looked at in one instant
 def _time_field(nanoseconds: int) -> bytes:
-    """Field 1, a Timestamp."""
+    """Return field 1, a Timestamp."""
     seconds, nanos = divmod(nanoseconds, 1_000_000_000)
     return _field(1, (b"\x08" + _varint(seconds) if seconds else b"") + (b"\x10" + _varint(nanos) if nanos else b""))
 
 
 @lru_cache(maxsize=4096)
 def _text_fields(*texts: str) -> bytes:
-    """Fields 2, 3 and so on."""
+    """Return the texts as fields 2, 3 and so on; empty ones are left out."""
     return b"".join(_field(number, text.encode()) for number, text in enumerate(texts, 2) if text)
 
 
@@ -101,21 +101,21 @@ def _field(number: int, data: bytes) -> bytes:
 
 
 def _doubles(first: int, a: float, second: int, b: float) -> bytes:
-    """Return two fields with their length; zeros are left out, as the format has it."""
+    """Return a length and two double fields; zeros are left out, as protobuf does."""
     fields = [_one_double(n << 3 | 1, v) for n, v in ((first, a), (second, b)) if v or math.copysign(1.0, v) < 0]
     return bytes([9 * len(fields)]) + b"".join(fields)
 
 
 @lru_cache(maxsize=1024)
 def _upright_fields(number: int, pose: bytes) -> bytes:
-    """Return ``_place_fields`` of a pose with a zero (``pose``: its three numbers), as mounts mostly have one."""
+    """Return ``_place_fields`` of a pose with a zero in it, as most mounts have; ``pose``: its three packed doubles."""
     x, y, yaw = _three_doubles.unpack(pose)
     tag, z, w = number << 3 | 2, math.sin(yaw / 2), math.cos(yaw / 2)
     return bytes([tag]) + _doubles(1, x, 2, y) + bytes([tag + 8]) + _doubles(3, z, 4, w)
 
 
 def _place_fields(number: int, pose: Pose) -> bytes:
-    """Return a field with the place (x, y) and the next one with the turn (z, w of a quaternion)."""
+    """Return a field with the position (x, y) and the next one with the rotation (z, w of a quaternion)."""
     x, y, yaw = pose.x, pose.y, pose.yaw
     z, w, tag = math.sin(yaw / 2), math.cos(yaw / 2), number << 3 | 2
     if x and y and z and w:
@@ -138,7 +138,7 @@ def encode_transforms(at: int, value: tuple[tuple[str, str, Pose], ...]) -> byte
 
 
 def encode_scan(at: int, value: tuple[str, LaserScan]) -> bytes:
-    """``value``: frame and scan. What was not seen is infinite, what is not known is not a number."""
+    """``value``: frame and scan. Ranges without an echo are infinite, unknown ones NaN."""
     frame, scan = value
     parts = np.rint(scan.ranges * PARTS_A_METRE)
     ranges = np.multiply(parts, 1.0 / PARTS_A_METRE, dtype="<f8")
@@ -184,7 +184,7 @@ def encode_log(at: int, value: tuple[int, str, str]) -> bytes:
 
 
 def encode_scene(at: int, value: tuple[tuple[str, str, Pose, float, float, bool], ...]) -> bytes:
-    """``value``: for each figure its name, frame, pose, radius and height (m), and whether it moves with the frame."""
+    """``value``: name, frame, pose, radius (m), height (m) of each figure, and True if it moves with the frame."""
     message = SceneUpdate_pb2.SceneUpdate()
     for name, frame, pose, radius, height, locked in value:
         entity = message.entities.add(id=name, frame_id=frame, frame_locked=locked)

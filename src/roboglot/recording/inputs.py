@@ -1,6 +1,6 @@
-"""Gives a lockstep world the recorded inputs once more, each at exactly its robot time, in the recorded order.
+"""Replays recorded inputs to a lockstep world, each at exactly its robot time, in the recorded order.
 
-Inputs are requests at the doors, clients that come and hang up, and what came from outside in another way: see
+Inputs are requests at the doors, clients that connect and hang up, and other influences from outside: see
 ``model/inputs/outside.py``.
 """
 
@@ -33,7 +33,7 @@ Repeat = Callable[[Input], Awaitable[object]]
 
 
 def is_of_client(exchange: Exchange) -> bool:
-    """Return whether a client said or heard it: no driver, no frame that a dog's door handed on, for that is asked."""
+    """Return whether a client sent or received it: no driver's exchange, no frame passed on by a dog's door."""
     return not exchange.door.startswith(DRIVER) and not (
         exchange.door == "visual" and exchange.connection.startswith(HANDED_ON)
     )
@@ -42,8 +42,8 @@ def is_of_client(exchange: Exchange) -> bool:
 class Inputs:
     """Plays the inputs of a recording.
 
-    ``where`` returns a new connection to a robot's door, not yet open, as that client had; None where none can be made;
-    ``repeat`` does what one other input says.
+    ``where`` returns a new connection to a robot's door, not yet open, like the recorded client's; None if there can be
+    none. ``repeat`` applies one input of another kind.
     """
 
     def __init__(self, recording: Recording, clock: LockstepClock, where: Where, repeat: Repeat) -> None:
@@ -64,15 +64,15 @@ class Inputs:
         self.unheard: list[str] = []  # inputs without effect, described
 
     def hear(self, exchange: Exchange) -> None:
-        """Listen to the robots' taps with this."""
+        """Count an exchange; a listener for the robots' taps."""
         self._heard[exchange.robot, exchange.door, exchange.direction] += 1
 
     def notice(self, given: Input) -> None:
-        """Listen to the robots' inputs with this."""
+        """Count an input; a listener for the robots' inputs."""
         self._heard[given.robot, given.name, given.kind] += 1
 
     async def play(self, until: float) -> None:
-        """Send all of it, and let robot time pass until then. Clients stay connected until ``close``."""
+        """Replay inputs, and let time pass, up to robot time ``until`` (s). Clients stay connected until ``close``."""
         for place, (number, due) in enumerate(self._due, 1):
             at = due if isinstance(due, Input) else due.request
             if at.stamp > until:
@@ -83,14 +83,14 @@ class Inputs:
         await self._clock.advance_to(max(self._clock.time(), until))
 
     async def close(self) -> None:
-        """Hang up, and end what is not answered."""
+        """Hang up, and cancel unanswered requests."""
         for task in self._tasks:
             task.cancel()
         for line in self._lines.values():
             await _quietly(line.close())
 
     async def _catch_up(self, number: int) -> None:
-        """Wait for replies that were heard before the exchange with this number, however long the machine takes."""
+        """Wait for the replies recorded before the exchange with this number, however long the machine takes."""
         while self._answered < len(self._replies) and self._replies[self._answered][0] < number:
             _, reply = self._replies[self._answered]
             self._answered += 1
@@ -99,7 +99,7 @@ class Inputs:
             self._patience = LOOK
 
     async def _give(self, given: Input) -> None:
-        """Give an input that is no request."""
+        """Apply an input that is not a request."""
         match given.kind:
             case outside.ANSWER:
                 if not await self._wait_until(lambda: self._repeat(given)):
@@ -124,7 +124,7 @@ class Inputs:
                 self._follow(self._repeat(given))  # it may take robot time
 
     async def _see(self, given: Input) -> None:
-        """Wait until the robot has noticed what a client did."""
+        """Wait until the robot has noticed an action of a client."""
         key = given.robot, given.name, given.kind
         self._wanted_inputs[key] += 1
         if not await self._wait_for({key: self._wanted_inputs[key]}):
@@ -134,7 +134,7 @@ class Inputs:
         self.unheard.append(f"{what} at {stamp:.3f}")
 
     async def _send(self, asked: Asked, following: Sequence[tuple[int, Asked | Input]]) -> None:
-        """Send a request, and wait for what is answered at once, before the ``following`` input."""
+        """Send a request, and wait for the answers that were recorded before the ``following`` input."""
         request = asked.request
         end = following[0][0] if following else math.inf
         robot, door = request.robot, request.door
@@ -167,7 +167,7 @@ class Inputs:
         return True
 
     async def _line(self, place: Place, path: str, stamp: float) -> Line | None:
-        """Return a client's connection, opened if it is not yet; None if that cannot be."""
+        """Return a client's connection, opened if necessary; None if that is impossible."""
         if (line := self._lines.get(place)) is not None:
             return line
         robot, door, _ = place

@@ -1,4 +1,4 @@
-"""One connection to any robot, by which recorded requests are sent as they are: a class for each protocol."""
+"""Connections to robots that send recorded requests unchanged; a class for each protocol."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ PATIENCE = 60.0  # s for an answer
 LINE_MAX = 1 << 20
 FRAMES, LOG = "/programs", "/log"  # paths of a WebSocket
 PORTS = {"slamware": 1448, "robomaster": 40923, "cyberdog": 50052, "visual": 50053}
-SHOWN = re.compile(r'"op":"(?:advertise|status)"')  # Foxglove's server has its topics, or says why not
-BINARY = tuple(bytes([opcode]) for opcode in ClientOpcode)  # with which Foxglove's messages begin that are no text
+SHOWN = re.compile(r'"op":"(?:advertise|status)"')  # the Foxglove door has advertised its topics, or reports why not
+BINARY = tuple(bytes([opcode]) for opcode in ClientOpcode)  # first bytes of Foxglove's binary messages
 REFUSALS = tuple(str(reply) for reply in Reply if reply is not Reply.OK)
 Answers = list[tuple[bytes, str]]
 Pushed = Callable[[str, bytes], None]
 
 
 def status_of(door: str, payload: bytes) -> str:
-    """Return an answer's status in the words that the tap uses; REST has it beside the payload."""
+    """Return an answer's status in the tap's words; REST has it beside the payload."""
     text = payload.decode("utf-8", "replace")
     if door == "robomaster":
         return text.rstrip(" ;\r\n") if text.startswith(REFUSALS) else "ok"
@@ -51,7 +51,7 @@ def status_of(door: str, payload: bytes) -> str:
 class Line(ABC):
     """``open`` and ``close`` it; ``ask`` sends one request and returns the answers. Raises ClientError.
 
-    ``comes``: the robot notices when it is opened. ``own``: the address of this machine that it comes from; empty: any.
+    ``comes``: the robot notices the opening. ``own``: local address of this machine; empty: any.
     """
 
     comes, own = True, ""
@@ -65,7 +65,7 @@ class Line(ABC):
 
     @abstractmethod
     async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
-        """Send one request; ``answers``: those that were recorded, for how many there are, and of which kind."""
+        """Send one request; ``answers``: the recorded ones, for the number and kind to expect."""
 
     @abstractmethod
     async def close(self) -> None:
@@ -73,7 +73,7 @@ class Line(ABC):
 
 
 class RestLine(Line):
-    """Slamware."""
+    """Slamware's REST API."""
 
     async def open(self) -> None:
         from roboglot.clients.slamware.http import HttpLink
@@ -122,7 +122,7 @@ class TextLine(Line):
 
 
 class DogLine(Line):
-    """CyberDog's gRPC; ``options`` of the URL: certs, app."""
+    """CyberDog's gRPC; ``options``: certs and app of the URL."""
 
     options: dict[str, str]
 
@@ -149,7 +149,7 @@ class DogLine(Line):
         if not operation.isdigit():
             return found
         code, text = int(operation), payload.decode("utf-8", "replace")
-        if operation in FILES and answers and answers[0][:1] != b"{":  # it came in chunks
+        if operation in FILES and answers and answers[0][:1] != b"{":  # recorded in chunks
             async for chunk in self._link.fetch(code, text):
                 found.append((chunk.SerializeToString(), "ok"))
             return found
@@ -162,7 +162,7 @@ class DogLine(Line):
 
 
 class FrameLine(Line):
-    """Block programs over their WebSocket: answers carry the id of their request, all else is a push.
+    """Block programs over their WebSocket: answers carry the id of their request, other frames are pushes.
 
     An operation that is a path (``/log``) has a socket of its own; ``path`` is that of the first socket.
     """

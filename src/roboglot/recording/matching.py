@@ -1,4 +1,4 @@
-"""Recognises a request that was asked before, although its ids and times are others."""
+"""Recognises a repeated request although its ids and times differ."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ _number = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])")
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """A request without what is made up anew, and what that was, in its order."""
+    """A request without its fresh values (ids, times), and these values in their order."""
 
     text: str
     fresh: tuple[bytes, ...]
 
 
 def normal(door: str, payload: bytes) -> Normal:
-    """Return a request as it can be recognised; ``\\x00`` stands where something was made up."""
+    """Return a request in recognisable form, with ``\\x00`` in place of fresh values."""
     pattern = _BY_DOOR.get(door, _any)
     fresh = tuple(match.group() for match in pattern.finditer(payload))
     return Normal(pattern.sub(b"\0", payload).decode("utf-8", "backslashreplace").strip().rstrip(";").strip(), fresh)
 
 
 def rewritten(payload: bytes, recorded: tuple[bytes, ...], live: tuple[bytes, ...]) -> bytes:
-    """Return an answer of the recording with the live client's ids instead of those that were recorded."""
+    """Return a recorded answer with the live client's ids instead of the recorded ones."""
     pairs = {old.strip(): new.strip() for old, new in zip(recorded, live, strict=False) if old.strip() != new.strip()}
     if not pairs:
         return payload

@@ -1,4 +1,4 @@
-"""Copies what is readable of a file without an end into a whole one, byte for byte, message by message."""
+"""Copies the readable messages of a file without an end into a whole file, byte for byte."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roboglot.recording.reader import records
 
 
 def mend(source: Path, target: Path) -> int:
-    """Return how many messages are in ``target`` now. Raises BadRecording, OSError."""
+    """Copy the messages of ``source`` to ``target``; return their number. Raises BadRecording, OSError."""
     count = 0
     schemas: dict[int, int] = {}
     channels: dict[int, int] = {}

@@ -1,7 +1,7 @@
-"""Our own messages in a recording, as JSON: exchanges of the doors, events, actions, state that changes now and then.
+"""Our own messages in a recording, as JSON: exchanges of the doors, events, actions, slowly changing state.
 
-A payload is ``text + json + base64`` put one after the other, each as far as it is there: so JSON stands in the file as
-JSON for every viewer, and still every byte of the vendor's message can be had back.
+A payload is the concatenation of ``text``, ``json`` and ``base64``, each if present: so viewers see JSON as JSON, and
+every byte of the vendor's message can be restored.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _parsed = msgspec.json.Decoder()
 
 
 class Kept(msgspec.Struct, omit_defaults=True):
-    """An exchange as it stands in the file; see ``model/tap.py`` for the fields."""
+    """An exchange as written to the file; see ``model/tap.py`` for the fields."""
 
     stamp: float
     robot: str
@@ -48,7 +48,7 @@ _kept = msgspec.json.Decoder(Kept)
 
 
 def split(payload: bytes) -> tuple[str, bytes, bytes]:
-    """Return what is text, what is JSON, and what is neither; together they are ``payload``."""
+    """Return the text, the JSON and the remaining bytes of ``payload``, in that order; their sum is ``payload``."""
     head, blank, body = payload.partition(b"\n\n") if payload[:1] not in b"{[" else (b"", b"", payload)
     try:
         if body[:1] in (b"{", b"[") and body[-1:] in (b"}", b"]"):
@@ -88,7 +88,7 @@ def encode_exchange(exchange: Exchange) -> bytes:
 
 
 def decode_exchange(data: bytes) -> Exchange:
-    """Return what ``encode_exchange`` was given. Raises msgspec.DecodeError, ValueError."""
+    """Return the exchange of a message. Raises msgspec.DecodeError, ValueError."""
     kept = _kept.decode(data)
     body = b"" if kept.json is msgspec.UNSET else bytes(kept.json)
     payload = kept.text.encode() + body + (base64.b64decode(kept.base64) if kept.base64 else b"")
@@ -114,18 +114,18 @@ def encode_input(given: Input) -> bytes:
 
 
 def decode_input(data: bytes) -> Input:
-    """Return what ``encode_input`` was given. Raises msgspec.DecodeError."""
+    """Return the input of a message. Raises msgspec.DecodeError."""
     value = _parsed.decode(data)
     return msgspec.convert([value.get(name) for name in Input._fields], Input)
 
 
 def encode_plain(value: object) -> bytes:
-    """Return any value of the model as JSON, in its own words."""
+    """Return any value of the model as JSON, with its own field names."""
     return _encode(plain(value))
 
 
 def plain(value: Any, depth: int = 0) -> Any:
-    """Return ``value`` as what JSON has; what is too deep, too long or unknown is left out or named."""
+    """Return ``value`` in JSON's types; values too deep, too long or unknown are left out or named."""
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):

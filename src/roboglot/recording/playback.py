@@ -1,9 +1,9 @@
-"""Plays a recorded robot: answers what was asked before as it was answered then, and pushes what was pushed then.
+"""Plays a recorded robot: answers recorded requests with their recorded answers, and repeats recorded pushes.
 
-A request is matched by operation and parameters; ids and times that clients make up do not count, and numbers may be a
-little off. What changes something (a command) is matched in the order of the session, each once; what only reads is
-answered as it was between the last command and the next one: in order, then with the last answer again. Times of
-answers and pushes are as recorded, from the command they followed.
+A request is matched by operation and parameters; fresh ids and times of clients are ignored, and numbers may differ a
+little. A command, which changes something, is matched in the order of the session, each once. A reading request gets
+the answers recorded between the last command and the next one: in order, then the last one again. Answers and pushes
+keep their recorded times after the command that they followed.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Playback(StandIn):
     """One recorded robot. ``missing``: requests that were never recorded."""
 
     def __init__(self, exchanges: Sequence[Exchange], clock: Clock, epoch: float, redact: Sequence[str] = ()) -> None:
-        """``epoch``: calendar time at the recording's robot time 0; ``redact``: further fields it was left without."""
+        """``epoch``: Unix time (s) at the recording's robot time 0; ``redact``: further fields redacted in it."""
         self._clock, self._epoch = clock, epoch
         self._redaction = Redaction((*FIELDS, *redact))
         self._doors: dict[str, _Door] = defaultdict(lambda: _Door(Timeline(clock)))
@@ -79,7 +79,7 @@ class Playback(StandIn):
     async def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:
         """See ``StandIn``."""
         began = self._clock.time()
-        live = normal(door, self._redaction.of(door, operation)(payload))  # as it would stand in the recording
+        live = normal(door, self._redaction.of(door, operation)(payload))  # in the form of the recording
         kept = self._doors[door]
         used = len(kept.used)
         place = self._find(kept, operation, live, reads=reads)
@@ -113,7 +113,7 @@ class Playback(StandIn):
         return next((push.payload for _, push in pushes if push.operation == operation), None)
 
     def close(self) -> None:
-        """Push no more."""
+        """Stop all pushes."""
         for door in self._doors.values():
             door.timeline.close()
 
@@ -134,7 +134,7 @@ class Playback(StandIn):
         return place
 
     def _find_read(self, door: _Door, places: Sequence[int]) -> int:
-        """Between the last command and what was asked as a command next."""
+        """Return the index of the read to answer with, between the last command and the next one."""
         after = bisect_right(places, door.cursor)
         until = self._next_change(door)
         window = [place for place in places[after:] if place < until]
@@ -147,7 +147,7 @@ class Playback(StandIn):
         return places[after - 1] if after else places[0]
 
     def _next_change(self, door: _Door) -> int:
-        """The place of the next recorded request that is known to change something; none: beyond the end."""
+        """Return the index of the next recorded command; beyond the end if there is none."""
         for place in range(door.cursor + 1, len(door.asked)):
             if place not in door.used and self._changes(door, door.asked[place][0].request):
                 return place
@@ -167,7 +167,7 @@ class Playback(StandIn):
 
     @staticmethod
     def _near(door: _Door, key: str) -> list[int]:
-        """Return requests whose numbers are nearly the same, the nearest kind first."""
+        """Return the indices of requests with nearly the same numbers."""
         form, numbers = without_numbers(key)
         return [
             place
@@ -186,7 +186,7 @@ class Playback(StandIn):
     # -- pushes --------------------------------------------------------------------------------------------------------
 
     def _schedule(self, door: _Door, place: int, since: float, now: float) -> None:
-        """Let the pushes follow that followed this command, up to the next one; ``since`` then is ``now``."""
+        """Schedule the pushes between this command and the next one; ``since``: recorded time of ``now``."""
         first = door.asked[place][0].number if place >= 0 else -1
         last = math.inf
         for later in range(place + 1, len(door.asked)):
@@ -205,7 +205,7 @@ class Playback(StandIn):
             send(push.operation, payload)
 
     def _as_now(self, recorded: Exchange, old: tuple[bytes, ...], new: tuple[bytes, ...]) -> bytes:
-        """Return what was said with the ids of now, and its Unix times moved to today; files as they are."""
+        """Return a recorded payload with current ids, and Unix times moved to now; files are unchanged."""
         try:
             recorded.payload.decode()
         except UnicodeDecodeError:

@@ -1,6 +1,6 @@
-"""Asks a robot all that can be asked without changing anything, so that robots can be compared that no one recorded.
+"""Sends a robot every read-only request, so that robots without recordings can be compared.
 
-Which operations only read, a door's table says; it comes with the call, for recordings know no door.
+The caller names the read-only operations from a door's table, as recordings know no door.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ def questions(door: str, operations: Iterable[str], rounds: int = ROUNDS) -> lis
 
 
 async def probe(target: Target, operations: Iterable[str], clock: Clock) -> Sequence[Exchange]:
-    """Return the session of a robot that is asked them. Raises ClientError where it cannot be reached."""
+    """Send these operations to a robot and return the session. Raises ClientError if it cannot be reached."""
     return await asked_again(questions(target.door, operations), target, clock, fast=True)
 
 
 async def asked_again(
     recorded: Sequence[Exchange], target: Target, clock: Clock, *, fast: bool = False
 ) -> Sequence[Exchange]:
-    """Return the session of a robot that is asked what was recorded. Raises ClientError."""
+    """Replay recorded requests to a robot and return the session. Raises ClientError."""
     try:
         return await Replay(recorded, target, clock, fast=fast).run()
     except* ClientError as errors:
@@ -56,7 +56,7 @@ def first_of(errors: BaseExceptionGroup[BaseException]) -> BaseException:
 
 
 def reads_only(exchanges: Sequence[Exchange], reads: Iterable[str]) -> list[Exchange]:
-    """Return those of a recording whose operations change nothing, with what opens a session."""
+    """Return the exchanges of read-only operations, and those that open a session."""
     kept = set(reads) | {operation for first in BEFORE.values() for operation in first}
     return [exchange for exchange in exchanges if exchange.operation in kept]
 

@@ -1,4 +1,4 @@
-"""Reads a recording back: exchanges, events, marks, facts, files; also one whose program was killed while it wrote."""
+"""Reads a recording: exchanges, events, marks, facts, files; even if its program was killed while writing."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ class Record:
     data: bytes
 
     def json(self) -> Any:
-        """The message, if it is one of ours."""
+        """Return the message parsed; only for JSON messages."""
         return json.loads(self.data)
 
 
 @dataclass(slots=True)
 class Recording:
-    """``whole`` is False if the file has no end: its program was killed, or still writes."""
+    """``whole`` is False if the file has no end: its program was killed, or is still writing."""
 
     path: Path
     facts: dict[str, str] = field(default_factory=dict)
@@ -59,7 +59,7 @@ class Recording:
 
     @property
     def robots(self) -> Sequence[str]:
-        """Names of the robots that spoke."""
+        """Names of the robots with exchanges, sorted."""
         return sorted({exchange.robot for exchange in self.exchanges})
 
     @property
@@ -68,7 +68,7 @@ class Recording:
         return (self.last - self.first) / 1e9
 
     def session(self, robot: str = "", door: str = "") -> list[Exchange]:
-        """Return the exchanges of the one robot, or of that one, at that door. Raises BadRecording."""
+        """Return the exchanges of a robot (empty: the only one) at a door (empty: any). Raises BadRecording."""
         if not robot and len(self.robots) > 1:
             raise BadRecording(f"{self.path} has the robots {', '.join(self.robots)}: choose one with --robot")
         if not (found := self.of(robot, door)):
@@ -76,13 +76,13 @@ class Recording:
         return found
 
     def of(self, robot: str = "", door: str = "") -> list[Exchange]:
-        """Return its exchanges, or those of one robot, of one door."""
+        """Return the exchanges of a robot (empty: all) at a door (empty: all)."""
         return [e for e in self.exchanges if robot in ("", e.robot) and door in ("", e.door)]
 
 
 @dataclass(slots=True)
 class Asked:
-    """A request with all its replies, and their places in the recording."""
+    """A request with all its replies, and their indices in the recording."""
 
     number: int
     request: Exchange
@@ -90,12 +90,12 @@ class Asked:
 
     @property
     def replies(self) -> list[Exchange]:
-        """The replies alone."""
+        """The replies without their indices."""
         return [reply for _, reply in self.numbered]
 
 
 def pair(exchanges: Sequence[Exchange]) -> tuple[list[Asked], list[tuple[int, Exchange]]]:
-    """Return requests with their replies, and pushes; each with its place among all exchanges."""
+    """Return requests with their replies, and pushes; each with its index among all exchanges."""
     asked: list[Asked] = []
     pushes: list[tuple[int, Exchange]] = []
     waiting: dict[tuple[str, str, str, str], list[Asked]] = {}
@@ -114,7 +114,7 @@ def pair(exchanges: Sequence[Exchange]) -> tuple[list[Asked], list[tuple[int, Ex
 
 
 def _answer(open_ones: list[Asked], number: int, reply: Exchange) -> None:
-    """Give the reply to the request that it says it belongs to: by when that was asked."""
+    """Add the reply to its request, found by the request's time."""
     if not open_ones:
         return
     began = reply.stamp - reply.seconds
@@ -149,7 +149,7 @@ def records(path: Path) -> Iterator[tuple[object, Channel | None, Schema | None]
 
 
 def stream(path: Path, file: IO[bytes], *, chunks: bool = False) -> Iterator[McapRecord]:
-    """Yield the records of an open file, or with ``chunks`` these as they are; ends where the file is cut off.
+    """Yield the records of an open file, with ``chunks`` undivided chunks; ends where the file is cut off.
 
     Raises BadRecording, OSError.
     """
@@ -172,7 +172,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def parts(path: Path) -> Sequence[Path]:
-    """Return the files that a recording consists of."""
+    """Return the files of a recording, in order."""
     found, stem, number = [path], path.stem, 2
     if (numbered := re.fullmatch(r"(.+)-(\d{3,})", stem)) and _part_of(path) == numbered[2].lstrip("0") != "1":
         stem, number = numbered[1], int(numbered[2]) + 1  # earlier parts were deleted, or are not wanted
@@ -183,7 +183,7 @@ def parts(path: Path) -> Sequence[Path]:
 
 
 def _part_of(path: Path) -> str:
-    """Return the number that a part says it has; empty if it says none."""
+    """Return the number in a part's metadata; empty if there is none."""
     found = (record for record, *_ in records(path) if isinstance(record, Metadata) and record.name == "roboglot")
     return str(next((record.metadata.get("part", "") for record in found), ""))
 

@@ -1,4 +1,4 @@
-"""Records all robots of one program: into files, or only the last minutes into memory, until something goes wrong."""
+"""Records all robots of one program: into files, or only the last minutes into memory, saved when a fault occurs."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ DROPS_PERIOD = 10.0  # s between two warnings
 
 
 class NotRecording(RobotError):
-    """No recording is under way, or there is one already; or it cannot be written."""
+    """No recording is running, or one already is, or it cannot be written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """Progress of a recording. ``path`` is empty while only the ring is kept."""
+    """Progress of a recording. ``path`` is empty if only the ring is kept."""
 
     on: bool
     path: str = ""
@@ -52,7 +52,7 @@ class Status:
 
 
 class Recorder:
-    """One program's. Made without work; ``start`` begins a recording, ``stop`` ends it."""
+    """Recorder of one program. Idle until ``start``, which begins a recording; ``stop`` ends it."""
 
     def __init__(
         self,
@@ -102,9 +102,9 @@ class Recorder:
         )
 
     def start(self, to: str = "") -> Path:
-        """Record into a file, or a folder (an existing one, or a path with a slash at its end); returns the file.
+        """Record into a file, or a folder (an existing one, or a path that ends in a slash); return the file.
 
-        Raises NotRecording where that cannot be.
+        Raises NotRecording if a recording runs already or the file cannot be written.
         """
         if self._files is not None:
             raise NotRecording(f"a recording is under way: {self._files.path}")
@@ -124,7 +124,7 @@ class Recorder:
         return files.path
 
     async def stop(self) -> Status:
-        """End the recording; returns what it has done. Raises NotRecording."""
+        """End the recording; return its final status. Raises NotRecording."""
         if self._files is None or self._thread is None:
             raise NotRecording("nothing is recorded")
         thread, files = self._thread, self._files
@@ -147,7 +147,7 @@ class Recorder:
         return status
 
     def mark(self, text: str) -> None:
-        """Note a remark of a person at this moment. Raises NotRecording."""
+        """Record a person's remark at the current time. Raises NotRecording."""
         if self._thread is None and self._ring_thread is None:
             raise NotRecording("nothing is recorded")
         at, wall = self._stamp()
@@ -165,8 +165,7 @@ class Recorder:
     def keep_ring(self, folder: Path) -> None:
         """Keep the last minutes in memory from now on.
 
-        They are written into ``folder`` when a robot has a new fault, and when something in this program breaks that
-        no one catches.
+        They are written into ``folder`` at a robot's new fault, and at an uncaught exception of this program.
         """
         if self._ring is not None:
             return
@@ -182,7 +181,7 @@ class Recorder:
         self._look_at_robots()
 
     def _watch_loop(self, folder: Path) -> Callable[[], None]:
-        """Save at what breaks in the event loop, then have it handled as ever; returns what ends that."""
+        """Save the ring at an uncaught exception of the event loop; return a function that ends that."""
         loop = asyncio.get_running_loop()
         before = loop.get_exception_handler()
 
@@ -198,7 +197,7 @@ class Recorder:
         return lambda: loop.set_exception_handler(before) if loop.get_exception_handler() is handle else None
 
     def save_ring(self, path: Path) -> int:
-        """Write the last minutes to ``path``; returns how many values. Raises NotRecording, OSError."""
+        """Write the last minutes to ``path``; return the number of values. Raises NotRecording, OSError."""
         if self._ring is None or self._ring_thread is None:
             raise NotRecording("the last minutes are not kept: start with --record-ring")
         self._ring_thread.settle()
@@ -240,7 +239,7 @@ class Recorder:
         self._sampling = asyncio.get_running_loop().create_task(self._sample(), name="recorder")
 
     def _look_again(self) -> None:
-        """Tell a recording that begins beside another one how things stand."""
+        """Sample all standing values again, for a recording that begins beside another."""
         for sampler in self._samplers:
             sampler.again()
         if self._truth is not None:
@@ -290,13 +289,13 @@ class Recorder:
         self._put(Entry("/inputs", "input", *self._stamp(), given))
 
     def note_log(self, record: logging.LogRecord) -> None:
-        """Take a line of the log along."""
+        """Record a line of the log."""
         at, wall = self._stamp()
         with contextlib.suppress(Exception):  # a broken log line must not break its logger
             self._put(Entry("/log", "log", at, wall, (record.levelno, record.name, record.getMessage()[:2000])))
 
     async def close(self) -> None:
-        """End everything."""
+        """End the recording, the ring and all sampling."""
         if self._files is not None:
             await self.stop()
         if self._ring_thread is not None:
@@ -308,7 +307,7 @@ class Recorder:
 
 
 class _LogHandler(logging.Handler):
-    """Puts the program's log into the recording."""
+    """Passes the program's log to the recording."""
 
     def __init__(self, recorder: Recorder) -> None:
         super().__init__(logging.INFO)

@@ -1,7 +1,7 @@
-"""Takes out of messages what must not leave the house: passwords, tokens, Wi-Fi keys, names and faces of people.
+"""Redacts confidential data in messages: passwords, tokens, Wi-Fi keys, names and faces of people.
 
-Works on bytes: everything else of a message stays as it was, byte for byte. Photos and films of real robots, where
-anyone may be seen, keep their size alone.
+Works on bytes: the rest of a message stays the same, byte for byte. Photos and films of real robots, which may show
+anyone, keep only their size.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class Redaction:
         self._in_query = re.compile(rb"([?&; ](?:" + names + rb")=)[^&;\s\"]*", re.IGNORECASE)
 
     def __call__(self, payload: bytes) -> bytes:
-        """Return ``payload`` without what must stay secret."""
+        """Return ``payload`` with secrets redacted."""
         low = payload.lower()
         if self._names and b"describe" in low:
             payload = _listed.sub(rb"\1\4" + REDACTED + rb"\3\6", payload)
@@ -107,7 +107,7 @@ class Redaction:
         return self._in_query.sub(rb"\1" + REDACTED, payload)
 
     def of(self, door: str, operation: str) -> Redaction:
-        """Return what is used for the payloads of an operation at a door, or at the driver of such robots."""
+        """Return the redaction of an operation's payloads at a door, or at the driver of such robots."""
         key = door.removeprefix(DRIVER), operation
         if key not in FIELDS_OF:
             return self
@@ -116,10 +116,10 @@ class Redaction:
         return self._more[key]
 
     def exchange(self, exchange: Exchange) -> Exchange:
-        """Return an exchange without what must stay secret."""
+        """Return an exchange with secrets redacted."""
         payload = self.of(exchange.door, exchange.operation)(exchange.payload)
         if exchange.refusal and (exchange.door.removeprefix(DRIVER), exchange.operation) in QUOTING:
-            payload = _quoted_in_json.sub(REDACTED, payload)  # a REST refusal says it in its body, too
+            payload = _quoted_in_json.sub(REDACTED, payload)  # a REST refusal quotes it in its body, too
             return exchange._replace(payload=payload, refusal=_quoted.sub(REDACTED.decode(), exchange.refusal))
         return exchange._replace(payload=payload)
 

@@ -1,4 +1,4 @@
-"""Finds the messages of a recording by their time, and reads only the chunks that it needs for them.
+"""Finds messages of a recording by their time, reading only the necessary chunks.
 
 A whole file has an index; one that was cut off is read once, from the front.
 """
@@ -29,7 +29,7 @@ RECORD_HEAD = 9  # bytes: opcode and length
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic and how its messages are written, as the file has it."""
+    """A topic and the encoding of its messages, from the file."""
 
     name: str
     encoding: str
@@ -39,7 +39,7 @@ class Topic:
 
 
 class Shot(NamedTuple):
-    """One message: its time in ns since 1970, the place of its topic in ``Reel.topics``, and its bytes."""
+    """One message: its time in ns since 1970, the index of its topic in ``Reel.topics``, and its bytes."""
 
     at: int
     topic: int
@@ -48,7 +48,7 @@ class Shot(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """One file, and the places of its channels in ``Reel.topics``."""
+    """One file, and the indices of its channels in ``Reel.topics``."""
 
     path: Path
     places: Mapping[int, int]
@@ -78,7 +78,7 @@ class Reel:
         self._ends = list(accumulate((chunk.last for chunk in self._chunks), max))  # of each chunk and all before it
 
     def play(self, since: int) -> Iterator[Sequence[Shot]]:
-        """Yield all messages at or after that time, some together, none earlier than those yielded before.
+        """Yield all messages at or after ``since`` (ns since 1970) in batches, ordered by time.
 
         Messages of the same time come together. Raises BadRecording, OSError.
         """
@@ -95,7 +95,7 @@ class Reel:
                 del waiting[:ready]
 
     def last(self, at: int, topics: Collection[int]) -> list[Shot]:
-        """Return the last message of each of these topics at or before that time. Raises BadRecording, OSError."""
+        """Return the last message of each topic at or before ``at`` (ns since 1970). Raises BadRecording, OSError."""
         found: dict[int, Shot] = {}
         for number in range(bisect_right(self._chunks, at, key=lambda chunk: chunk.first) - 1, -1, -1):
             # An entry is final when no earlier chunk reaches beyond it.
@@ -144,7 +144,7 @@ class Reel:
             offset = file.tell()
 
     def _places(self, channels: Collection[Channel], schemas: Mapping[int, Schema]) -> dict[int, int]:
-        """Return the places of these channels among the topics, which new ones join."""
+        """Return the indices of these channels in ``topics``; new topics are added."""
         found = {}
         for channel in channels:
             if (schema := schemas.get(channel.schema_id)) is None:
@@ -178,7 +178,7 @@ def _time(shot: Shot) -> int:
 
 
 def _before(shots: Sequence[Shot], until: int) -> int:
-    """Return how many of them, which are in order, come before that time."""
+    """Return the number of ``shots``, which are in order, before ``until`` (ns since 1970)."""
     return bisect_right(shots, until - 1, key=_time)
 
 

@@ -1,4 +1,4 @@
-"""Sends the requests of a recording to a robot again, in their order and at their times, and keeps what it answers."""
+"""Sends the requests of a recording to a robot again, in order and at their times, and collects the answers."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ IDS_MAX = 10_000
 
 
 def sendable(exchanges: Sequence[Exchange]) -> tuple[list[Exchange], int]:
-    """Return a session without the requests whose values were redacted, and their answers; and how many those are.
+    """Return a session without redacted requests and their answers, and the number of requests left out.
 
-    Sent as they are, they would name a robot's Wi-Fi, or a person, "[redacted]".
+    Sent unchanged, they would name a robot's Wi-Fi or a person "[redacted]".
     """
     asked, _ = pair(exchanges)
     held = [one for one in asked if REDACTED in one.request.payload]
@@ -29,7 +29,7 @@ def sendable(exchanges: Sequence[Exchange]) -> tuple[list[Exchange], int]:
 
 
 class Replay:
-    """One replay; ``run`` returns the session as the robot at ``target`` had it."""
+    """One replay; ``run`` returns the session with the robot at ``target``."""
 
     def __init__(self, recorded: Sequence[Exchange], target: Target, clock: Clock, *, fast: bool = False) -> None:
         self._asked = [asked for asked in pair(sendable(recorded)[0])[0] if asked.request.door == target.door]
@@ -41,7 +41,7 @@ class Replay:
         self._lost: LinkLost | None = None
 
     async def run(self) -> list[Exchange]:
-        """Raises ClientError where the robot cannot be reached at all."""
+        """Run the replay and return the new session. Raises ClientError if the robot was never reached."""
         self._started = self._clock.time()
         if self._fast:
             await self._one_line(self._asked)
@@ -52,7 +52,7 @@ class Replay:
             async with asyncio.TaskGroup() as tasks:
                 for mine in lines.values():
                     tasks.create_task(self._one_line(mine))
-        if self._lost and not self._answered:  # no session consists of an absent robot's silence
+        if self._lost and not self._answered:  # an absent robot has no session
             raise self._lost
         return sorted(self._found, key=lambda exchange: exchange.stamp)
 
@@ -111,7 +111,7 @@ class Replay:
     # -- ids given by the robot ----------------------------------------------------------------------------------------
 
     def _learn(self, recorded: bytes, live: bytes) -> None:
-        """Remember what the robot calls now what it called otherwise then."""
+        """Remember the robot's new ids for the recorded ones."""
         then: dict[str, object] = dict(leaves(tree(recorded)))
         for path, value in leaves(tree(live)):
             old = then.get(path)
@@ -119,7 +119,7 @@ class Replay:
                 self._ids[str(old)] = str(value)
 
     def _renamed(self, payload: bytes) -> bytes:
-        """Return a request with the ids of now: in the path, and in JSON under names that end in id."""
+        """Return a request with the new ids: in the path, and in JSON fields whose names end in id."""
         if not self._ids:
             return payload
         head, blank, body = payload.partition(b"\n\n") if self._target.door == "slamware" else (b"", b"", payload)

@@ -1,6 +1,6 @@
-"""The last minutes, kept in memory, compressed second by second; written to a file when something went wrong.
+"""The last minutes, kept in memory, compressed second by second; written to a file after a fault.
 
-What is noted only when it changes (the map, faults) is kept when its block is forgotten: the file begins with it.
+Standing values (the map, faults) outlive their block: the file begins with them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BLOCK_SECONDS = 1.0
 
 
 class Ring:
-    """A sink that forgets. ``save`` may be called from any thread."""
+    """A sink that keeps the newest entries. ``save`` may be called from any thread."""
 
     def __init__(self, origin: Origin, redaction: Redaction, seconds: float = 300.0) -> None:
         self._origin, self._redaction, self._seconds = origin, redaction, seconds
@@ -34,21 +34,21 @@ class Ring:
 
     @property
     def size(self) -> int:
-        """Bytes in memory."""
+        """Size in memory, bytes."""
         return self._bytes
 
     def write(self, entry: Entry) -> None:
-        """Keep one entry, and forget those that are too old."""
+        """Keep one entry, and drop those that are too old."""
         with self._lock:
             if self._open and entry.at - self._open[0].at > BLOCK_SECONDS * NANO:
                 self._close_block()
             self._open.append(entry)
 
     def flush(self) -> None:
-        """Do nothing: nothing is safe here."""
+        """Do nothing: entries are in memory only."""
 
     def close(self) -> None:
-        """Forget all."""
+        """Drop all entries."""
         with self._lock:
             self._blocks.clear()
             self._standing.clear()

@@ -1,6 +1,6 @@
-"""Recorded messages in ROS 2's types, as CDR: scans, frames, odometry, poses, maps, batteries, video, logs.
+"""Recorded messages in ROS 2 types, as CDR: scans, frames, odometry, poses, maps, batteries, video, logs.
 
-What ROS has no type for (the doors' exchanges, events, actions, states) is JSON in a ``std_msgs/String``.
+Values without a ROS type (exchanges of doors, events, actions, states) are JSON in a ``std_msgs/String``.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 class _Battery(TypedDict, total=False):
-    """``roboglot.Battery`` as far as ROS has a place for it."""
+    """The fields of ``roboglot.Battery`` that ROS has, too."""
 
     charging: bool
     voltage: float | None
@@ -58,7 +58,7 @@ class RosMessage(NamedTuple):
 
 
 def read_cdr(data: bytes, type: str) -> object:
-    """Return a message. Raises ValueError for what is none."""
+    """Return a decoded message. Raises ValueError for bad data."""
     try:
         return STORE.deserialize_cdr(data, type)
     except (SerdeError, struct.error, LookupError, AssertionError, OverflowError) as error:
@@ -91,9 +91,9 @@ def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Msg:
 
 
 class Ros2Words:
-    """Translates one recording, in its order: speeds and reaches are made of what came before.
+    """Translates one recording, in its order, as speeds and ranges depend on earlier messages.
 
-    ``robot``: only what is this robot's; empty: everything.
+    ``robot``: only this robot's messages; empty: all.
     """
 
     def __init__(self, robot: str = "") -> None:
@@ -112,7 +112,7 @@ class Ros2Words:
         }
 
     def translate(self, record: Record) -> Iterator[RosMessage]:
-        """Yield the messages that say what ``record`` says. Raises ValueError for a damaged one."""
+        """Yield the ROS messages of ``record``. Raises ValueError for a damaged one."""
         if self._robot and record.topic != "/tf" and self._robot not in record.topic.split("/")[1:3]:
             return
         if record.schema in TYPES:
@@ -189,7 +189,7 @@ class Ros2Words:
         )
 
     def _mount(self, at: int, frame: FrameTransform, transform: Msg) -> Iterator[RosMessage]:
-        """Yield the laser's mount, when it is new."""
+        """Yield the laser's mount if it has changed."""
         place = (frame.translation.x, frame.translation.y, frame.rotation.z, frame.rotation.w)
         if self._mounts.get(frame.child_frame_id) != place:
             self._mounts[frame.child_frame_id] = place
@@ -222,7 +222,7 @@ class Ros2Words:
         return self._made(f"/{robot}/odom", "nav_msgs/msg/Odometry", at, message)
 
     def _speed(self, robot: str, at: int, here: Pose) -> Pose:
-        """Metres and radians a second in base_link, over the last half second: stamps of poses are a little off."""
+        """Return the velocity in base_link (m/s, rad/s) over the last half second, as stamps of poses are inexact."""
         past = self._past.setdefault(robot, deque())
         while past and not 0.0 < at - past[0][0] <= SPEED_SPAN * 1e9:
             past.popleft()
@@ -258,7 +258,7 @@ class Ros2Words:
         yield self._compressed(f"{record.topic}/compressed", record.at, message.frame_id, message.format, message.data)
 
     def picture(self, at: int, frame: str, jpeg: bytes) -> RosMessage:
-        """Return a picture; its topic is the caller's."""
+        """Return a picture as a message; the caller sets its topic."""
         return self._compressed("", at, frame, "jpeg", jpeg)
 
     def _compressed(self, topic: str, at: int, frame: str, form: str, data: bytes) -> RosMessage:
@@ -267,7 +267,7 @@ class Ros2Words:
         return self._made(topic, type, at, picture)
 
     def joints(self, at: int, positions: Mapping[str, float]) -> RosMessage:
-        """Return where joints stand (rad); its topic is the caller's."""
+        """Return joint positions (rad) as a message; the caller sets its topic."""
         type, none = "sensor_msgs/msg/JointState", np.array([], np.float64)
         angles = np.array(list(positions.values()), np.float64)
         message = _new(type, header=_header(at, ""), name=list(positions), position=angles, velocity=none, effort=none)
@@ -277,7 +277,7 @@ class Ros2Words:
         yield self.line(record.at, ROS_LEVELS.get(message.level, 20), message.name, message.message)
 
     def line(self, at: int, level: int, name: str, text: str) -> RosMessage:
-        """Return a line of the log."""
+        """Return a line of the log as a message."""
         type = "rcl_interfaces/msg/Log"
         line = _new(type, stamp=_time(at), level=level, name=name, msg=text, file="", function="", line=0)
         return self._made("/rosout", type, at, line)

@@ -1,4 +1,4 @@
-"""Writes a recording as a bag of ROS 2: a folder with ``metadata.yaml`` and an MCAP or SQLite file."""
+"""Writes a recording as a ROS 2 bag: a folder with ``metadata.yaml`` and an MCAP or SQLite file."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ NEVER = QosTime(2147483647, 4294967295)
 
 
 def export(recording: Path, bag: Path, storage: str = "mcap", robot: str = "") -> Counter[str]:
-    """Write the messages of a recording, or of one robot, into the new folder ``bag``; returns how many by topic.
+    """Write the messages of a recording, or of one robot, into the new folder ``bag``; return counts by topic.
 
-    Raises BadRecording, OSError; then no new folder stays.
+    Raises BadRecording, OSError; a new folder is then removed.
     """
     new = not bag.exists()
     try:

@@ -1,4 +1,4 @@
-"""Watches one robot for a recording: what it says at its doors, what happens to it, what it sees and where it is."""
+"""Watches one robot for a recording: exchanges at its doors, events, sensor data and poses."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ class Stamps:
         self._epoch = round((robot.clock.epoch() - robot.clock.time()) * 1e6) * 1000
 
     def at(self, stamp: float) -> int:
-        """The nanoseconds of this robot time (s)."""
+        """Return a robot time (s) as ns since 1970."""
         return self._epoch + round(stamp * 1e9)
 
     def now(self) -> tuple[int, int]:
-        """Robot time and the machine's time."""
+        """Return robot time and the machine's time, both in ns since 1970."""
         return self.at(self._clock.time()), time.time_ns()
 
 
 class Sampler:
-    """One robot's. ``close`` ends it."""
+    """Samples one robot until ``close``."""
 
     def __init__(self, robot: Robot, put: Put, *, video: bool = False, photos: bool = False) -> None:
-        """``video``: with the camera; ``photos``: those of a real robot, too."""
+        """``video``: record the camera; ``photos``: record photos of a real robot, too."""
         self._robot, self._put, self._photos = robot, put, photos
         self._stamps = Stamps(robot)
         self._topic = f"/{robot.id}"
@@ -68,13 +68,13 @@ class Sampler:
         self.film(video)
 
     def close(self) -> None:
-        """Look away."""
+        """Stop sampling and filming."""
         for leave in self._leave:
             leave()
         self.film(False)
 
     def film(self, on: bool) -> None:
-        """Look through the camera from now on, or no more; nothing changes if it is so already."""
+        """Start or stop recording the camera; no effect if it is so already."""
         if on and self._filming is None:
             self._filming = asyncio.get_running_loop().create_task(self._film(), name="film")
         elif not on and self._filming is not None:
@@ -82,12 +82,12 @@ class Sampler:
             self._filming = None
 
     def again(self) -> None:
-        """Report once more what is noted only when it changes: another recording begins."""
+        """Report standing values again, as another recording begins."""
         self._before.clear()
         self._shown = False
 
     def beat(self, number: int) -> None:
-        """Look at what moves; now and then at the rest."""
+        """Sample poses; every ``STATE_BEATS`` beats the other values, too."""
         at, wall = self._stamps.now()
         self._note_places(at, wall)
         if number % STATE_BEATS == 0:
@@ -188,7 +188,7 @@ class Sampler:
 
 
 def _action(event: ActionChanged) -> dict[str, object]:
-    """Return the current state of an action, which changes later."""
+    """Return a copy of an action's state, as the action itself changes later."""
     action: Any = event.action
     return {
         "id": action.id,

@@ -1,4 +1,4 @@
-"""Values that are noted once or when they change (body, map, faults): the last one holds until the next."""
+"""Standing values, recorded once or when they change (body, map, faults): the last one holds until the next."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ REPEATED = 0  # the sequence number of messages repeated from an earlier part
 
 
 class Standing:
-    """The last entry of each topic of these kinds."""
+    """The last entry of each topic with standing values."""
 
     def __init__(self) -> None:
         self._last: dict[str, Entry] = {}
 
     def note(self, entry: Entry) -> None:
-        """Keep it, if it holds until the next one."""
+        """Keep an entry if its value is a standing one."""
         if entry.kind in STANDING and (entry.topic in self._last or len(self._last) < STANDING_MAX):
             self._last[entry.topic] = entry
 
     def at(self, at: int) -> Sequence[Entry]:
-        """Return all of them, as they are at this time (ns since 1970)."""
+        """Return all entries with this time (ns since 1970)."""
         return [entry._replace(at=at) for entry in self._last.values()]

@@ -1,4 +1,4 @@
-"""The thread that writes: entries wait for it in a bounded queue, and the event loop never waits for a disk."""
+"""The writer thread: entries wait in a bounded queue, and the event loop never waits for a disk."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ class Sink(Protocol):
     """Receiver of entries; called in the thread alone."""
 
     def write(self, entry: Entry) -> None:
-        """Add one. Raises OSError."""
+        """Add an entry. Raises OSError."""
 
     def flush(self) -> None:
-        """Make safe what was written. Raises OSError."""
+        """Hand all entries to the system, so that they survive the process. Raises OSError."""
 
     def close(self) -> None:
-        """End. Raises OSError."""
+        """Finish and close. Raises OSError."""
 
 
 class WriterThread:
-    """``put`` from the event loop or any thread; ``close`` writes what waits. What finds no room is lost, and counted.
+    """``put`` from the event loop or any thread; ``close`` writes the queue. A full queue drops and counts entries.
 
-    ``patient``: ``put`` waits for room instead (lockstep: time stands still meanwhile).
+    ``patient``: ``put`` waits for room instead (in lockstep, where time stands still meanwhile).
     """
 
     def __init__(self, sink: Sink, *, patient: bool = False) -> None:
@@ -50,9 +50,9 @@ class WriterThread:
         self._thread.start()
 
     def put(self, entry: Entry) -> bool:
-        """Have it written soon; False: it is lost."""
+        """Queue an entry; return False if it was dropped."""
         weight = entry.weight
-        with self._lock:  # without the way through Python of a condition
+        with self._lock:  # a plain lock is faster than a condition, which is Python code
             while self._patient and not self.failure and not self._ending and self._full(weight):
                 self._wake.set()
                 self._room.wait(PERIOD)
@@ -64,7 +64,7 @@ class WriterThread:
             return True
 
     def settle(self, patience: float = 10.0) -> None:
-        """Return when all that waits now is with the sink, or after so many s."""
+        """Return when everything queued now is in the sink, or after ``patience`` s."""
         with self._room:
             self._settled.clear()
         self._wake.set()
@@ -74,7 +74,7 @@ class WriterThread:
         return len(self._queue) >= ENTRIES_MAX or (bool(self._queue) and self._weight + weight > BYTES_MAX)
 
     def close(self, patience: float = 10.0) -> None:
-        """Write what waits, then end the sink; returns when that is done, or after so many s."""
+        """Write the queue and close the sink; return when done, or after ``patience`` s."""
         self._ending = True
         self._wake.set()
         self._thread.join(patience)

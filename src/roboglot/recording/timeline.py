@@ -1,4 +1,4 @@
-"""Lets answers and pushes of one door go out in the order of the recording, however late the machine is.
+"""Sends answers and pushes of one door in the order of the recording, however late the machine is.
 
 Timers alone do not: when a busy machine finds several due at once, a push is sent inside its timer, but an answer only
 wakes the task that will send it. So one timer serves all, and after an answer the rest waits until that task has run.
@@ -20,11 +20,11 @@ EARLIER = 0.25  # s for which an answer waits for pushes recorded before it
 class _Item:
     due: float
     number: int
-    send: Callable[[], bool] = field(compare=False)  # whether another task continues from here
+    send: Callable[[], bool] = field(compare=False)  # returns True if another task continues from here
 
 
 class Timeline:
-    """Pending messages, by their time, then by their number in the recording."""
+    """Pending messages, ordered by time, then by number in the recording."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -33,7 +33,7 @@ class Timeline:
         self._giving_way = False
 
     def push(self, due: float, number: int, send: Callable[[], None]) -> None:
-        """Call ``send`` when it is its turn."""
+        """Call ``send`` in its turn; ``due``: s of robot time."""
 
         def play() -> bool:
             send()
@@ -44,7 +44,7 @@ class Timeline:
     async def turn(self, due: float, number: int, *, in_order: bool) -> None:
         """Wait for the turn of an answer; it must be sent before its task waits for anything else.
 
-        ``in_order``: what was recorded before it, and is nearly due, goes first.
+        ``in_order``: nearly due messages that were recorded earlier go first.
         """
         if in_order:
             first, last = self._place(due), self._place(due + EARLIER)
@@ -61,7 +61,7 @@ class Timeline:
         await woken
 
     def close(self) -> None:
-        """Send nothing more by itself."""
+        """Drop all pending messages."""
         self._items.clear()
         self._arm()
 

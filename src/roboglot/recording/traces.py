@@ -1,4 +1,4 @@
-"""Two recordings of what should have been the same: the first message in which they differ, with its surroundings."""
+"""Compares two recordings that should be equal: the first message that differs, with the messages before it."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from roboglot.recording.reader import Record, read_messages
 AROUND = 5  # messages shown before the first difference
 SHOWN_MAX = 300  # characters per message
 LEFT_OUT = frozenset({"/log"})  # log lines contain ports
-COMING = frozenset({CAME, GONE})  # inputs that a rerun gives by itself, and reports where it cannot
+COMING = frozenset({CAME, GONE})  # inputs that a rerun repeats by itself, or reports if it cannot
 SAID = ("roboglot.Exchange", "roboglot.Input")
 ADDRESS = re.compile(rb"((?:\d{1,3}\.){3}\d{1,3}|[0-9a-f]*:[0-9a-f:.]+):\d{1,5}(?!\d)")
 HERE = b"127.0.0.1"  # where a rerun's clients are
-UNCOUNTED = ("connection", "client", "turn")  # of exchanges and inputs: ends of clients, and a visible order
+UNCOUNTED = ("connection", "client", "turn")  # clients' addresses, and an order visible anyway
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """The first difference: the recorded and the new message, in words, and the last ones on which both agree."""
+    """The first difference: the recorded and the new message as text, and the last messages on which both agree."""
 
     topic: str
     before: Sequence[str]
@@ -37,7 +37,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Number of messages that agreed, and the first that did not; None: the traces are identical."""
+    """Number of equal messages, and the first difference; None: the traces are identical."""
 
     agreed: int
     difference: Difference | None
@@ -46,8 +46,8 @@ class Verdict:
 def difference(recorded: Path, now: Path) -> Verdict:
     """Compare the messages of two files: topic, robot time and bytes, in order. Raises BadRecording, OSError.
 
-    Within one instant the order counts in each topic, and there among requests, among replies and among pushes of one
-    kind: which of two that do not wait for each other comes first is the machine's affair.
+    Within one instant, order counts per topic, among requests, among replies and among pushes of one kind only: the
+    order of independent messages depends on the machine.
     """
     around: deque[str] = deque(maxlen=AROUND)
     agreed = 0
@@ -78,9 +78,9 @@ def _counts(record: Record) -> bool:
 
 
 class _Ends:
-    """Clients' addresses so far, also where they stand in actions' sources.
+    """Clients' addresses so far, which are in actions' sources, too.
 
-    Their ports are the machine's choice, and clients of other machines are this one's in a rerun.
+    The machine chooses their ports, and in a rerun clients of other machines are on this one.
     """
 
     def __init__(self) -> None:
@@ -89,7 +89,7 @@ class _Ends:
         self._elsewhere: re.Pattern[bytes] | None = None
 
     def note(self, record: Record) -> None:
-        """Remember its sender."""
+        """Remember the sender of an exchange."""
         if record.schema in SAID and (found := ADDRESS.search(str(record.json()["connection"]).encode())):
             self._seen.add(found[0])
             if found[1] != HERE and found[1] not in self._hosts:
@@ -98,13 +98,13 @@ class _Ends:
                 self._elsewhere = re.compile(rb"(?<![\w.:])(?:" + names + rb")(?![\w.:])")
 
     def without(self, data: bytes) -> bytes:
-        """Return JSON without them."""
+        """Return JSON without these addresses' ports and foreign hosts."""
         data = ADDRESS.sub(lambda found: found[1] if found[0] in self._seen else found[0], data)
         return data if self._elsewhere is None else self._elsewhere.sub(HERE, data)
 
 
 def _stream(record: Record) -> tuple[str, str, str]:
-    """Return what a message has an order in: its topic, and the direction of an exchange; a push also its operation."""
+    """Return the stream in which a message is ordered: topic, direction of an exchange, operation of a push."""
     if record.schema == "roboglot.Input":
         value = record.json()
         return record.topic, value["kind"], value["name"] if value["kind"] == ANSWER else ""

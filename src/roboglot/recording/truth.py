@@ -15,18 +15,18 @@ THING = 0.1, 0.2
 
 
 class TruthSampler:
-    """Looks at the stage; ``put`` gets what it sees."""
+    """Samples the stage; ``put`` gets the entries."""
 
     def __init__(self, stage: Stage, put: Callable[[Entry], object]) -> None:
         self._stage, self._put = stage, put
         self._before: object = None
 
     def again(self) -> None:
-        """Report once more what is noted only when it changes."""
+        """Report standing values again."""
         self._before = None
 
     def beat(self, number: int, at: int) -> None:
-        """Look once."""
+        """Sample once; ``at``: ns since 1970."""
         wall = time.time_ns()
         for placed in self._stage.robots:
             self._put(Entry(f"/truth/{placed.name}/pose", "pose", at, wall, ("world", placed.pose)))

@@ -1,1 +1,1 @@
-"""Compares what two robots answered and pushed: value by value, under a mask."""
+"""Compares the answers and pushes of two robots, value by value, under a mask."""

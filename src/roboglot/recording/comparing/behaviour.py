@@ -1,8 +1,7 @@
-"""Compares how two robots behave where they were not asked the same at the same moment: operation by operation.
+"""Compares the behaviour of two robots that did not get the same requests at the same time, operation by operation.
 
-Of each operation and push: which statuses came, which fields with which types, whether numbers are of one magnitude
-and their ranges overlap, how long answers took, how often pushes came. Single values do not count: another robot stands
-elsewhere.
+Compared are, for each operation and push: statuses, fields and their types, magnitudes and ranges of numbers, times of
+answers, rates of pushes. Single values are not compared, as another robot is at another place.
 """
 
 from __future__ import annotations
@@ -32,14 +31,14 @@ _own_name = re.compile(r"\.(?:[0-9a-fA-F-]{12,}|\d+)(?=[.\[]|$)")  # of an objec
 
 @dataclass(slots=True)
 class Field:
-    """The values of one field: how often it was there, its types, its numbers."""
+    """The values of one field: number of occurrences, types, numbers."""
 
     kinds: set[str] = field(default_factory=set)
     numbers: list[float] = field(default_factory=list)
 
     @property
     def size(self) -> float:
-        """The usual size of its numbers."""
+        """Median magnitude of the numbers."""
         return statistics.median(map(abs, self.numbers))
 
 
@@ -54,7 +53,7 @@ class Profile:
     stamps: list[float] = field(default_factory=list)  # of each push
 
     def note(self, payload: bytes) -> None:
-        """Take in the values of one message."""
+        """Add the values of one message."""
         for path, value in leaves(tree(payload)):
             name = _own_name.sub(".*", _index.sub("[]", path))
             if name not in self.fields and len(self.fields) >= FIELDS_MAX:
@@ -66,7 +65,7 @@ class Profile:
 
     @property
     def rate(self) -> float:
-        """Pushes a second."""
+        """Pushes per second."""
         span = max(self.stamps) - min(self.stamps)
         return (len(self.stamps) - 1) / span if span > 0 else 0.0
 
@@ -75,7 +74,7 @@ Profiles = dict[tuple[str, str], Profile]
 
 
 def profiles(exchanges: Sequence[Exchange]) -> Profiles:
-    """Return what was seen, by door and operation."""
+    """Return profiles by door and operation."""
     found: Profiles = defaultdict(Profile)
     asked, pushes = pair(exchanges)
     for one in asked:
@@ -96,7 +95,7 @@ def profiles(exchanges: Sequence[Exchange]) -> Profiles:
 
 
 def compare_behaviour(one: Sequence[Exchange], other: Sequence[Exchange], mask: Mask | None = None) -> Comparison:
-    """Compare two sessions of one robot each by what they show of its behaviour."""
+    """Compare two sessions, of one robot each, by the behaviour that they show."""
     mask = mask or Mask()
     mine, theirs = profiles(one), profiles(other)
     rows: dict[tuple[str, str], Row] = {}
@@ -155,7 +154,7 @@ def _compare_numbers(row: Row, path: str, one: Field, other: Field) -> None:
 
 
 def _in_empty(path: str, fields: dict[str, Field]) -> bool:
-    """Return whether an enclosing list or object was only ever empty, or not there at all in place of null."""
+    """Return whether an enclosing list or object was always empty, or absent instead of null."""
     for end in range(len(path) - 1, 0, -1):
         if path[end] in ".[":
             found = fields.get(path[:end])

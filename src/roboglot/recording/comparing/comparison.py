@@ -1,4 +1,4 @@
-"""Compares two sessions: pairs what was asked alike, then status, values and times of the answers, and the pushes."""
+"""Compares two sessions: pairs equal requests, then compares status, values and times of answers, and pushes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MISSING = "(not there)"
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Disagreement of two recordings: its place, and both values in words."""
+    """A difference between two recordings: its place, and both values as text."""
 
     what: str
     one: str
@@ -29,7 +29,7 @@ class Difference:
 
 @dataclass(slots=True)
 class Row:
-    """One operation or push of one door: how often it was in each session, and how much of it agrees."""
+    """One operation or push of one door: its count in each session, and the share that agrees."""
 
     door: str
     operation: str
@@ -49,7 +49,7 @@ class Row:
 
     @property
     def compared(self) -> bool:
-        """False for what only one session has."""
+        """False if only one session has this row."""
         return self.ones > 0 and self.others > 0
 
 
@@ -61,17 +61,17 @@ class Comparison:
 
     @property
     def fidelity(self) -> float:
-        """The share of what was compared that agrees; 1.0 where nothing was."""
+        """Share of comparisons that agree, 0 to 1; 1.0 if nothing was compared."""
         checks = sum(row.checks for row in self.rows)
         return sum(row.agreed for row in self.rows) / checks if checks else 1.0
 
     @property
     def differs(self) -> bool:
-        """True if anything at all does not agree."""
+        """True if any comparison does not agree."""
         return any(row.agreed < row.checks for row in self.rows)
 
     def of(self, door: str) -> Comparison:
-        """Only one door's rows."""
+        """Return a comparison with the rows of one door."""
         return Comparison([row for row in self.rows if row.door == door])
 
     @property
@@ -83,7 +83,7 @@ class Comparison:
 def compare(
     one: Sequence[Exchange], other: Sequence[Exchange], mask: Mask | None = None, *, order: bool = True
 ) -> Comparison:
-    """Compare two sessions of one robot each; ``order``: also which operation came first."""
+    """Compare two sessions, of one robot each; ``order``: compare the order of operations, too."""
     mask = mask or Mask()
     rows: dict[tuple[str, str], Row] = {}
     asked_one, pushed_one = pair(one)
@@ -97,7 +97,7 @@ def compare(
 
 
 def answers_only(exchanges: Sequence[Exchange]) -> list[Exchange]:
-    """Leave out pushes: for sessions whose requests are sent again, where no one listens for them as before."""
+    """Return a session without pushes: a replay of its requests does not receive them in the same way."""
     return [exchange for exchange in exchanges if exchange.direction is not Direction.PUSH]
 
 
@@ -180,7 +180,7 @@ def _by_operation(pushes: Sequence[Exchange]) -> dict[tuple[str, str], list[Exch
 
 
 def compare_order(rows: dict[tuple[str, str], Row], one: Sequence[Exchange], other: Sequence[Exchange]) -> None:
-    """Compare the order of operations, of those that both sessions have."""
+    """Compare the order of the operations that both sessions have."""
     firsts = [_first_places(one), _first_places(other)]
     shared = sorted(firsts[0].keys() & firsts[1].keys(), key=lambda key: firsts[0][key])
     for before, after in pairwise(shared):

@@ -47,9 +47,9 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The first rule that fits counts; where none does, numbers have the tolerances here and the rest is exact.
+    """The first matching rule counts; without one, numbers have these tolerances and other values must be equal.
 
-    ``seconds``, ``seconds_share``: how much later or earlier an answer or a push may be.
+    ``seconds``, ``seconds_share``: absolute and relative tolerance of the times of answers and pushes.
     """
 
     rule: tuple[Rule, ...] = ()
@@ -59,7 +59,7 @@ class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seconds_share: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.25
 
     def agree(self, operation: str, path: str, one: object, other: object) -> bool:
-        """Return whether two values are as good as the same."""
+        """Return whether two values agree under this mask."""
         if (rule := self._rule(operation, path)) is not None:
             return _agree(rule.compare, one, other, rule.tolerance, rule.share)
         if is_volatile(one) and is_volatile(other):
@@ -67,7 +67,7 @@ class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return _agree(How.NUMBER, one, other, self.tolerance, self.share)
 
     def how(self, operation: str, path: str) -> How | None:
-        """Return how a rule wants the field compared; None: no rule fits."""
+        """Return the comparison that a rule sets for the field; None if no rule matches."""
         rule = self._rule(operation, path)
         return None if rule is None else rule.compare
 
@@ -76,7 +76,7 @@ class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return next(fits, None)
 
     def in_time(self, one: float, other: float) -> bool:
-        """Return whether two durations (s) are as good as the same."""
+        """Return whether two durations (s) agree within the tolerance."""
         return abs(one - other) <= max(self.seconds, self.seconds_share * max(abs(one), abs(other)))
 
 
@@ -107,7 +107,7 @@ def _agree(how: How, one: Any, other: Any, tolerance: float, share: float) -> bo
 
 
 def is_volatile(value: object) -> bool:
-    """Return whether a value is one that no two sessions share: an id, a date, a Unix time."""
+    """Return whether a value differs in every session: an id, a date, a Unix time."""
     if isinstance(value, bool):
         return False
     if isinstance(value, int | float):

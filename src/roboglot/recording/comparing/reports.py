@@ -1,4 +1,4 @@
-"""A comparison for people and for build servers: a table, an HTML page, JUnit's XML."""
+"""Reports of a comparison for people and build servers: a table, an HTML page, JUnit XML."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def percent(share: float) -> str:
 
 
 def table(comparison: Comparison) -> str:
-    """Return a line for each operation, its differences below it, and the number at the end."""
+    """Return a line for each operation with its differences below, and the total at the end."""
     lines = []
     for row in comparison.rows:
         lines.append(f"{percent(_share(row)):>8}  {row.ones:5} {row.others:5}  {row.door} {row.operation or '(none)'}")
@@ -31,7 +31,7 @@ def table(comparison: Comparison) -> str:
 
 
 def page(comparison: Comparison, names: tuple[str, str]) -> str:
-    """Return an HTML page that needs nothing else."""
+    """Return a self-contained HTML page."""
     parts = [
         "<!doctype html><meta charset=utf-8><title>roboglot compare</title>",
         f"<style>{STYLE}</style><h1>{percent(comparison.fidelity)} agree</h1>",
@@ -77,5 +77,5 @@ def _html_row(row: Row) -> str:
 
 
 def _clean(text: str) -> str:
-    """Leave out what XML cannot hold."""
+    """Remove characters that XML cannot hold."""
     return "".join(c for c in text if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd")

@@ -34,7 +34,7 @@ def _value(word: str) -> object:
 
 
 def leaves(value: Any, path: str = "$") -> Iterator[tuple[str, Any]]:
-    """Yield each value that holds no other with its path; of an empty list or object, that."""
+    """Yield each leaf with its path; an empty list or object is a leaf."""
     stack, count = [(path, value)], 0
     while stack and count < LEAVES_MAX:
         where, found = stack.pop()

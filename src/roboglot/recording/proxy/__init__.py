@@ -1,1 +1,1 @@
-"""Records a robot from between it and its client: every byte passes, and what it means is noted beside."""
+"""Records a robot as a proxy between it and its client: passes every byte on and records the exchanges."""

@@ -1,6 +1,6 @@
-"""Reads calls of gRPC from a copy of one HTTP/2 connection's bytes. Knows no service, and answers nothing.
+"""Reads gRPC calls from a copy of one HTTP/2 connection's bytes. Knows no service, and answers nothing.
 
-Headers are compressed against all that came before on the connection, so each direction is read from its first byte on.
+Header compression depends on all earlier headers of the connection, so each direction is read from its first byte on.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from enum import IntEnum, IntFlag
 
 from hpack import Decoder
 
-PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"  # with which a client begins
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"  # first bytes of a client
 HEAD = 9  # bytes of a frame before its payload
 FRAME_MAX = 1 << 24
 MESSAGE_HEAD = 5  # bytes before a message: whether it is packed, and its length
@@ -44,7 +44,7 @@ class Flag(IntFlag):
 
 @dataclass(slots=True)
 class Call:
-    """One call: its path, and what its reader keeps of it."""
+    """One call: its path, and the state of its reader."""
 
     path: str = ""
     code: str = ""
@@ -54,7 +54,7 @@ class Call:
 
 @dataclass(slots=True)
 class _Messages:
-    """Messages of one direction of a call, as far as they have come."""
+    """Messages of one direction of a call, as far as received."""
 
     packing: str = ""
     waiting: bytearray = field(default_factory=bytearray)
@@ -66,7 +66,7 @@ Heard = Callable[[Call, bytes], None]
 class OneWay:
     """One direction of a connection: ``feed`` it; ``heard`` gets each whole message of a call.
 
-    Raises ValueError, IndexError or hpack's HPACKError where it is not HTTP/2.
+    Raises ValueError, IndexError or hpack's HPACKError for bytes that are not HTTP/2.
     """
 
     def __init__(self, name: str, calls: dict[int, Call], heard: Heard, preface: bytes = b"") -> None:
@@ -79,11 +79,11 @@ class OneWay:
         self.peer: OneWay | None = None
 
     def remember(self, size: int) -> None:
-        """The other side allows this one's headers to refer back to so many bytes of earlier ones."""
+        """Set the size of the header table (bytes) that the other side allows for this side's headers."""
         self._decoder.max_allowed_table_size = size
 
     def feed(self, data: bytes) -> None:
-        """Read what came."""
+        """Read received bytes."""
         rest = self._rest
         rest += data
         at = 0
@@ -125,7 +125,7 @@ class OneWay:
                 self._settings(payload)
 
     def _head(self, flags: Flag, stream: int) -> None:
-        """Headers; those of every call are read, for the next ones refer to them."""
+        """Decode headers, of every call, as later ones refer to them."""
         if not flags & Flag.END_HEADERS:
             return
         found = {_text(name): _text(value) for name, value in self._decoder.decode(bytes(self._headers), raw=True)}
@@ -139,7 +139,7 @@ class OneWay:
             self._end_with(Flag.END_STREAM, stream)
 
     def _end_with(self, flags: Flag, stream: int) -> None:
-        """Forget a call when its answer ends: that of the side that was asked."""
+        """Forget a call when the side that answers ends it."""
         if flags & Flag.END_STREAM and self._name == "answers":
             self._calls.pop(stream, None)
 
@@ -158,14 +158,14 @@ class OneWay:
             self._heard(call, _unpacked(way.packing, message) if packed else message)
 
     def _settings(self, payload: bytes) -> None:
-        """Settings of this side say how far the other side's compression may remember."""
+        """Apply settings: this side's header table size limits the other side's compression."""
         for at in range(0, len(payload) - SETTING + 1, SETTING):
             if int.from_bytes(payload[at : at + 2]) == HEADER_TABLE_SIZE and self.peer is not None:
                 self.peer.remember(int.from_bytes(payload[at + 2 : at + SETTING]))
 
 
 def both(asked: Heard, answered: Heard) -> tuple[OneWay, OneWay]:
-    """Return the two directions of a connection: the caller's, which begins with the preface, and the answers."""
+    """Return the two directions of a connection: the caller's, which begins with the preface, and the answerer's."""
     calls: dict[int, Call] = {}
     asking, answering = OneWay("asks", calls, asked, PREFACE), OneWay("answers", calls, answered)
     asking.peer, answering.peer = answering, asking
@@ -177,7 +177,7 @@ def _unpadded(flags: Flag, payload: bytes) -> bytes:
 
 
 def _unpacked(packing: str, message: bytes) -> bytes:
-    """Return what a packed message says; as it is where the packing is not known. Raises ValueError."""
+    """Return a message decompressed; unchanged if the compression is unknown. Raises ValueError."""
     if packing not in ("gzip", "deflate"):
         return message
     unpacking = zlib.decompressobj(zlib.MAX_WBITS | 32)  # of either form

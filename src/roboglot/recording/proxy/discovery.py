@@ -1,4 +1,4 @@
-"""An EP's broadcasts (``robot ip A.B.C.D``, UDP 40926) through the proxy, with its own address in them."""
+"""Passes on an EP's broadcasts (``robot ip A.B.C.D``, UDP 40926) with the proxy's own address."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PREFIX = b"robot ip "
 
 
 class Announcer:
-    """Says what the robot at ``host`` says of itself, as if ``address`` were the robot."""
+    """Repeats the broadcasts of the robot at ``host`` with ``address`` as the robot's."""
 
     def __init__(self, host: str, address: str, heard: Callable[[bytes], None]) -> None:
         self._host, self._address, self._heard = host, address, heard
@@ -22,7 +22,7 @@ class Announcer:
         self._out: asyncio.DatagramTransport | None = None
 
     async def open(self) -> None:
-        """Listen; without the port, clients find nothing, and the log says so."""
+        """Listen; if the port is taken, log that clients will not find the robot."""
         loop = asyncio.get_running_loop()
         try:
             self._out, _ = await loop.create_datagram_endpoint(
@@ -33,7 +33,7 @@ class Announcer:
             log.warning("broadcasts of the robot do not pass: UDP %d: %s", PORT, error.strerror)
 
     def hear(self, data: bytes, sender: str) -> None:
-        """Pass one broadcast, if it is this robot's and of the known form."""
+        """Pass one broadcast on, if it is this robot's and has the known form."""
         if sender != self._host or not data.startswith(PREFIX) or self._out is None:
             return
         self._heard(data)
@@ -42,14 +42,14 @@ class Announcer:
         self._out.sendto(PREFIX + self._address.encode() + rest, (everyone, PORT))
 
     def close(self) -> None:
-        """Listen and speak no more."""
+        """Close both sockets."""
         for transport in (self._in, self._out):
             if transport is not None:
                 transport.close()
 
 
 def _listening() -> socket.socket:
-    """Return a socket for broadcasts, beside those of clients on this machine."""
+    """Return a socket for broadcasts that shares its port with clients on this machine."""
     ear = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     ear.setblocking(False)
     ear.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

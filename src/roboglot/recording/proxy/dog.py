@@ -1,7 +1,7 @@
-"""Passes the connections of a CyberDog app and its robot, in both directions, and notes what they mean.
+"""Passes connections between a CyberDog app and its robot, in both directions, and records their exchanges.
 
-Both ends prove themselves to the proxy, and it to them: TLS lets nothing stand between them unnoticed. Inside of it
-every byte of HTTP/2 passes as it came, so calls, deadlines, refusals and pings are those of the two ends.
+Both ends authenticate to the proxy, and it to them, as TLS allows no unnoticed proxy. Inside TLS every byte of HTTP/2
+passes unchanged, so calls, deadlines, refusals and pings are those of the two ends.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SEND, FETCH, BEAT = SERVICE + "sendMsg", SERVICE + "getFile", SERVICE + "heartbe
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """Certificate and key (PEM) of the proxy at one end, and whose certificates it believes there."""
+    """Certificate and key (PEM) of the proxy at one end, and the certificates that it trusts there."""
 
     certificate: bytes
     key: bytes
@@ -44,14 +44,14 @@ class Proof:
 
 
 class DogRelay:
-    """Listens at ``address`` as the robot does, and on ``app_port`` of this machine as the app does.
+    """Listens at ``address`` in place of the robot, and on the app's port of this machine in place of the app.
 
-    ``proof`` is the proxy's as the robot; None, and no ``certs`` in the robot's URL: without TLS. ``app`` of the URL is
-    the port where the robot calls this machine (8981); the app is called at its own host, port ``called``.
+    ``proof``: the proxy's proof towards the app; without it and ``certs`` in the robot's URL: no TLS. ``app`` of the
+    URL: port on which the robot calls this machine (8981); the app is called at its own host, port ``called``.
     """
 
     def __init__(self, target: Target, address: str, book: Book, proof: Proof | None, called: int = APP_PORT) -> None:
-        """Raises ValueError where the URL's certificates cannot be read."""
+        """Raises ValueError if the URL's certificates cannot be read."""
         self._target, self._address, self._book, self._called = target, address, book, called
         self._app_port = int(target.options.get("app", APP_PORT))
         own = _certificates(target)
@@ -81,7 +81,7 @@ class DogRelay:
         await self._crossing.close()
 
     def _app_came(self, app: End) -> None:
-        """Dial the robot; the app that asked last is the one that the robot gets when it calls."""
+        """Dial the robot; calls of the robot go to the app that connected last."""
         host, port = app.peer
         self._app_host = host
 
@@ -94,7 +94,7 @@ class DogRelay:
         self._cross(app, to, AppSniffer(note))
 
     def _robot_came(self, robot: End) -> None:
-        """Dial the app; without one no one takes what the robot says."""
+        """Dial the app; without an app, drop the robot's connection."""
         if not self._app_host:
             robot.transport.abort()
             return
@@ -123,14 +123,14 @@ class GrpcSniffer(Sniffer):
         self._answering(data)
 
     def asked(self, call: Call, message: bytes) -> None:
-        """A message of the caller."""
+        """Handle a message of the caller."""
 
     def answered(self, call: Call, message: bytes) -> None:
-        """A message of the side that was called."""
+        """Handle a message of the called side."""
 
 
 class AppSniffer(GrpcSniffer):
-    """Questions of an app, and what the robot answers."""
+    """Requests of an app, and the robot's answers."""
 
     def asked(self, call: Call, message: bytes) -> None:
         call.code, text = _said(message) if call.path in (SEND, FETCH) else ("", message)
@@ -146,7 +146,7 @@ class AppSniffer(GrpcSniffer):
 
 
 class RobotSniffer(GrpcSniffer):
-    """Calls of the robot to its app: pushes, and heartbeats, of which those with news are noted."""
+    """Calls of the robot to its app: pushes, and heartbeats, recorded when they change."""
 
     def __init__(self, note: Note, beats: Beats) -> None:
         super().__init__(note)
@@ -163,7 +163,7 @@ class RobotSniffer(GrpcSniffer):
 
 
 def _read(kind: type[Message], data: bytes) -> Message | None:
-    """Return what the bytes mean; None where they are not understood: they pass all the same."""
+    """Return the parsed message; None, with a warning, if the bytes cannot be parsed."""
     try:
         return kind.FromString(data)
     except DecodeError as error:
@@ -172,7 +172,7 @@ def _read(kind: type[Message], data: bytes) -> Message | None:
 
 
 def _said(request: bytes) -> tuple[str, bytes]:
-    """Return the code of a message, and its text; "" and all of it where it is not understood."""
+    """Return the code and the text of a message; "" and all its bytes if it cannot be parsed."""
     said = _read(pb.SendRequest, request)
     return ("", request) if said is None else (str(said.nameCode), said.params.encode())
 
@@ -189,10 +189,10 @@ def _certificates(target: Target) -> Proof | None:
 
 
 def _context(proof: Proof | None, *, server: bool) -> ssl.SSLContext | None:
-    """Return TLS whose ends prove themselves to each other. Raises ValueError for certificates that are none."""
+    """Return a context for mutual TLS; None without ``proof``. Raises ValueError for bad certificates."""
     if proof is None:
         return None
-    with tempfile.TemporaryDirectory() as folder:  # ssl reads files alone; only this user may
+    with tempfile.TemporaryDirectory() as folder:  # ssl only reads files; this folder is private to the user
         names = Path(folder, "certificate.pem"), Path(folder, "key.pem")
         for name, data in zip(names, (proof.certificate, proof.key), strict=True):
             name.write_bytes(data)
@@ -200,7 +200,7 @@ def _context(proof: Proof | None, *, server: bool) -> ssl.SSLContext | None:
             if server:
                 context = server_context(*names)
             else:
-                context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # asks for the other end's name and proof
+                context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # checks the other end's name and certificate
                 context.load_cert_chain(*names)
             context.load_verify_locations(cadata=proof.believed.decode("ascii", "replace"))
         except ssl.SSLError as error:

@@ -1,4 +1,4 @@
-"""Connections through a proxy: each that comes is joined with one that is made for it, and bytes pass at once."""
+"""Connections through a proxy: each incoming one is joined with a new outgoing one, and bytes pass at once."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ log = logging.getLogger(__name__)
 seldom = Seldom(log)
 CONNECT_SECONDS = 10.0
 CONNECTIONS_MAX = 256
-BUFFER_MAX = 1 << 20  # bytes that wait for the other end to be dialled
+BUFFER_MAX = 1 << 20  # bytes kept until the other end is connected
 Joining = Callable[["End", "End"], Awaitable[None]]
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Address to dial. ``context``: over TLS, if the other end proves to be ``name``. ``own``: from this address."""
+    """Address to dial. ``context``: of TLS; the other end must prove to be ``name``. ``own``: local address."""
 
     host: str
     port: int
@@ -54,7 +54,7 @@ class End(asyncio.Protocol):
     transport: asyncio.Transport
 
     def __init__(self, came: Callable[[End], None] = lambda _: None) -> None:
-        """``came`` is called when it is connected."""
+        """``came`` is called when the end is connected."""
         self._came = came
         self.other: End | None = None
         self.look: Callable[[bytes], None] | None = None
@@ -64,14 +64,14 @@ class End(asyncio.Protocol):
 
     @property
     def peer(self) -> tuple[str, int]:
-        """Host and port at the other end of the wire; empty where that is gone already."""
+        """Host and port at the other end of the wire; "" and 0 if that is gone already."""
         host, port = (self.transport.get_extra_info("peername") or ("", 0))[:2]
         return str(host), int(port)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = cast(asyncio.Transport, transport)
-        # No room to wait in: what is written goes to the system at once, in uvloop, too, which else collects what is
-        # written until all that has come is looked at.
+        # No write buffer, so that data go to the system at once; uvloop would otherwise collect writes until all
+        # received data are handled.
         self.transport.set_write_buffer_limits(high=0)
         self._came(self)
 
@@ -90,7 +90,7 @@ class End(asyncio.Protocol):
                 self.look = None
 
     def join(self, other: End) -> None:
-        """Pass everything to ``other`` from now on, what has come already first."""
+        """Pass everything to ``other`` from now on, received data first."""
         self.other = other
         if self.waiting:
             other.transport.write(bytes(self.waiting))
@@ -119,7 +119,7 @@ class End(asyncio.Protocol):
 
 
 class Crossing:
-    """Listens, and joins what comes with what it dials."""
+    """Listens, and joins incoming connections with outgoing ones."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -128,7 +128,7 @@ class Crossing:
         self._dialling: set[asyncio.Task[None]] = set()
 
     async def listen(self, host: str, port: int, came: Callable[[End], None], context: ssl.SSLContext | None) -> None:
-        """``came`` is called for each connection, over TLS once hands are shaken. Raises OSError."""
+        """Listen; ``came`` is called for each connection, with TLS after the handshake. Raises OSError."""
 
         def end() -> asyncio.Protocol:
             return End(came) if context is None else TlsPort(lambda: End(came), Tls(context, plain=False))
@@ -136,7 +136,7 @@ class Crossing:
         self._servers.append(await asyncio.get_running_loop().create_server(end, host, port))
 
     def cross(self, came: End, to: Place, robot: End, joining: Joining | None = None) -> None:
-        """Dial ``to`` as ``robot`` for the end that came; ``joining`` is awaited before anything passes."""
+        """Dial ``to`` as ``robot`` for the incoming end; ``joining`` is awaited before any byte passes."""
         crossing = self._cross(came, to, robot, joining)
         task = asyncio.get_running_loop().create_task(crossing, name=f"crossing to {to.port}")
         self._dialling.add(task)

@@ -1,4 +1,4 @@
-"""Passes bytes between clients and one robot, unchanged and at once, whatever becomes of their recording."""
+"""Passes bytes between clients and one robot, unchanged and at once, even if their recording fails."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ EVENTS, PUSHES = 40925, 40924
 
 
 class Book:
-    """Book of exchanges, with the time of this machine."""
+    """Writes exchanges to a recording, with the time of this machine."""
 
     def __init__(
         self, path: Path, target: Target, version: str, *, redact: Sequence[str] = (), photos: bool = False
     ) -> None:
-        """``redact``: further fields to leave out; ``photos``: with photos and films.
+        """``redact``: further fields to leave out; ``photos``: record photos and films, too.
 
-        Raises OSError where the file cannot be written.
+        Raises OSError if the file cannot be written.
         """
         facts = {"version": version, "robot": f"{target.door}://{target.host}:{target.port}", "clock": "x1"}
         if redact:
@@ -58,7 +58,7 @@ class Book:
         began: float | None,
         now: float | None = None,
     ) -> float:
-        """Write one exchange soon; returns its time, which is ``now`` where that is given."""
+        """Queue one exchange; return its time (s), which is ``now`` if given."""
         now = self.clock.time() if now is None else now
         seconds = 0.0 if began is None else now - began
         client = f"{self._door} {connection.rpartition(':')[0]}"
@@ -82,7 +82,7 @@ class Book:
         return now
 
     def close(self) -> None:
-        """Write what waits."""
+        """Write what is queued and close the file."""
         self.thread.close()
 
 
@@ -90,7 +90,7 @@ class Relay:
     """Listens at ``address`` on the ports of the robot's protocol."""
 
     def __init__(self, target: Target, address: str, book: Book) -> None:
-        """Raises ValueError for a protocol that it cannot stand between."""
+        """Raises ValueError for a protocol without a sniffer."""
         if target.door not in SNIFFERS:
             raise ValueError(f"no recording between a client and a robot of {target.door} yet")
         self._target, self._address, self._book = target, address, book
@@ -114,12 +114,12 @@ class Relay:
             await self._announcer.open()
 
     def _accept(self, port: int, client: End) -> None:
-        """Dial the robot for a client that came; what the client says already waits, and is understood."""
+        """Dial the robot for a new client, whose first bytes wait meanwhile and are parsed."""
         robot, sniffer = End(), self._sniffer("{}:{}".format(*client.peer), port)
         if sniffer is not None:
             client.look, robot.look = sniffer.from_client, sniffer.from_robot
         joining = self._listen_for_pushes if self._target.door == "robomaster" else None
-        # To a robot of this machine it calls from where it listens: with the client's address it would have its pushes.
+        # A robot on this machine is called from our own address: from the client's, it would push to the client.
         own = self._address if self._target.host.startswith("127.") and self._address.startswith("127.") else ""
         self._crossing.cross(client, Place(self._target.host, port, own=own), robot, joining)
 
@@ -132,7 +132,7 @@ class Relay:
         return _Events(note) if port == EVENTS else None
 
     async def _listen_for_pushes(self, client: End, robot: End) -> None:
-        """Take the robot's datagrams where it sends them, at our own address, and pass them to the clients' hosts."""
+        """Receive the robot's datagrams at our own address, and pass them to the clients' hosts."""
         own, host = robot.transport.get_extra_info("sockname")[0], client.peer[0]
         self._hosts.add(host)
         if own == host:
@@ -152,14 +152,14 @@ class Relay:
             log.warning("pushes of the robot are not passed: UDP %s:%d: %s", own, PUSHES, error.strerror)
 
     def push(self, data: bytes) -> None:
-        """Pass one datagram, and note it."""
+        """Pass one datagram on, and record it."""
         for host in self._hosts:
             if self._out is not None:
                 self._out.sendto(data, (host, PUSHES))
         self._pushed(PUSHES, data)
 
     def _pushed(self, port: int, data: bytes) -> None:
-        """Note a datagram of the robot."""
+        """Record a datagram of the robot."""
         words = data.decode("utf-8", "replace").split()[:2]
         self._book.note(f"*:{port}", Direction.PUSH, f"> {' '.join(words)}", data, "", None)
 
@@ -184,12 +184,12 @@ class _Pushes(asyncio.DatagramProtocol):
 
 
 class _Events(Sniffer):
-    """The EP's event port: the robot speaks, and no one asks."""
+    """The EP's event port, on which only the robot sends."""
 
     _rest = b""
 
     def from_client(self, data: bytes) -> None:
-        """Do nothing: nothing is asked here."""
+        """Do nothing: clients send no requests here."""
 
     def from_robot(self, data: bytes) -> None:
         *whole, self._rest = (self._rest + data).split(b";")

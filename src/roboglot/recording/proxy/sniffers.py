@@ -1,4 +1,4 @@
-"""Understand what passes between a client and a robot: a class for each protocol. They see copies only."""
+"""Parsers of the traffic between a client and a robot, a class for each protocol. They get copies only."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Note = Callable[[Direction, str, bytes, str, float | None], float]
 
 
 class Sniffer(ABC):
-    """One connection. ``note`` takes direction, operation, payload, status, and when it was asked; returns now."""
+    """One connection. ``note`` takes direction, operation, payload, status, time of the request; returns the time."""
 
     def __init__(self, note: Note) -> None:
         self._note = note
@@ -33,11 +33,11 @@ class Sniffer(ABC):
 
     @abstractmethod
     def from_client(self, data: bytes) -> None:
-        """Bytes that go to the robot. May raise anything: then no more is understood of this connection."""
+        """Parse bytes to the robot. Any error ends the parsing of this connection, not the connection."""
 
     @abstractmethod
     def from_robot(self, data: bytes) -> None:
-        """Bytes that go to the client."""
+        """Parse bytes to the client."""
 
     def _asked(self, operation: str, payload: bytes) -> None:
         self._waiting.append((operation, self._note(Direction.REQUEST, operation, payload[:PAYLOAD_MAX], "", None)))
@@ -128,7 +128,7 @@ def _paths() -> list[tuple[str, tuple[str, ...], str]]:
 
 
 def rest_operation(method: str, path: str) -> str:
-    """Return the contract's key of a request; empty if it is none of it."""
+    """Return the contract's key of a request; empty if the contract has none."""
     parts = path.partition("?")[0].rstrip("/").split("/")
     for known, segments, key in _paths():
         if known == method and len(segments) == len(parts) and _fits(segments, parts):
@@ -141,9 +141,9 @@ def _fits(segments: tuple[str, ...], parts: list[str]) -> bool:
 
 
 class FrameSniffer(Sniffer):
-    """Block programs over a WebSocket: answers carry the id of their request, all else is a push.
+    """Block programs over a WebSocket: answers carry the id of their request, other frames are pushes.
 
-    On other paths than that of the frames (``/log``) the path is the operation.
+    On other paths than the frames' (``/log``), the path is the operation.
     """
 
     def __init__(self, note: Note) -> None:
