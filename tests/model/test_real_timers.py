@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
+
+import pytest
 
 from roboglot.model.clock_base import CANCELLED_MAX, RealTimers
 
@@ -57,18 +60,27 @@ async def test_timers_added_by_timers_come_later() -> None:
     assert hours.rung == ["adding", "beside", "added"]
 
 
-async def test_error_of_one_timer_affects_no_other() -> None:
+@pytest.mark.parametrize("kind", [ZeroDivisionError, asyncio.CancelledError])
+async def test_error_of_one_timer_affects_no_other(kind: type[BaseException]) -> None:
     hours, errors = Hours(), list[object]()
     asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context["exception"]))
 
     def fail() -> None:
-        raise ZeroDivisionError
+        raise kind
 
     hours.timers.add(1.0, fail)
     hours.timers.add(1.0, hours.note("next"))
     await hours.reach(1.0)
     assert hours.rung == ["next"]
-    assert [type(error) for error in errors] == [ZeroDivisionError]
+    assert [type(error) for error in errors] == [kind]
+
+
+async def test_a_time_that_is_no_number_stops_no_other() -> None:
+    hours = Hours()
+    hours.timers.add(math.nan, hours.note("at once"))
+    hours.timers.add(1.0, hours.note("next"))
+    await hours.reach(1.0)
+    assert hours.rung == ["at once", "next"]
 
 
 async def test_timers_that_were_called_off_take_no_memory() -> None:

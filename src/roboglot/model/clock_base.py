@@ -183,6 +183,8 @@ class RealTimers:
     def add(self, when: float, callback: Callable[[], None]) -> RealTimer:
         """Call ``callback`` once when it is due; soon if it is already."""
         timer = RealTimer(self, callback)
+        if math.isnan(when):
+            when = -math.inf  # due at once; in the heap, it would stand before all others for good
         heapq.heappush(self._heap, (when, next(self._order), timer))
         if not self._ringing and (
             self._alarm is None or when < self._rings_at or self._loop is not asyncio.get_running_loop()
@@ -239,7 +241,9 @@ class RealTimers:
             return
         try:
             timer.context.run(callback)
-        except Exception as error:  # noqa: BLE001
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:  # noqa: BLE001 - a CancelledError, too, as the loop itself has it
             asyncio.get_running_loop().call_exception_handler(
                 {"message": f"Exception in callback {callback!r}", "exception": error}
             )
