@@ -1,8 +1,7 @@
-"""Audit of changes and refusals, on its way to the audit's table.
+"""Writer of the audit of changes and refusals.
 
-A thread writes what is noted, at once and many rows together, so that no request waits for the disk; a row that is
-written survives ``kill -9``. Rows hold names of operations and reasons, and never what was sent. While the table cannot
-be written, rows wait.
+A thread writes rows at once, many together, so that no request waits for the disk; a written row survives ``kill -9``.
+Rows hold names of operations and reasons, never the data sent. While the table cannot be written, rows wait.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ CLOSE_SECONDS = 5.0
 
 
 class _Kind(NamedTuple):
-    """Same things that came one after another: when a row was written, how many came since, and the last of them."""
+    """A series of equal entries: time of the written row (Unix s), number of entries since, and the last of them."""
 
     written: float
     repeats: int
@@ -49,7 +48,7 @@ class Audit:
         self._thread.start()
 
     def note(self, entry: Entry) -> None:
-        """Keep it. The same within REPEATED_WITHIN is only counted: a joystick sends 50 commands a second."""
+        """Queue an entry. Equal ones within REPEATED_WITHIN are only counted: a joystick sends 50 commands a second."""
         host = entry.address.rpartition(":")[0]  # another connection from the same host is not another kind
         key = (entry.who, host, *entry[3:8])
         with self._lock:
@@ -63,7 +62,7 @@ class Audit:
             self._put(entry._replace(repeats=kind.repeats if kind else 0))
 
     def close(self) -> None:
-        """Write what waits; what cannot be written in time is counted in the log."""
+        """Write waiting rows; the log reports rows that cannot be written in time."""
         self._settle(math.inf)
         self._queue.put(None)
         self._closing.set()
@@ -72,7 +71,7 @@ class Audit:
             log.error("the audit is not written to its end: its database does not answer")
 
     def _settle(self, until: float) -> None:
-        """Write what was only counted, if nothing of its kind came for a while."""
+        """Write rows of counted repetitions whose series have ended by ``until``."""
         with self._lock:
             for key, kind in self._kinds.items():
                 if kind.repeats and until - kind.written >= REPEATED_WITHIN:
@@ -104,7 +103,7 @@ class Audit:
                 self._keep(entries)
 
     def _take(self) -> list[Entry | None]:
-        """Return rows as soon as there are some; none after a while without. The writing thread is the only reader."""
+        """Return waiting rows, or none after REPEATED_WITHIN s. The writing thread is the only reader."""
         try:
             taken = [self._queue.get(timeout=REPEATED_WITHIN)]
         except queue.Empty:
@@ -114,7 +113,7 @@ class Audit:
         return taken
 
     def _keep(self, entries: list[Entry]) -> None:
-        """Write rows, and try again until that works; while the program ends, once more."""
+        """Write rows, with retries until that works; with one retry while the program ends."""
         last = False
         while True:
             try:
@@ -130,5 +129,5 @@ class Audit:
 
 
 def now() -> float:
-    """The machine's time, Unix s."""
+    """Return the machine's time, Unix s."""
     return time.time()

@@ -1,4 +1,4 @@
-"""Identities and their rights in memory: looked up at every request, made anew when the file changed."""
+"""Identities and their rights in memory: looked up at every request, rebuilt when the list changes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Book:
         return identity.password if identity is not None and identity.kind is IdentityKind.PERSON else ""
 
     def has(self, name: str, kind: IdentityKind) -> bool:
-        """Return whether there is one of this kind."""
+        """Return whether an identity of this name and kind exists."""
         identity = self._identities.get(name)
         return identity is not None and identity.kind is kind
 
@@ -47,7 +47,7 @@ class Book:
         return found
 
     def next_end(self, now: float) -> float:
-        """Return when the next right ends; infinity: none does."""
+        """Return the time (Unix s) at which the next right ends; infinity if none does."""
         ends = [grant.until for identity in self._identities.values() for grant in identity.grants]
         return min((end for end in ends if end is not None and end > now), default=float("inf"))
 

@@ -7,19 +7,19 @@ import binascii
 
 
 def host_of(address: str) -> str:
-    """The host of "10.0.0.7:40312", "[::1]:40312", or of the same after "ipv4:" or "ipv6:", as gRPC has it."""
+    """Return the host of "10.0.0.7:40312" or "[::1]:40312", also with gRPC's prefix "ipv4:" or "ipv6:"."""
     text = address.removeprefix("ipv4:").removeprefix("ipv6:").replace("%5B", "[").replace("%5D", "]")
     return text.rpartition(":")[0].strip("[]").removeprefix("::ffff:")
 
 
 def port_of(address: str) -> int:
-    """The port at the end of an address; 0 where there is none."""
+    """Return the port at the end of an address; 0 if there is none."""
     port = address.rpartition(":")[2]
     return int(port) if port.isascii() and port.isdecimal() else 0
 
 
 def basic_of(value: str) -> tuple[str, str]:
-    """Name and password of a header "Basic …"; empty if it is none."""
+    """Return name and password of a header "Basic …"; empty texts for any other header."""
     scheme, _, rest = value.partition(" ")
     if scheme.lower() != "basic":
         return "", ""

@@ -1,7 +1,7 @@
-"""Decides, for all robots of a program, who comes in and who may do what; notes it; and throws out who may no more.
+"""Admits clients to all robots of a program, checks and audits their requests, and disconnects those that lose rights.
 
-Nothing that comes in waits for the list's database: requests ask a copy in memory, which a thread renews. While the
-database cannot be reached, the copy stays as it is; rights still end at their time.
+No request waits for the list's database: requests use a copy in memory, renewed by a thread. While the database cannot
+be reached, the copy stays as it is; rights still end at their time.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ BURST_SECONDS = 2.0  # the burst allowance: seconds' worth of bytes at once
 
 
 class Tunnelled(NamedTuple):
-    """Identity at the other end of a tunnel, and the host that it came from.
+    """Identity at the other end of a tunnel, and its host.
 
-    ``calls``: the tunnel's open connections by their local port. Other programs on this machine may call from the same
+    ``calls``: the tunnel's open connections by local port. Other programs on this machine may call from the same
     loopback address, but not from one of these ports.
     """
 
@@ -58,10 +58,10 @@ class Tunnelled(NamedTuple):
 
 
 class Guard:
-    """One for all robots. ``start`` begins to follow the list; ``reload`` reads it at once.
+    """Guard of all robots. ``start`` begins to follow the list; ``reload`` reads it at once.
 
-    ``shared``: the server's database that keeps list and audit for a fleet; its owner closes it. Without it they are
-    files in ``folder``. Raises OSError, ValueError, sqlite3.Error, DatabaseError.
+    ``shared``: a server's database with list and audit of a fleet, closed by its owner; without it, both are files in
+    ``folder``. Raises OSError, ValueError, sqlite3.Error, DatabaseError.
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class Guard:
         self._thread.start()
 
     def close(self) -> None:
-        """Follow no more; what was noted is written."""
+        """Stop following the list, and write the rest of the audit."""
         self._ended.set()
         if self._thread is not None:
             self._thread.join(2.0)
@@ -116,7 +116,7 @@ class Guard:
         self._adopt(self._store.snapshot())
 
     def _adopt(self, newer: Snapshot) -> None:
-        """Let what the list says now be so, unless a later state of it was read meanwhile."""
+        """Apply a snapshot of the list, unless a later one has been applied."""
         if newer.version < self._list.version:
             return
         self._list = newer
@@ -165,7 +165,7 @@ class Guard:
         return self._handshakes.take(host) and self._handshakes_together.take("")
 
     def _follow(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Follow the list in a thread: looks cost nothing to the robots, and lockstep waits for none of them."""
+        """Follow the list in a thread, so that neither robots nor lockstep wait for its database."""
         seen = self._list.version
         while not self._ended.wait(LOOK_PERIOD):
             if self.now() >= self._next_end:
@@ -208,7 +208,7 @@ class RobotAdmission(Admission):
         robot.tap.listen(self._note_reply)
 
     def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
-        """Return the client's identity if that takes no work."""
+        """Return the client's identity if it is known without work, else None."""
         return self._guard.known(address, proof)
 
     async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
@@ -220,11 +220,11 @@ class RobotAdmission(Admission):
             raise
 
     def spend(self, client: str, amount: int) -> float:
-        """Count bytes; seconds until the client may send more."""
+        """Count bytes; return the seconds until the client may send more."""
         return self._guard.bytes.spend(client, amount)
 
     def carries_datagrams(self, address: str) -> bool:
-        """Return whether the client came by no tunnel."""
+        """Return whether datagrams reach the client: False through a tunnel."""
         return host_of(address) not in self._guard.tunnels
 
     def may_shake_hands(self, host: str) -> bool:
@@ -232,13 +232,13 @@ class RobotAdmission(Admission):
         return self._guard.may_shake_hands(host)
 
     async def invite(self, name: str, rights: frozenset[Right], seconds: float) -> Proof | None:
-        """Let a guest in for so long."""
+        """Admit a guest for ``seconds``; return its proof."""
         proof = await self._guard.invite(name, Grant(self._name, rights, self._guard.now() + seconds))
         self._note(identity(), connection(), "", "rights", "invited", name)
         return proof
 
     async def shut_out(self, name: str) -> None:
-        """Let a guest in no more."""
+        """Revoke a guest."""
         await self._guard.shut_out(name)
 
     def check(self, door: str, operation: str, right: Right | None) -> None:
@@ -272,11 +272,11 @@ class RobotAdmission(Admission):
         self._note(identity(), connection(), door, operation, "done", "")
 
     def may(self, right: Right) -> bool:
-        """Return whether the client that is asked for has ``right``."""
+        """Return whether the current client has ``right``."""
         return right in self._rights.get(identity(), NOTHING)
 
     def offer(self, server: asyncio.Server, factory: Callable[[], asyncio.Protocol]) -> None:
-        """Tunnels reach this port without the kernel."""
+        """Register a port that tunnels reach within the process."""
         self._offers[server.sockets[0].getsockname()[1]] = server, factory
 
     def offered(self, port: int) -> tuple[asyncio.Server, Callable[[], asyncio.Protocol]] | None:
@@ -320,7 +320,7 @@ class RobotAdmission(Admission):
             listener(who)
 
     def _note_reply(self, exchange: Exchange) -> None:
-        """Note a reply that changed something, or was refused by the robot; ``check`` has noted its own refusals."""
+        """Audit a reply to a change, or a robot's refusal; ``check`` audits its own refusals."""
         right = self._needs.get(exchange.operation)
         if exchange.door.startswith(DRIVER) or exchange.direction is not Direction.REPLY or right in (None, Right.SEE):
             return

@@ -1,4 +1,4 @@
-"""Verification of passwords, tokens and certificates. Failures count against the host, and the name that it gives."""
+"""Verification of passwords, tokens and certificates. Failures count against the host and the given name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HTTP = ProofKind.HTTP  # the class look-up of a member is slower than everything
 
 
 class Proofs:
-    """``logins``: wrong ones of one address in a minute."""
+    """``logins``: failures allowed to one address per minute."""
 
     def __init__(self, book: Book, logins: int) -> None:
         self._book = book
@@ -32,16 +32,16 @@ class Proofs:
         self._waiting = 0
 
     def renew(self, book: Book, replaced: set[str]) -> None:
-        """The people are those of ``book`` from now on; what ``replaced`` showed before counts no more."""
+        """Use the identities of ``book`` from now on; forget cached proofs of those in ``replaced``."""
         self._book = book
         self._owners = {proof: who for proof, who in self._owners.items() if who not in replaced}
 
     def known(self, proof: Proof) -> str | None:
-        """Return whose it is, if that needs no work."""
+        """Return the owner of a proof if that needs no work, else None."""
         return self._owners.get(proof.value) if proof.kind is HTTP else self._certified(proof)
 
     async def find(self, proof: Proof, host: str) -> str:
-        """Return the identity of ``proof`` from ``host``. Raises Unknown, and LockedOut after too many wrong ones."""
+        """Return the identity of ``proof`` from ``host``. Raises Unknown, and LockedOut after too many failures."""
         if proof.kind is ProofKind.NONE:
             raise Unknown("say who you are: a name and password, a token, or have your address allowed")
         found = self._by_token(proof)

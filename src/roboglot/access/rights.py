@@ -1,4 +1,4 @@
-"""Rights as people write them, and what each brings along."""
+"""Rights as text, and the rights that each includes."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ NOTHING: frozenset[Right] = frozenset()
 
 
 def whole(rights: Iterable[Right]) -> frozenset[Right]:
-    """The rights with all that they bring along."""
+    """Return the rights with all rights that they include."""
     return frozenset().union(*(BRINGS[right] for right in rights))
 
 
 def parse_rights(text: str) -> frozenset[Right]:
-    """ "drive,edit". Raises ValueError."""
+    """Return the rights of a text such as "drive,edit". Raises ValueError."""
     try:
         return frozenset(Right(word.strip().lower()) for word in text.split(","))
     except ValueError:
@@ -33,6 +33,6 @@ def parse_rights(text: str) -> frozenset[Right]:
 
 
 def write_rights(rights: Iterable[Right]) -> str:
-    """Return the rights as ``parse_rights`` reads them, in their own order."""
+    """Return the rights as a text for ``parse_rights``, in the order of ``Right``."""
     chosen = set(rights)
     return ",".join(right for right in Right if right in chosen)

@@ -14,7 +14,7 @@ _SALT_BYTES, _KEY_BYTES = 16, 32
 
 
 def new_token() -> str:
-    """256 random bits as text."""
+    """Return 256 random bits as text."""
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 
@@ -24,7 +24,7 @@ def token_hash(token: str) -> str:
 
 
 def password_hash(password: str) -> str:
-    """Return what is kept of a password: "scrypt$salt$key". Raises ValueError for one that is too short or too long."""
+    """Return the stored form of a password: "scrypt$salt$key". Raises ValueError if it is too short or too long."""
     if not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
         raise ValueError(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")
     salt = secrets.token_bytes(_SALT_BYTES)
@@ -32,7 +32,7 @@ def password_hash(password: str) -> str:
 
 
 def password_fits(password: str, kept: str) -> bool:
-    """Return whether it is the stored one; takes as long if ``kept`` is empty: timing reveals nothing."""
+    """Return whether a password matches its stored form; takes as long for an empty ``kept``, to reveal nothing."""
     kind, _, rest = kept.partition("$")
     salt, _, key = rest.partition("$")
     derived = _derived(password[: PASSWORD_MAX + 1], base64.b64decode(salt) or bytes(_SALT_BYTES))

@@ -1,7 +1,7 @@
 """Store of identities and their rights: written by ``roboglot access``, read by the running robots.
 
-It is a SQLite file of its own, or where robots are kept on a PostgreSQL server, there, for all programs of a fleet.
-Several programs use it at once, so every change is one transaction, and counts the version up.
+A separate SQLite file or, if robots are stored on a PostgreSQL server, tables there for all programs of a fleet.
+Several programs use it at once, so every change is one transaction that increments the version.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ IDENTITIES_MAX = 10_000
 
 
 class IdentityKind(StrEnum):
-    """Kind of an identity, and so its means of authentication."""
+    """Kind of an identity, which determines its means of authentication."""
 
     PERSON = "person"  # shows a password
     MACHINE = "machine"  # shows a token
@@ -36,7 +36,7 @@ class IdentityKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """Rights on one robot (ALL_ROBOTS: on each), until an instant (Unix time in s; None: for good)."""
+    """Rights on one robot (ALL_ROBOTS: on each), until a time (Unix s; None: unlimited)."""
 
     robot: str
     rights: frozenset[Right]
@@ -68,7 +68,7 @@ def open_store(folder: Path, url: str = "") -> AccessStore:
 
 
 class AccessStore:
-    """The list in a database. From any thread; all wait in place. Raises DatabaseError, ValueError, LookupError."""
+    """The list in a database. Methods block, from any thread. Raises DatabaseError, ValueError, LookupError."""
 
     def __init__(self, database: Transactions) -> None:
         self._database = database
@@ -79,29 +79,29 @@ class AccessStore:
 
     @property
     def version(self) -> int:
-        """Another number after every change."""
+        """Version of the list, which every change increments."""
         return self._database.run_now(_version)
 
     def snapshot(self) -> Snapshot:
-        """Return all of it, by name."""
+        """Return the whole list, by name."""
         return self._database.run_now(lambda connection: Snapshot(_version(connection), tuple(_all(connection))))
 
     def identities(self) -> list[Identity]:
-        """All, by name."""
+        """Return all identities, by name."""
         return self._database.run_now(_all)
 
     def add_person(self, name: str, password: str, grants: Iterable[Grant]) -> None:
-        """Let a person in by a password, with these rights and no others."""
+        """Add a person with a password and these rights; replaces any before."""
         self.put(Identity(name, IdentityKind.PERSON, password_hash(password), None, tuple(grants)))
 
     def add_machine(self, name: str, grants: Iterable[Grant]) -> str:
-        """Let a machine in; its token, which is known this once."""
+        """Add a machine; return its token, which is not stored."""
         token = new_token()
         self.put(Identity(name, IdentityKind.MACHINE, "", token_hash(token), tuple(grants)))
         return token
 
     def add_guest(self, name: str, grants: Iterable[Grant], now: float) -> str:
-        """Let a guest in, and forget those whose time is over at ``now``; the guest's token. Raises ValueError."""
+        """Add a guest and remove those expired at ``now`` (Unix s); return the guest's token. Raises ValueError."""
         token = new_token()
         guest = _checked(Identity(name, IdentityKind.GUEST, "", token_hash(token), tuple(grants)))
 
@@ -118,22 +118,22 @@ class AccessStore:
         return token
 
     def add_app(self, name: str, grants: Iterable[Grant]) -> None:
-        """Let a CyberDog app in by the certificate with this common name."""
+        """Add a CyberDog app, authenticated by the certificate with this common name."""
         self.put(Identity(name, IdentityKind.APP, "", None, tuple(grants)))
 
     def allow(self, address: str, grants: Iterable[Grant]) -> str:
-        """Let in whatever comes from an address; the address as it is kept."""
+        """Allow all clients from an address; return the address as stored."""
         name = str(ip_address(address))
         self.put(Identity(name, IdentityKind.ADDRESS, "", None, tuple(grants)))
         return name
 
     def put(self, identity: Identity) -> None:
-        """Add it, replacing the identity of this name. Raises ValueError."""
+        """Add an identity, replacing the one of this name. Raises ValueError."""
         _checked(identity)
         self._database.run_now(lambda connection: _put(connection, identity))
 
     def rotate(self, name: str, password: str = "") -> str:
-        """Another token (returned) or this password; the old one is no longer valid. Raises LookupError."""
+        """Replace the token (returns the new one) or the password; the old one is void. Raises LookupError."""
         kind = self._database.run_now(lambda connection: _kind(connection, name))
         if kind is IdentityKind.PERSON:
             self._set("password", password_hash(password), name)
@@ -152,7 +152,7 @@ class AccessStore:
         self._database.run_now(work)
 
     def revoke(self, name: str) -> None:
-        """Let it in no more. Raises LookupError."""
+        """Remove an identity. Raises LookupError."""
 
         def work(connection: Connection) -> None:
             _kind(connection, name)
@@ -162,7 +162,7 @@ class AccessStore:
 
 
 def _checked(identity: Identity) -> Identity:
-    """Return it, if its name may be one. Raises ValueError."""
+    """Return the identity if its name is valid. Raises ValueError."""
     name, forbidden = identity.name, " " if identity.kind is IdentityKind.ADDRESS else " :"
     if not 0 < len(name) <= NAME_MAX or not name.isprintable() or set(name) & set(forbidden):
         raise ValueError(f"a name has 1 to {NAME_MAX} characters, no blanks and no colon")

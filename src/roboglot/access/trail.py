@@ -1,6 +1,6 @@
-"""The audit's table: rows are only added, each with the hash of the one before.
+"""The audit's table: rows are only appended, each with the hash of the previous one.
 
-It is a SQLite file of its own, or where robots are kept on a PostgreSQL server, there, one for all programs of a fleet.
+A separate SQLite file or, if robots are stored on a PostgreSQL server, a table there for all programs of a fleet.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FIELDS = "number, at, who, address, robot, door, operation, outcome, reason, rep
 
 
 class Entry(NamedTuple):
-    """One thing that was done or refused. ``repeats``: how often the same came before it without a row of its own."""
+    """One change or refusal. ``repeats``: number of equal ones before it without a row."""
 
     at: float  # Unix time, s
     who: str
@@ -53,7 +53,7 @@ def open_trail(folder: Path, url: str = "") -> Trail:
 
 
 class Trail:
-    """The table in a database. From any thread; all wait in place. Raises DatabaseError."""
+    """The table in a database. Methods block, from any thread. Raises DatabaseError."""
 
     def __init__(self, database: Transactions) -> None:
         self._database = database
@@ -70,7 +70,7 @@ class Trail:
         self._database.close()
 
     def add(self, entries: Sequence[Entry]) -> None:
-        """Add rows; they are kept when this returns. Called again with the same ones after an error, add them once."""
+        """Add rows; they are stored when this returns. Retried with the same rows after an error, it adds them once."""
         self._database.run_now(lambda connection: self._add(connection, entries))
         self._tried = None
 
@@ -86,13 +86,13 @@ class Trail:
         self._tried = entries, End(number, digest)
 
     def rows(self, *, robot: str = "", after: int = 0) -> Iterator[tuple[int, Entry]]:
-        """Rows with their numbers from the one behind ``after`` on, of one robot or of all."""
+        """Yield rows with their numbers, of one robot or of all, from the one after number ``after``."""
         query = f"SELECT {FIELDS} FROM audit WHERE number > ? AND (? = '' OR robot = ?) ORDER BY number LIMIT {PAGE}"
         for number, entry, _ in self._pages(query, after, robot, robot):
             yield number, entry
 
     def verify(self) -> End:
-        """Return the last row: kept elsewhere, it shows later that none was cut off.
+        """Check all hashes and return the last row: stored elsewhere, it shows later that no row was cut off.
 
         Raises BrokenChain naming the first row that does not fit.
         """
@@ -131,7 +131,7 @@ def _marks() -> str:
 
 
 def _cut(entry: Entry) -> Entry:
-    """Bound every text, and replace what no database keeps."""
+    """Shorten every text to its limit, and replace characters that databases refuse."""
     return Entry._make(_plain(field) if isinstance(field, str) else field for field in entry)
 
 

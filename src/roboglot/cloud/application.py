@@ -1,4 +1,4 @@
-"""The reference cloud: what robots post to, and where people choose favourites. An ASGI application.
+"""The reference cloud, where robots post events and people choose favourites. An ASGI application.
 
 Knows accounts and documents; no robot, and no more of a frame than type, operate and ids.
 """
@@ -45,7 +45,7 @@ class BackEnd:
         self._browsers = browsers or Browsers("")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One request."""
+        """Serve one request."""
         if scope["type"] != "http":
             return
         frame: dict[str, object] = {}
@@ -64,7 +64,7 @@ class BackEnd:
         await send({"type": "http.response.body", "body": body})
 
     async def _serve(self, scope: Scope, receive: Receive, frame: dict[str, object]) -> None:
-        """Always raises Answer; what was read of the frame is in ``frame``."""
+        """Handle a request; always raises Answer. ``frame`` receives the fields of the frame."""
         if why := self._browsers.refusal(of_rows(scope["headers"], scope["method"])):
             raise Answer(CloudCode.REFUSED, why)
         handler = {"/programs": self._program, "/favourites": self._favourite}.get(scope["path"])
@@ -116,7 +116,7 @@ class BackEnd:
             await self._store.record(account, robot, document)
 
     async def _inquire(self, account: str, kind: str, known: list[str]) -> list[dict[str, object]]:
-        """Favourites that the robot does not have, or what happened on the account's robots."""
+        """Return favourites that the robot lacks, or events of the account's robots."""
         if kind in KINDS:
             found = [json.loads(document) for document in await self._store.favourites(account, kind, known)]
             return [frame | {"id": frame["target_id"][0], "operate": "save", "state": "null"} for frame in found]
@@ -126,7 +126,7 @@ class BackEnd:
         return [_record(robot, json.loads(document)) for robot, document in rows]
 
     async def _favourite(self, account: str, _robot: str, wish: dict[str, object]) -> None:
-        """``{"type", "id", "favourite": true or false}``."""
+        """Set a favourite: ``{"type", "id", "favourite": true or false}``."""
         kind, id = _text(wish, "type"), _text(wish, "id")
         favourite = wish.get("favourite", True)
         if kind not in KINDS or not id.isprintable():
@@ -138,7 +138,7 @@ class BackEnd:
 
 
 async def _json_of(receive: Receive) -> dict[str, object]:
-    """The body of a request. Raises Answer."""
+    """Return the body of a request as a JSON object. Raises Answer."""
     body = bytearray()
     while True:
         event = await receive()
@@ -174,7 +174,7 @@ def _ids(frame: dict[str, object]) -> list[str]:
 
 
 def _record(robot: str, document: dict[str, Any]) -> dict[str, Any]:
-    """One thing that happened, in the words of a list's item."""
+    """Return an event as an item of a list."""
     event = document.get("feedback", document)
     targets = event.get("target_id", "")
     return {

@@ -1,6 +1,6 @@
 """One HTTP connection of the reference cloud: uvicorn's, with limits on a request's head.
 
-Knows no path; what a body may be is the back end's business. Time here is the machine's.
+Knows no path; the back end checks bodies. Times are the machine's.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ HEAD_MAX = 32 * 1024
 
 
 class BackEndConnection(HttpToolsProtocol):
-    """Closes connections on which no whole head comes in time."""
+    """Closes connections that send no complete head in time."""
 
     _patience: asyncio.TimerHandle | None = None
     _head_bytes = 0

@@ -134,7 +134,7 @@ class Playback(StandIn):
         return place
 
     def _find_read(self, door: _Door, places: Sequence[int]) -> int:
-        """Return the index of the read to answer with, between the last command and the next one."""
+        """Return the index of the read to answer with: between the last command and the next, else an earlier one."""
         after = bisect_right(places, door.cursor)
         until = self._next_change(door)
         window = [place for place in places[after:] if place < until]

@@ -1,6 +1,6 @@
-"""A shard as an actor: the same code as in a forked process, on a thread of a process that Ray started.
+"""A shard as an actor: the same code as in a forked process, in a thread of a process started by Ray.
 
-A process that exits is started again by Ray, elsewhere if its node is gone.
+Ray restarts a process that exits, on another node if its own is gone.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import msgspec
 
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal, pair
 
-AGAIN_SECONDS = 1.0  # before a process whose shard ended makes Ray start another
+AGAIN_SECONDS = 1.0  # s until the process of an ended shard exits, so that Ray restarts it
 STOP_SECONDS = 12.0
 LINES_MAX = 2000  # log lines kept until the fleet fetches them
 EXIT_ENDED = 1
@@ -27,10 +27,10 @@ RUN_BITS = 53  # of a run's number, so that JSON keeps it exactly
 
 
 class Condition(msgspec.Struct):
-    """State of a shard: its last report, and where it runs. ``lines`` are those logged since the last look.
+    """State of a shard: its last report and its node. ``lines``: log lines since the last look.
 
-    ``ready`` is left out where the client has it already: a hundred robots' endpoints are long. ``run`` is another
-    number in every process: those of two machines may have the same pid.
+    ``ready`` is left out if the client has it already, as a hundred robots' endpoints are long. ``run``: a number that
+    differs in every process, unlike pids of different machines.
     """
 
     pid: int
@@ -58,7 +58,7 @@ class _Lines(logging.Handler):
 class ShardActor:
     """Serves one shard from its beginning to ``stop``.
 
-    ``of_node``: folders of the same name on other nodes are others', so each node has one of its own below them.
+    ``of_node``: nodes share no folders, so each uses a subfolder of its own.
     """
 
     def __init__(self, settings: dict[str, object], folder: str, *, of_node: bool) -> None:
@@ -92,7 +92,7 @@ class ShardActor:
         self._serving.start()
 
     def look(self, known: int) -> bytes:
-        """Return its Condition, encoded. ``known``: the run of which the asker has what is ready."""
+        """Return the encoded Condition. ``known``: the run whose ``ready`` the client has."""
         with self._turn:
             self._hear()
             lines = [self._lines.kept.popleft() for _ in range(len(self._lines.kept))]
@@ -123,7 +123,7 @@ class ShardActor:
                 os._exit(EXIT_ENDED)  # Ray restarts the actor
 
     def _hear(self) -> None:
-        """Take what the shard sent since the last time."""
+        """Read the messages that the shard has sent since the last call."""
         while not self._stopping:
             try:
                 packet = self._link.recv(MESSAGE_MAX)

@@ -1,6 +1,6 @@
 """The classroom that the consoles of a fleet's worlds share: a world for each pupil, one grid for the teacher.
 
-It is in the supervisor, so that it outlives a world that dies, and listens in the fleet's folder.
+It runs in the supervisor, so that it outlives a dead world, and listens in the fleet's folder.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 FOLDER = "classes"
 PENDING_MAX = 256  # requests of one world in progress
 SEATS_MAX = 200  # pages per world
-UNREAD_MAX = 32 << 20  # bytes that a world has not read: it hangs and is disconnected
+UNREAD_MAX = 32 << 20  # bytes unread by a world, which then counts as hung and is disconnected
 STOP_SECONDS = 10.0
 _decode = msgspec.json.Decoder(ToRoom).decode
 
@@ -56,7 +56,7 @@ class FleetClasses:
         self._worlds: set[asyncio.Task[None]] = set()
 
     async def open(self) -> None:
-        """Listen. Where that cannot be worlds are up all the same, without classes, and a warning says so."""
+        """Listen. On failure, log a warning; worlds then run without classes."""
         path = self._folder / CLASS_SOCKET
         listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
@@ -99,7 +99,7 @@ class _Link:
         self._pending: set[asyncio.Task[None]] = set()
 
     async def serve(self, reader: asyncio.StreamReader) -> None:
-        """Serve until it hangs up."""
+        """Serve until the console hangs up."""
         mine = None
         try:
             hello = _decode(await reader.readline())
@@ -192,7 +192,7 @@ class _Link:
         self._writer.write(line(answer))
 
     def _end(self, code: str) -> None:
-        """Say that a class is over."""
+        """Report the end of a class."""
         self._writer.write(line(Ended(code)))
 
     def _send(self, number: int, message: dict[str, object]) -> None:
@@ -202,7 +202,7 @@ class _Link:
                 self._writer.transport.abort()
 
     async def _stop(self, robot: str) -> None:
-        """End all that a robot does. Raises Refused."""
+        """Stop all programs and motion of a robot. Raises Refused."""
         id = max(self._stops, default=0) + 1
         self._stops[id] = asyncio.get_running_loop().create_future()
         try:

@@ -1,6 +1,6 @@
-"""A fleet on Ray: every shard is a named actor. Ray places shards, notices what dies and starts it again elsewhere.
+"""A fleet on Ray: every shard is a named actor. Ray places shards, detects dead ones and restarts them elsewhere.
 
-This side only asks each actor how it is, once a second, and keeps its log lines.
+This side only polls each actor's state, once a second, and stores its log lines.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def join(where: str) -> None:
 
 @contextmanager
 def joined(where: str) -> Iterator[None]:
-    """Be part of a cluster for a while; one that was started here ends with it."""
+    """Context in which this program is part of a cluster; one that it started ends with the context."""
     join(where)
     try:
         yield
@@ -87,14 +87,14 @@ class Reference(Protocol):
     """Ray's result of a call."""
 
     def future(self) -> Future[bytes]:
-        """Return the answer to come."""
+        """Return a future of the call's result."""
 
 
 class Call(Protocol):
     """A method of an actor."""
 
     def remote(self, *values: int) -> Reference:
-        """Call it."""
+        """Call the method."""
 
 
 class Actor(Protocol):
@@ -105,7 +105,7 @@ class Actor(Protocol):
 
 
 class ClusterFleet:
-    """One fleet on a cluster that was joined. ``lasting``: its shards stay when this program ends."""
+    """One fleet on a joined cluster. ``lasting``: its shards outlive this program."""
 
     def __init__(self, plan: FleetPlan, folder: Path, where: str, *, lasting: bool = False) -> None:
         """Raises FolderInUse; ValueError if robots could run twice on this cluster."""
@@ -125,16 +125,16 @@ class ClusterFleet:
 
     @property
     def nursery(self) -> int:
-        """Shards on a cluster are not forked."""
+        """0: shards on a cluster are not forked."""
         return 0
 
     @property
     def stores_here(self) -> bool:
-        """A cluster's machines are others."""
+        """True if the cluster is this machine."""
         return self._local
 
     async def start(self) -> float:
-        """Start all, or find those that stayed; returns when each is ready or has failed."""
+        """Start all shards, or find running ones; return the duration (s) when each is ready or has failed."""
         began = time.monotonic()
         save(self.plan, self.folder)
         for shard in self.shards.values():
@@ -150,7 +150,7 @@ class ClusterFleet:
         return passed
 
     async def close(self) -> None:
-        """Stop all shards unless they are to stay, and release the folder."""
+        """Stop all shards, unless ``lasting``, and release the folder."""
         tasks = [task for task in (self._watch, self._silence) if task is not None]
         for task in tasks:
             task.cancel()
@@ -168,24 +168,24 @@ class ClusterFleet:
             self._turn_to(shard, State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
-        """Stop it if it runs, start it, and wait until it is ready or has failed."""
+        """Restart a shard, or start it; return when it is ready or has failed."""
         await self.stop(shard)
         shard.reason = ""
         await asyncio.to_thread(self._begin, shard)
         await asyncio.wait_for(self.until(lambda: _settled(shard)), START_MAX)
 
     async def reset(self, shard: Shard) -> None:
-        """Restart it with nothing stored."""
+        """Delete a shard's stored data and restart it."""
         await self.stop(shard)
         await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
         await self.restart(shard)
 
     def node_of(self, name: str) -> str:
-        """Return the node that a shard was last seen on; empty: none yet."""
+        """Return the node on which a shard was last seen; empty: none yet."""
         return self._nodes.get(name, "")
 
     def _begin(self, shard: Shard) -> None:
-        """Create the shard's actor, or find the one that stayed."""
+        """Create the shard's actor, or find a running one."""
         plan = shard.plan
         cores = min(CORES_MAX, CORE_EACH * len(plan.robots))
         actor = ray.remote(ShardActor).options(
@@ -293,7 +293,7 @@ def _keep(path: Path, lines: list[str]) -> None:
 
 
 async def _free_the_silent(plan: FleetPlan) -> None:
-    """Free the homes of shards that died, while Ray starts them again. Without it they would wait for it themselves."""
+    """Release dead shards' robots in the registry while Ray restarts the shards, which would otherwise wait for it."""
     if not (where := _registry_of(plan.shards[0])):
         return
     try:

@@ -1,4 +1,4 @@
-"""Fleet desk of this machine's owner: the socket behind ``roboglot fleet list|stop|…``."""
+"""Server of the owner's commands to a fleet: the socket behind ``roboglot fleet list|stop|…``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roboglot.shards.wishes import SOCKET, Answer, Request, RobotRow, Row
 
 
 class FleetDesk:
-    """Desk of one fleet."""
+    """Command server of one fleet."""
 
     def __init__(self, supervisor: FleetHost, folder: Path) -> None:
         self._supervisor = supervisor

@@ -22,23 +22,23 @@ class FleetHost(Protocol):
 
     @property
     def nursery(self) -> int:
-        """The process that shards are forked from; 0 if they are not."""
+        """Process id of the nursery; 0 without one."""
 
     @property
     def stores_here(self) -> bool:
-        """True if robots' data is stored in folders of this machine."""
+        """True if the robots' data is stored in folders of this machine."""
 
     async def start(self) -> float:
-        """Start all; returns s until the first could start."""
+        """Start all shards; return the time until the first could start, s."""
 
     async def close(self) -> None:
-        """End what ends with this program."""
+        """Stop all shards that do not outlive this program."""
 
     async def stop(self, shard: Shard) -> None:
         """Stop a shard and leave it stopped."""
 
     async def restart(self, shard: Shard) -> None:
-        """Stop it if it runs, start it, and wait until it is ready or has failed."""
+        """Restart a shard, or start it; return when it is ready or has failed."""
 
     async def reset(self, shard: Shard) -> None:
-        """Restart it with nothing stored."""
+        """Delete a shard's stored data and restart it."""

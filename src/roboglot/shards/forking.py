@@ -1,4 +1,4 @@
-"""Handle of the nursery: starts it, has it fork shards, hears of births and deaths. Starts it again if it dies."""
+"""Handle of the nursery: starts it, has it fork shards, receives births and deaths; restarts it if it dies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, 
 from roboglot.shards.warmth import ENVIRONMENT
 
 log = logging.getLogger(__name__)
-AGAIN_SECONDS = 5.0  # between two attempts to start one that does not become ready
+AGAIN_SECONDS = 5.0  # s between two attempts to start a nursery that does not become ready
 WARM_SECONDS_MAX = 240.0  # s to load everything; compiling kernels takes a minute
 
 
@@ -41,7 +41,7 @@ class Forks:
 
     @property
     def pid(self) -> int:
-        """The nursery's process; 0 if there is none."""
+        """Process id of the nursery; 0 if there is none."""
         return self._process.pid if self._process else 0
 
     def open(self) -> None:
@@ -60,7 +60,7 @@ class Forks:
         asyncio.get_running_loop().add_reader(ours, self._hear)
 
     async def warm(self) -> float:
-        """Wait until it can fork; returns how long it took to load everything, s. Raises NotWarm."""
+        """Wait until the nursery can fork; return its loading time, s. Raises NotWarm."""
         try:
             return await asyncio.wait_for(asyncio.shield(self._warm), WARM_SECONDS_MAX)
         except TimeoutError:
@@ -79,7 +79,7 @@ class Forks:
         return ours
 
     def end(self, number: int, kind: signal.Signals) -> None:
-        """Send a signal to a shard, if it lives."""
+        """Send a signal to a shard, if it is alive."""
         if self._control is not None and number in self._living:
             with contextlib.suppress(OSError):
                 self._control.send(encode(End(number, kind)))
@@ -116,7 +116,7 @@ class Forks:
                 self._dead(number, status)
 
     def _lost(self) -> None:
-        """The nursery has ended, and its shards with it."""
+        """Handle the end of the nursery, which its shards do not survive."""
         self._let_go()
         if self._closed:
             return

@@ -1,4 +1,4 @@
-"""Glances at the robots of all worlds, by their consoles' own interface: once a second at most, and only on demand."""
+"""States and pictures of robots in all worlds, from their consoles, at most once a second and only on demand."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from roboglot.agents.console import ConsoleClient, Refused
 from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.supervisor import Shard, State
 
-PERIOD = 1.0  # s that a glance is shown again
+PERIOD = 1.0  # s for which an answer is reused
 AT_ONCE_MAX = 8  # requests to consoles in progress
 SHOWN = ("about", "battery", "actions", "faults", "safety", "control", "parts", "pose")
 T = TypeVar("T")
 
 
 class _Newest(Generic[T]):
-    """Newest answer of each robot: less than ``PERIOD`` old, or under way."""
+    """Newest answer for each robot: less than ``PERIOD`` old, or pending."""
 
     def __init__(self) -> None:
         self._found: dict[str, tuple[float, asyncio.Task[T]]] = {}  # with when it was begun, s of the loop
 
     async def get(self, robot: str, look: Callable[[], Coroutine[None, None, T]]) -> T:
-        """Return what ``look`` finds, or found just now. Raises what it does."""
+        """Return the result of ``look``, or a recent one. Raises its errors."""
         loop = asyncio.get_running_loop()
         began, task = self._found.get(robot, (-PERIOD, None))
         if task is None or (task.done() and loop.time() - began >= PERIOD):
@@ -33,7 +33,7 @@ class _Newest(Generic[T]):
 
 
 class Glances:
-    """Looks at the robots of one fleet, however many pages ask."""
+    """Polls the robots of one fleet, once for all pages."""
 
     def __init__(self, fleet_host: FleetHost, client: Callable[[str], ConsoleClient] = ConsoleClient) -> None:
         self._fleet_host, self._client = fleet_host, client
@@ -42,7 +42,7 @@ class Glances:
         self._turns = asyncio.Semaphore(AT_ONCE_MAX)
 
     async def state(self, robot: str) -> dict[str, object]:
-        """Return how a robot is, as its console says; ``{"error": why}`` if it does not. Raises LookupError."""
+        """Return a robot's state from its console; ``{"error": why}`` if that fails. Raises LookupError."""
         console = self._console(self._home(robot))
 
         async def look() -> dict[str, object]:
@@ -73,7 +73,7 @@ class Glances:
         return self._fleet_host.shards[self._fleet_host.plan.home_of(robot).name]
 
     def _console(self, shard: Shard) -> ConsoleClient | None:
-        """Return the console of a world that is up and has one."""
+        """Return the console of a world; None if the world is not up or has none."""
         if shard.state is not State.READY or shard.ready is None or not shard.ready.console:
             return None
         return self._client(shard.ready.console)

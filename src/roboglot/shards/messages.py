@@ -1,4 +1,4 @@
-"""Messages between supervisor, nursery and shards: one JSON object a packet, on sockets that keep packets apart."""
+"""Messages between supervisor, nursery and shards: one JSON object per packet, on sockets that preserve packets."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Fork(msgspec.Struct, tag=True, frozen=True):
 
 
 class End(msgspec.Struct, tag=True, frozen=True):
-    """Message to the nursery: send ``signal`` to this child if it still lives."""
+    """Message to the nursery: send ``signal`` to this child if it is still alive."""
 
     number: int
     signal: int
@@ -44,16 +44,16 @@ class Dead(msgspec.Struct, tag=True, frozen=True):
 
 
 class Ready(msgspec.Struct, tag=True, frozen=True):
-    """From a shard: its doors answer. Per robot ("label", "address") of each door; the console's page or nothing."""
+    """Message of a shard: its doors answer. ("label", "address") of each robot's doors; the console's URL or ""."""
 
     endpoints: dict[str, list[tuple[str, str]]]
     console: str = ""
 
 
 class Beat(msgspec.Struct, tag=True, frozen=True):
-    """From a shard, once a second: ``factor`` is robot time per wanted robot time since the last one.
+    """Message of a shard, once a second. ``factor``: robot time over wanted robot time since the last one.
 
-    ``memory`` is its own share of the machine's (PSS, bytes), ``cpu`` the processor time used so far (s).
+    ``memory``: proportional set size (bytes); ``cpu``: processor time used so far (s).
     """
 
     factor: float
@@ -62,7 +62,7 @@ class Beat(msgspec.Struct, tag=True, frozen=True):
 
 
 class Refusal(msgspec.Struct, tag=True, frozen=True):
-    """Message of a shard: why it cannot start. ``lasting``: its settings are wrong, another try would end alike."""
+    """Message of a shard: why it cannot start. ``lasting``: its settings are wrong, so another try would fail, too."""
 
     reason: str
     lasting: bool
@@ -74,7 +74,7 @@ News = Ready | Beat | Refusal
 
 
 def pair() -> tuple[socket.socket, socket.socket]:
-    """Return two connected sockets that keep packets apart and fit ``MESSAGE_MAX``."""
+    """Return two connected sockets that preserve packets of up to ``MESSAGE_MAX`` bytes."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     for end in (ours, theirs):
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * MESSAGE_MAX)

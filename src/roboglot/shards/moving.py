@@ -1,4 +1,4 @@
-"""A robot moves from one shard to another, with everything that is stored of it, and keeps its address."""
+"""Moves a robot from one shard to another, with all its stored data and its address."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ DATABASE = "roboglot.db"  # in a shard's data folder
 
 
 async def move_robot(supervisor: FleetHost, robot: str, to: str) -> None:
-    """Move it; both shards are down meanwhile. Raises LookupError, ValueError where it cannot live there.
+    """Move a robot to shard ``to``; both shards are down meanwhile. Raises LookupError, ValueError if it cannot move.
 
-    First its rows are in the new place, then the plan says so, then they are removed from the old one: a crash at any
-    moment leaves the robot in one shard, with all of its rows.
+    Its rows are copied, then the plan is changed, then the old rows are removed: a crash at any moment leaves the robot
+    in one shard, with all its rows.
     """
     plan = supervisor.plan
     old, new = plan.home_of(robot), plan.shard(to)

@@ -1,7 +1,7 @@
-"""The process that every shard is forked from: warmed, single-threaded, with no event loop.
+"""The process from which every shard is forked: warmed up, single-threaded, without an event loop.
 
 ``python -m roboglot.shards.nursery DESCRIPTOR``: serves ``Fork`` and ``End`` on that socket, reports births and deaths,
-and ends with the socket, its shards first. Shards die with it even if it is killed.
+and ends when the socket closes, its shards first. Shards die with it even if it is killed.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, 
 from roboglot.shards.warmth import ENVIRONMENT, refuse_threads, warm
 
 PR_SET_PDEATHSIG = 1
-LAST_SECONDS = 12.0  # for shards to close when the nursery ends
+LAST_SECONDS = 12.0  # s for shards to close when the nursery ends
 LINK_FD = 3  # of a shard
 EXIT_BROKEN = 70  # of a shard that could not begin
 
 
 class Nursery:
-    """The fork server's state: its control socket and which child is which."""
+    """State of the fork server: its control socket, and its children by process id."""
 
     def __init__(self, control: socket.socket, run: Callable[[str, socket.socket], int]) -> None:
         self._control, self._run = control, run
@@ -41,7 +41,7 @@ class Nursery:
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
 
     def serve(self) -> None:
-        """Serve until the control socket ends."""
+        """Serve until the control socket closes."""
         poll = select.poll()
         poll.register(self._control, select.POLLIN)
         poll.register(self._wake, select.POLLIN)
@@ -54,7 +54,7 @@ class Nursery:
                 return
 
     def close(self) -> None:
-        """End the shards: kindly, then by force."""
+        """End the shards: by SIGTERM, then by SIGKILL."""
         with contextlib.suppress(OSError):
             self._control.close()  # nothing is reported from here on
         for end, patience in ((signal.SIGTERM, LAST_SECONDS), (signal.SIGKILL, LAST_SECONDS)):
@@ -141,11 +141,11 @@ def _take_descriptors(link: int, output: int) -> None:
 
 
 def _ignore(number: int, frame: FrameType | None) -> None:
-    """A handler must exist for the wake-up descriptor to be written."""
+    """Do nothing: without a handler, nothing would be written to the wake-up descriptor."""
 
 
 def main(descriptor: int) -> None:
-    """Warm up, say so, and serve on an inherited socket."""
+    """Warm up, report that, and serve on an inherited socket."""
     began = time.monotonic()
     os.setpgid(0, 0)  # the terminal's Ctrl-C is for the supervisor, which stops us in order
     for kind in (signal.SIGINT, signal.SIGTERM):  # sent to a whole group or unit: the supervisor's socket ends us

@@ -1,6 +1,6 @@
-"""The page of all worlds of a fleet: who lives where and how they are; what is looked at closely has its own console.
+"""The page of all worlds of a fleet: robots by world, and their states; details are on each world's console.
 
-It only reads, listens on loopback alone, and asks a world's console for the robots that are on a page's screen.
+It is read-only, listens on loopback only, and polls a world's console for the robots on a page's screen.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Overview:
                 transport.abort()
 
     async def ready(self) -> None:
-        """Wait until it answers."""
+        """Wait until the page answers."""
         if self._serving is not None:
             await self._serving
 
@@ -116,7 +116,7 @@ class Overview:
                 await self._send_file(scope["path"], send)
 
     async def look(self, seen: list[str]) -> dict[str, object]:
-        """Return all worlds, and how the robots are that a page shows. Raises Problem."""
+        """Return all worlds, and the states of the robots on a page. Raises Problem."""
         if len(seen) > SEEN_MAX:
             raise Problem(400, f"a page shows {SEEN_MAX} robots at most")
         try:

@@ -1,4 +1,4 @@
-"""Plan of a fleet: its shards with their settings, robots and addresses, and the file that keeps it."""
+"""Plan of a fleet: its shards with their settings, robots and addresses, and its file."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class ShardPlan(msgspec.Struct):
 
 
 class FleetPlan(msgspec.Struct):
-    """All shards. ``request`` is what was asked for, to know it again at the next start."""
+    """All shards. ``request``: the options of the first start, to compare them at the next one."""
 
     request: dict[str, object]
     shards: list[ShardPlan]
 
     def home_of(self, robot: str) -> ShardPlan:
-        """Return the shard that a robot lives in. Raises LookupError."""
+        """Return the shard of a robot. Raises LookupError."""
         for shard in self.shards:
             if robot in shard.robots:
                 return shard
@@ -58,7 +58,7 @@ def plan_fleet(
     """Plan ``worlds`` shards from a template. Raises ValueError in plain words.
 
     The template is a configuration as for ``roboglot up``. Its robots, or ``robots_each`` of body "universal", are in
-    every world, with the world's number after their names: a1, a2, … Every robot has an address of its own.
+    every world, with the world's number after their names: a1, a2, … Every robot has its own address.
     """
     if not 1 <= worlds <= WORLDS_MAX:
         raise ValueError(f"between 1 and {WORLDS_MAX} worlds, not {worlds}")
@@ -94,7 +94,7 @@ def checked(shard: ShardPlan) -> Config:
 
 
 def save(plan: FleetPlan, folder: Path) -> None:
-    """Write the plan so that a crash leaves the old one or the new one."""
+    """Write the plan; a crash leaves the old or the new one."""
     fresh = folder / f"{PLAN}.new"
     with fresh.open("wb") as file:
         file.write(msgspec.json.format(msgspec.json.encode(plan), indent=1))
@@ -104,7 +104,7 @@ def save(plan: FleetPlan, folder: Path) -> None:
 
 
 def load(folder: Path) -> FleetPlan | None:
-    """Return the plan that is kept there, if there is one. Raises ValueError."""
+    """Return the plan in ``folder``; None if there is none. Raises ValueError."""
     try:
         return msgspec.json.decode((folder / PLAN).read_bytes(), type=FleetPlan)
     except FileNotFoundError:
@@ -120,7 +120,7 @@ def _robots(count: int) -> list[dict[str, object]]:
 
 
 def _console(template: dict[str, Any], address: str, number: int) -> dict[str, Any]:
-    """Return the console's settings: on the address of the world's first robot, where the template has none."""
+    """Return the console's settings, by default at the address of the world's first robot."""
     given = dict(template.get("console", {}))
     if given.get("address") and (port := given.get("port", ConsoleConfig().port)):  # one address: separate ports
         given["port"] = port + number - 1

@@ -42,7 +42,7 @@ def settings_of(values: dict[str, object]) -> Config:
 
 
 def run(folder: str, link: socket.socket) -> int:
-    """Serve until SIGTERM, or until the supervisor has gone; the exit status."""
+    """Serve until SIGTERM or the end of the supervisor; return the exit status."""
     set_up_logging(verbose=False)
     reporter = Reporter(link)
     try:
@@ -63,7 +63,7 @@ def run(folder: str, link: socket.socket) -> int:
 
 
 def _class_home(folder: Path) -> ClassHome | None:
-    """Return where the fleet's classroom listens, by the shard's folder; None: there is none."""
+    """Return the socket of the fleet's classroom for this shard's folder; None if there is no classroom."""
     path = folder.parent.parent / CLASS_SOCKET
     return ClassHome(path, folder.name) if path.exists() else None
 
@@ -76,12 +76,12 @@ class Reporter:
         link.setblocking(False)
 
     def send(self, message: News) -> None:
-        """Send it, or drop it: a supervisor that does not read must not hold the robots up."""
+        """Send a message, or drop it: a supervisor that does not read must not block the robots."""
         with contextlib.suppress(OSError):
             self._link.send(encode(message))
 
     def watch(self, ended: asyncio.Event) -> None:
-        """Set ``ended`` when the supervisor has gone."""
+        """Set ``ended`` when the supervisor is gone."""
 
         def look() -> None:
             try:
@@ -148,7 +148,7 @@ async def _beat(runtime: Runtime, reporter: Reporter) -> None:
 
 
 def _memory() -> int:
-    """Return the proportional share of memory (bytes); what is resident where the system tells no share."""
+    """Return the proportional set size (bytes), or the resident one if the system does not report the former."""
     with contextlib.suppress(OSError, ValueError, IndexError):
         for line in Path("/proc/self/smaps_rollup").read_text().splitlines():
             if line.startswith("Pss:"):

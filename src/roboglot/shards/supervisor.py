@@ -69,7 +69,7 @@ class Supervisor:
     """
 
     def __init__(self, plan: FleetPlan, folder: Path, *, memory_max: int = 0) -> None:
-        """Raises FolderInUse if another one uses the folder. ``memory_max``: bytes of a shard, 0: any."""
+        """``memory_max``: bytes per shard; 0: unlimited. Raises FolderInUse if another program uses the folder."""
         self._memory_max = memory_max
         self.plan, self.folder = plan, folder
         self._lock = lock_folder(folder)
@@ -85,16 +85,16 @@ class Supervisor:
 
     @property
     def nursery(self) -> int:
-        """The process that shards are forked from."""
+        """Process id of the nursery."""
         return self._forks.pid
 
     @property
     def stores_here(self) -> bool:
-        """True: robots' data is stored in the shards' folders."""
+        """True: the robots' data is stored in the shards' folders."""
         return True
 
     async def start(self) -> float:
-        """Start all, in turn; returns how long the nursery took to warm up, s. Raises NotWarm."""
+        """Start all shards, in turn; return the nursery's warm-up time, s. Raises NotWarm."""
         save(self.plan, self.folder)
         self._forks.open()
         seconds = await self._forks.warm()
@@ -134,14 +134,14 @@ class Supervisor:
             await self.until(lambda: shard.state is State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
-        """Stop it if it runs, start it, and wait until it is ready or has failed."""
+        """Restart a shard, or start it; return when it is ready or has failed."""
         await self.stop(shard)
         shard.deaths, shard.hopeless, shard.reason = 0, False, ""
         self._enqueue(shard)
         await self.until(lambda: shard.state in (State.READY, State.FAILED, State.STOPPED))
 
     async def reset(self, shard: Shard) -> None:
-        """Restart it with nothing stored: programs, maps, places and certificates are gone."""
+        """Delete a shard's stored data (programs, maps, places, certificates) and restart it."""
         await self.stop(shard)
         await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
         await self.restart(shard)
@@ -151,7 +151,7 @@ class Supervisor:
         self._wake.set()
 
     async def _start_in_turn(self) -> None:
-        """Fork those that wait, few at a time."""
+        """Fork waiting shards, few at a time."""
         while await self._wake.wait():
             self._wake.clear()
             starting = sum(shard.state is State.STARTING for shard in self.shards.values())
@@ -162,7 +162,7 @@ class Supervisor:
                     self._fork(shard)
 
     async def _until_warm(self) -> None:
-        """Wait for the nursery, which may have to come up again, however long that takes."""
+        """Wait for the nursery, even through restarts, without a limit."""
         while True:
             try:
                 await self._forks.warm()
@@ -188,7 +188,7 @@ class Supervisor:
         self._turn_to(shard, State.STARTING)
 
     def _hear(self, shard: Shard) -> bool:
-        """Take one packet; False if there is none."""
+        """Handle one packet; return False if there is none."""
         if shard.link is None:
             return False
         try:
@@ -230,7 +230,7 @@ class Supervisor:
         self._failed(shard)
 
     def _failed(self, shard: Shard) -> None:
-        """Try again: at once the first time, later the next times."""
+        """Schedule another attempt: at once after the first crash, later after further ones."""
         pause = PAUSES[min(shard.deaths, len(PAUSES) - 1)]
         shard.deaths += 1
         if shard.hopeless:
@@ -246,7 +246,7 @@ class Supervisor:
         shard.again = self._loop.call_later(pause, self._enqueue, shard)
 
     def _look_after(self) -> None:
-        """Kill what hangs; the rest follows from its death."""
+        """Kill hung shards; their death triggers the restart."""
         now = self._loop.time()
         for shard in self.shards.values():
             limit = {State.STARTING: START_MAX, State.READY: SILENCE_MAX, State.STOPPING: STOP_MAX}.get(shard.state)
@@ -260,7 +260,7 @@ class Supervisor:
         self._watch = self._loop.call_later(1.0, self._look_after)
 
     def _judge(self, shard: Shard) -> None:
-        """Say that a shard is too slow, once until it keeps up again; start one anew that has grown too large."""
+        """Log that a shard is too slow, once per slowdown; restart a shard that uses too much memory."""
         slow = shard.beat.factor < SLOW and self._loop.time() - shard.since > SETTLING
         shard.slow_for = shard.slow_for + 1 if slow else 0
         if shard.slow_for == SLOW_FOR:
@@ -287,7 +287,7 @@ def _in_words(status: int) -> str:
 
 
 def _open_log(path: Path) -> int:
-    """Return a descriptor to append to; one that has grown too long is kept once under another name."""
+    """Return a descriptor that appends to the log; a log that is too long is renamed and replaces the last such one."""
     if path.exists() and path.stat().st_size > LOG_MAX:
         path.replace(path.with_suffix(".old"))
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)

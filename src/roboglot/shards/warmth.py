@@ -29,7 +29,7 @@ FOREIGN = (
     "websockets.server",
     "wsproto",
 )
-ENVIRONMENT = {  # of the nursery: no library starts threads of its own, and gRPC leaves forks alone
+ENVIRONMENT = {  # of the nursery: keeps libraries from starting threads, and gRPC from handling forks
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
@@ -40,11 +40,11 @@ TASKS = "/proc/self/task"
 
 
 class Threaded(RuntimeError):
-    """Something started a thread in the process that must be able to fork."""
+    """An import started a thread in the process that must be able to fork."""
 
 
 def warm() -> None:
-    """Load everything, then freeze it, so that no collection copies the pages that shards share. Raises Threaded."""
+    """Load everything, then freeze it, so that garbage collection copies no shared pages. Raises Threaded."""
     gc.disable()
     for name in _modules():
         try:
@@ -67,7 +67,7 @@ def warm() -> None:
 
 
 def _rehearse() -> None:
-    """Build a world once and drop it: decoders, parts and physics find out what they need, and every fork has it."""
+    """Build a world once and drop it, so that every fork inherits the caches of decoders, parts and physics."""
     from roboglot.model.clock import LockstepClock
     from roboglot.model.robot import Robot
     from roboglot.shards.shard import settings_of

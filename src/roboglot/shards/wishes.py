@@ -1,4 +1,4 @@
-"""Messages of the socket behind ``roboglot fleet``: what is wished of a fleet, and how its shards are."""
+"""Messages of the socket behind ``roboglot fleet``: requests to a fleet, and the states of its shards."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ Verb = Literal["look", "stop", "restart", "reset", "move"]
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
-    """Request to a fleet. ``shard``: a shard's name, or a robot's for its shard; ``to``: where a robot moves.
+    """Request to a fleet. ``shard``: a shard's name, or a robot's for its shard; ``to``: destination shard of a robot.
 
-    ``robot`` is for ``move`` alone. An empty ``shard`` of ``stop`` and ``restart`` means all.
+    ``robot`` is for ``move`` only. An empty ``shard`` of ``stop`` and ``restart`` means all.
     """
 
     do: Verb = "look"
@@ -23,7 +23,7 @@ class Request(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class RobotRow(msgspec.Struct):
-    """One robot: where it is reached."""
+    """One robot with its endpoints."""
 
     name: str
     body: str
@@ -31,7 +31,7 @@ class RobotRow(msgspec.Struct):
 
 
 class Row(msgspec.Struct):
-    """One shard as the table shows it; memory in bytes, cpu in s, ``factor`` 1 where it keeps up."""
+    """One shard in the table; memory in bytes, cpu in s, ``factor`` 1 if it keeps up."""
 
     name: str
     state: str
@@ -48,7 +48,7 @@ class Row(msgspec.Struct):
 
 
 class Answer(msgspec.Struct):
-    """All shards, and why the wish was not granted (empty: it was)."""
+    """All shards, and the reason for a refusal (empty: granted)."""
 
     shards: list[Row]
     nursery: int

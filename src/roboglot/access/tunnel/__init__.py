@@ -1,1 +1,1 @@
-"""Vendors' ports of one robot over one TLS 1.3 connection: ``roboglot connect`` and the gateway that it calls."""
+"""Vendors' ports of one robot over one TLS 1.3 connection: ``roboglot connect`` and its gateway."""

@@ -1,4 +1,4 @@
-"""Keeps an event loop awake while a short answer is expected: a process that sleeps is woken tens of µs late."""
+"""Keeps an event loop awake while a short answer is expected, as a sleeping process wakes tens of µs late."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 AWAKE = 200e-6  # s of polling after a message: a robot's answer and most clients' next request arrive within it
-SHORT_MAX = 2048  # bytes of a request or an answer; larger ones are streams, which bear the delay
+SHORT_MAX = 2048  # bytes of a request or an answer; larger ones are streams, which tolerate the delay
 _make_way: Callable[[], object] = getattr(os, "sched_yield", lambda: None)
 
 
@@ -21,7 +21,7 @@ class BusyPoll:
         self._stirred = self._polling = False
 
     def stir(self, size: int) -> None:
-        """Stay awake, if the message was short."""
+        """Stay awake for a while if the message was short."""
         if size <= SHORT_MAX:
             self._stirred = True
             if not self._polling:
@@ -29,7 +29,7 @@ class BusyPoll:
                 self._loop.call_soon(self._poll)
 
     def _poll(self) -> None:
-        """Have the loop look for news without sleeping, again and again."""
+        """Reschedule itself until the deadline, so that the loop polls without sleeping."""
         now = time.perf_counter()
         if self._stirred:
             self._until, self._stirred = now + AWAKE, False

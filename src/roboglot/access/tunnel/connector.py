@@ -39,7 +39,7 @@ class Welcome(TypedDict):
 
 
 class NotTrusted(ConnectionError):
-    """The gateway is another than last time."""
+    """The gateway's certificate is not the known one."""
 
 
 class Refused(ConnectionError):
@@ -47,14 +47,14 @@ class Refused(ConnectionError):
 
 
 class Trust(Protocol):
-    """Decides whether a gateway is the one that is meant."""
+    """Verifies the certificates of gateways."""
 
     def check(self, gateway: str, certificate: bytes) -> tuple[str, bool]:
         """The fingerprint, and whether it is new here. Raises NotTrusted."""
 
 
 class KnownGateways:
-    """Fingerprints of gateways' certificates, in a file: the first is believed, later ones have to be the same."""
+    """Fingerprints of gateways' certificates, in a file: the first is trusted, later ones must equal it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -81,13 +81,13 @@ class KnownGateways:
 
 
 class AnnouncedGateway:
-    """The fingerprint that the registry of robots has of a gateway: no other is believed."""
+    """The fingerprint of a gateway from the registry of robots; no other is trusted."""
 
     def __init__(self, fingerprint: str) -> None:
         self._fingerprint = fingerprint
 
     def check(self, gateway: str, certificate: bytes) -> tuple[str, bool]:
-        """The fingerprint, which is never new. Raises NotTrusted."""
+        """Return the fingerprint, never as new. Raises NotTrusted."""
         shown = hashlib.sha256(certificate).hexdigest()
         if shown != self._fingerprint:
             raise NotTrusted(f"{gateway} shows another certificate ({shown}) than the registry has of it")
@@ -102,7 +102,7 @@ class Connector:
         self._address, self._known = address, known
 
     async def run(self, ready: Callable[[list[int], str, bool], None]) -> None:
-        """Calls ``ready`` with the open ports, the fingerprint, and whether that is new.
+        """Carry the ports; call ``ready`` with the open ports, the fingerprint, and whether that is new.
 
         Raises NotTrusted, Refused, TunnelLost, OSError.
         """
@@ -128,7 +128,7 @@ class Connector:
         return self._known.check(f"{self._gateway}:{self._port}", certificate)
 
     async def _beat_beside(self, tunnel: Tunnel, key: str) -> None:
-        """Keep a second connection for beats; a tunnel without one only bears lost packets less well."""
+        """Keep a second connection for heartbeats; without it, the tunnel only tolerates lost packets less well."""
         while True:
             try:
                 link = await self._call(TunnelLink)

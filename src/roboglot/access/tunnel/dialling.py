@@ -1,4 +1,4 @@
-"""A robot's ports kept on an address of this machine: dials again when a tunnel is lost, or when the robot moved."""
+"""Keeps a robot's ports on an address of this machine; dials again when the tunnel is lost or the robot has moved."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Protocol
 from roboglot.access.tunnel.connector import Connector, NotTrusted, Refused, Trust
 
 AGAIN_AFTER = 1.0  # s
-SOON = 0.5  # s between two questions about a robot that no program runs at present
+SOON = 0.5  # s between two look-ups of a robot that no program runs at present
 
 
 class Unusable(Exception):
-    """The address or a port of it cannot be had; another try would fare no better."""
+    """The address or one of its ports is unavailable; a retry would fail, too."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A gateway. ``epoch`` is another after each move of the robot."""
+    """A gateway. ``epoch`` changes with each move of the robot."""
 
     host: str
     port: int
@@ -30,17 +30,17 @@ class Place:
 
 
 class Places(Protocol):
-    """Knows behind which gateway a robot is."""
+    """Finds the gateway of a robot."""
 
     async def of(self, robot: str, /) -> Place | None:
-        """Return where it is; None: nowhere just now. Raises OSError."""
+        """Return the robot's gateway; None if it has none at present. Raises OSError."""
 
     async def moved(self, robot: str, place: Place, /) -> None:
-        """Return when it is no longer at this place."""
+        """Return when the robot is no longer at this place."""
 
 
 class OnePlace:
-    """All robots behind one gateway, for good."""
+    """One fixed gateway for all robots."""
 
     def __init__(self, place: Place) -> None:
         self._place = place
@@ -50,12 +50,12 @@ class OnePlace:
         return self._place
 
     async def moved(self, _robot: str, _place: Place, /) -> None:
-        """Wait for ever."""
+        """Wait forever: robots do not move."""
         await asyncio.Event().wait()
 
 
 class Dialling:
-    """Dialling to one robot. ``ready`` and ``say`` report to the user: open ports, and one line about what failed."""
+    """Connection to one robot. ``ready`` and ``say`` report open ports and one line about failures to the user."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class Dialling:
             await asyncio.sleep(SOON)
 
     async def _carry(self, place: Place) -> bool:
-        """Carry the ports until the tunnel is lost or the robot moved: which of these is returned."""
+        """Carry the ports until the tunnel is lost or the robot has moved; return True if it has moved."""
         connector = Connector(place.host, place.port, self._robot, self._token, self._address, place.trust)
         running = asyncio.ensure_future(
             connector.run(lambda ports, shown, new: self._ready(self._robot, ports, shown, new))
@@ -110,7 +110,7 @@ class Dialling:
         return await self._lost(outcome, place)
 
     async def _lost(self, outcome: object, place: Place) -> bool:
-        """Report how a tunnel ended; True: the robot moved meanwhile."""
+        """Report the end of a tunnel; return True if the robot has moved meanwhile."""
         match outcome:
             case NotTrusted() | Refused():
                 if await self._is_there(place):
@@ -125,7 +125,7 @@ class Dialling:
         return False
 
     async def _is_there(self, place: Place) -> bool:
-        """Return whether a gateway that refused us is still the robot's."""
+        """Return whether the gateway at ``place`` is still the robot's."""
         try:
             now = await self._places.of(self._robot)
         except OSError:
@@ -139,7 +139,7 @@ class Dialling:
 
 
 def _unusable(error: BaseException, address: str) -> str:
-    """Return why this address cannot be listened at, and what to do; empty: that is not what went wrong."""
+    """Return why this address cannot be used, and a remedy; empty for other errors."""
     match getattr(error, "errno", None):
         case errno.EADDRNOTAVAIL:
             network = IPv4Network(f"{address}/24", strict=False)

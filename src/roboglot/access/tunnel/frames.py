@@ -16,7 +16,7 @@ CREDIT = struct.Struct("!I")
 class FrameKind(IntEnum):
     """Kind of a frame."""
 
-    HELLO = 1  # from the client: its identity and the robot that it wants; JSON
+    HELLO = 1  # from the client: its identity and the requested robot; JSON
     WELCOME = 2  # from the gateway: its ports; JSON
     REFUSED = 3  # from the gateway: the reason; text
     OPEN = 4  # a new stream, to this port at the other end
@@ -37,16 +37,16 @@ class TunnelFrame(NamedTuple):
 
 
 class BadFrame(ValueError):
-    """Bytes received are no frame; the tunnel ends."""
+    """Received bytes are no frame; the tunnel ends."""
 
 
 def encode(kind: FrameKind, stream: int = 0, payload: bytes = b"") -> bytes:
-    """The frame's bytes; the payload has at most FRAME_MAX - 1."""
+    """Return the frame's bytes; the payload has at most FRAME_MAX - 1."""
     return HEAD.pack(kind, stream, len(payload)) + payload
 
 
 async def read_frame(reader: asyncio.StreamReader) -> TunnelFrame:
-    """The next frame. Raises BadFrame, IncompleteReadError, OSError."""
+    """Return the next frame. Raises BadFrame, IncompleteReadError, OSError."""
     number, stream, size = HEAD.unpack(await reader.readexactly(HEAD.size))
     try:
         kind = FrameKind(number)

@@ -1,7 +1,7 @@
-"""The robots' end: one TLS port behind which each client gets the doors of one robot, and nothing else.
+"""The robots' end: one TLS port that gives each client the doors of one robot, and nothing else.
 
-Each tunnel has a loopback address of its own, from which it calls the robot's ports. So the robot's pushes and
-callbacks come back to the right tunnel, and the guard knows whose they are.
+Each tunnel calls the robot's ports from its own loopback address. So the robot's pushes and callbacks return to the
+right tunnel, and the guard knows the client.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ BROADCASTS = ("127.255.255.255", "255.255.255.255")
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """Ports of one robot: its address, its TCP ports, where it sends datagrams, and where it calls its client back."""
+    """Ports of one robot: its address, TCP ports, destination ports of its datagrams, and ports of its callbacks."""
 
     address: str
     tcp: tuple[int, ...]
@@ -65,7 +65,7 @@ class Ports:
 
 
 class Hello(msgspec.Struct, frozen=True):
-    """Greeting of a client: wants a robot, or to beat over a second connection of a tunnel (``beats``: its key)."""
+    """Greeting of a client: requests a robot, or a second connection for heartbeats (``beats``: the tunnel's key)."""
 
     robot: str = ""
     token: str = ""
@@ -73,7 +73,7 @@ class Hello(msgspec.Struct, frozen=True):
 
 
 class Welcome(msgspec.Struct, frozen=True):
-    """Ports that a client is let in to, and the key of its second connection."""
+    """Ports open to a client, and the key of its second connection."""
 
     tcp: tuple[int, ...]
     callbacks: tuple[int, ...]
@@ -109,7 +109,7 @@ class Gateway:
         self.port = self._server.sockets[0].getsockname()[1]
 
     def reached_at(self) -> str:
-        """Return HOST:PORT for clients; for a gateway on all addresses, the one of this machine's default route."""
+        """Return HOST:PORT for clients; for a gateway on all addresses, with the address of the default route."""
         host = self._host
         if host in EVERYWHERE:
             kind = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -119,7 +119,7 @@ class Gateway:
         return f"[{host}]:{self.port}" if ":" in host else f"{host}:{self.port}"
 
     def certificate(self) -> str:
-        """Return the SHA-256 of its certificate, as clients see it."""
+        """Return the SHA-256 fingerprint of the gateway's certificate."""
         return hashlib.sha256(ssl.PEM_cert_to_DER_cert(_first(self._tls[0].read_text()))).hexdigest()
 
     async def close(self) -> None:
@@ -195,7 +195,7 @@ class Gateway:
 
     @contextlib.contextmanager
     def _address(self, who: str, host: str, callbacks: tuple[int, ...]) -> Iterator[str]:
-        """A loopback address for one tunnel, at which the guard knows ``who``.
+        """Yield a loopback address for one tunnel, at which the guard knows ``who``.
 
         No other gateway on this machine listens there at any of the ports ``callbacks``.
         """
@@ -266,7 +266,7 @@ class _Calls:
         self._numbers = itertools.cycle(PORTS_WITHIN)
 
     async def connect(self, port: int, protocol: Callable[[], asyncio.Protocol]) -> object:
-        """Within the process where the door lets us, else (gRPC) over loopback. Raises OSError."""
+        """Connect within the process if the door offers that, else (gRPC) over loopback. Raises OSError."""
         if port not in self._ports.tcp:
             raise OSError(f"{port} is none of the robot's ports")
         address = self._ports.address
@@ -281,7 +281,7 @@ class _Calls:
         return None
 
     async def _call(self, stream: asyncio.Protocol, address: str, port: int) -> object:
-        """Over loopback; the guard knows the port that it comes from before the door sees it."""
+        """Connect over loopback; the guard knows the local port before the door sees the connection."""
         caller = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             caller.setblocking(False)
@@ -311,7 +311,7 @@ def _is_free(address: str, ports: tuple[int, ...]) -> bool:
 async def _listening(tunnel: Tunnel, robot: Robot, ports: Ports, own: str) -> AsyncIterator[None]:
     """Send the robot's datagrams and calls to the tunnel's address through the tunnel.
 
-    Datagrams are taken from the tap: clients on this machine may hold the same ports on every address.
+    Datagrams are taken from the tap, as clients on this machine may hold the same ports on every address.
     """
     places = {f"{own}:{port}": port for port in ports.pushes}
     places |= {f"{host}:{port}": port for port in ports.broadcasts for host in BROADCASTS}

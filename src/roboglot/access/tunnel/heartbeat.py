@@ -1,4 +1,4 @@
-"""Heartbeat of a tunnel: when an end beats, and what the other's silence means. Knows no clock and no socket."""
+"""Heartbeat of a tunnel: times of beats, and the meaning of silence. Knows no clock and no socket."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LOST_AFTER = 5.0  # s of silence that the tunnel and its connections survive: lo
 
 
 class Look(NamedTuple):
-    """Decision for this moment, and the seconds until the next look."""
+    """Decision at one moment, and the seconds until the next look."""
 
     beat: bool
     quiet: bool
@@ -25,7 +25,7 @@ class Look(NamedTuple):
 
 
 class Heartbeat:
-    """``hear`` at everything that comes; ``look`` again after each look's pause. Times are in s, from any zero."""
+    """Call ``hear`` for everything received, and ``look`` again after each look's pause. Times in s, from any zero."""
 
     def __init__(self, now: float) -> None:
         self.heard = self._heard_beside = self._looked = now
@@ -36,17 +36,17 @@ class Heartbeat:
         self._looks = 0  # in a row in which the other end was silent
 
     def hear(self, now: float, *, quick: bool = False) -> None:
-        """The other end is there; ``quick``: it wants quick beats."""
+        """Note a sign of life of the other end; ``quick``: it wants quick beats."""
         self.heard = now
         if quick:
             self.quick_until = now + QUICK_SECONDS
 
     def hear_beside(self, now: float) -> None:
-        """The other end is there, as its second connection shows."""
+        """Note a sign of life on the second connection."""
         self._heard_beside = now
 
     def look(self, now: float, drives: bool) -> Look:
-        """``drives``: the client has the robot move."""
+        """Return the decision at ``now``; ``drives``: the client moves the robot."""
         quick = drives or now < self.quick_until
         beat = quick or now - self._said >= PING_PERIOD
         if beat:

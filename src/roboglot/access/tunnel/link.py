@@ -16,9 +16,9 @@ _KINDS = {int(kind): kind for kind in FrameKind}
 
 
 class TunnelLink(asyncio.Protocol):
-    """``first`` waits for a frame; after ``follow`` each is handed on.
+    """``first`` waits for a frame; after ``follow``, frames go to its callback.
 
-    ``made`` is called when it is there, ``stir`` with the size of what streams send and receive.
+    ``made`` is called when connected, ``stir`` with the size of data sent and received by streams.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class TunnelLink(asyncio.Protocol):
         self._made(self)
 
     def data_received(self, data: bytes) -> None:
-        """Cut it; what is no frame ends the connection."""
+        """Cut data into frames; a bad frame ends the connection."""
         try:
             self._cut(data)
         except BadFrame as bad:
@@ -51,11 +51,11 @@ class TunnelLink(asyncio.Protocol):
         self.end(str(exc or "the other end hung up"))
 
     def pause_writing(self) -> None:
-        """Much waits to be sent."""
+        """Report a full send buffer."""
         self._crowded(True)
 
     def resume_writing(self) -> None:
-        """Go on sending: the buffer has been sent."""
+        """Report an emptied send buffer."""
         self._crowded(False)
 
     async def first(self) -> TunnelFrame:
@@ -68,7 +68,7 @@ class TunnelLink(asyncio.Protocol):
         return self._early.popleft()
 
     def follow(self, take: Take, crowded: Callable[[bool], None]) -> None:
-        """Hand on every frame from now on; ``crowded`` is called when much waits to be sent, and when no more."""
+        """Pass every frame to ``take`` from now on; ``crowded`` is called when the send buffer fills or empties."""
         self._take, self._crowded = take, crowded
         try:
             while self._early:
@@ -77,7 +77,7 @@ class TunnelLink(asyncio.Protocol):
             self.end(str(bad))
 
     def send(self, kind: FrameKind, number: int = 0, payload: bytes = b"") -> None:
-        """Send a frame; lost where there is no connection any more."""
+        """Send a frame; it is lost if the connection is closing."""
         transport = self.transport
         if not transport.is_closing():
             transport.write(HEAD.pack(kind, number, len(payload)) + payload)

@@ -1,4 +1,4 @@
-"""One TCP connection at one end of a tunnel: what it reads goes into the tunnel as far as the other end has room."""
+"""One TCP connection at one end of a tunnel: its data goes into the tunnel as far as the other end has room."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CREDIT_STEP = WINDOW // 4  # bytes credited at a time
 
 
 class Stream(asyncio.Protocol):
-    """``forget`` is called when it is over."""
+    """``forget`` is called when the stream is over."""
 
     def __init__(self, number: int, link: TunnelLink, forget: Callable[[int], None]) -> None:
         self._number, self._link, self._forget = number, link, forget
@@ -34,7 +34,7 @@ class Stream(asyncio.Protocol):
     # -- this end ------------------------------------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """The local connection is there."""
+        """Start with the local connection, and deliver earlier data."""
         self._transport = cast(asyncio.Transport, transport)
         if self._over:
             self._transport.abort()
@@ -48,7 +48,7 @@ class Stream(asyncio.Protocol):
         self._throttle()
 
     def data_received(self, data: bytes) -> None:
-        """Into the tunnel."""
+        """Send local data into the tunnel."""
         if len(data) <= PIECE:
             self._link.send(FrameKind.DATA, self._number, data)
         else:
@@ -59,20 +59,20 @@ class Stream(asyncio.Protocol):
             self._throttle()
 
     def eof_received(self) -> bool:
-        """The local client sends no more, and may go on reading."""
+        """Pass on the end of the local client's data; it may go on reading."""
         self._link.send(FrameKind.EOF, self._number)
         self._ended_here = True
         return not self._ended_there
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - asyncio's
-        """The local client is gone."""
+        """Close the stream with the local connection."""
         if not self._over:
             self._over = True
             self._link.send(FrameKind.CLOSE, self._number)
             self._forget(self._number)
 
     def pause_writing(self) -> None:
-        """The local client does not read: credit nothing."""
+        """Stop crediting: the local client does not read."""
         self._clogged = True
 
     def resume_writing(self) -> None:
@@ -86,7 +86,7 @@ class Stream(asyncio.Protocol):
     # -- the other end -------------------------------------------------------------------------------------------------
 
     def deliver(self, data: bytes) -> None:
-        """Deliver to the local client, or as soon as it is connected."""
+        """Deliver data to the local client, or keep it until that is connected."""
         if self._transport is None:
             self.undelivered += len(data)
             self._early += data
@@ -100,30 +100,30 @@ class Stream(asyncio.Protocol):
                 self._pay()
 
     def deliver_end(self) -> None:
-        """The far client sends no more."""
+        """Pass the end of the far client's data to the local one."""
         self._ended_there = True
         if self._transport is not None:
             self._write_end()
 
     def give(self, credit: int) -> None:
-        """The other end has room for more."""
+        """Add credit: bytes for which the other end has room."""
         self._credit = min(WINDOW, self._credit + credit)
         self._throttle()
 
     def hold(self, held: bool) -> None:
-        """The tunnel is full, or no longer."""
+        """Hold or release the stream, as the tunnel is full or no longer."""
         self._held = held
         self._throttle()
 
     def close(self) -> None:
-        """The far connection has ended; earlier data is still delivered."""
+        """Close the stream after the far connection; earlier data is still delivered."""
         self._over = True
         self._forget(self._number)
         if self._transport is not None:
             self._transport.close()
 
     def abort(self) -> None:
-        """The tunnel is lost."""
+        """Abort the local connection, as the tunnel is lost."""
         self._over = True
         if self._transport is not None:
             self._transport.abort()
@@ -136,7 +136,7 @@ class Stream(asyncio.Protocol):
             self._transport.write_eof()
 
     def _pay(self) -> None:
-        """Credit what was taken."""
+        """Credit the bytes taken."""
         self._link.send(FrameKind.CREDIT, self._number, CREDIT.pack(self._owed))
         self._owed = 0
 

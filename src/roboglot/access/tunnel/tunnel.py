@@ -1,4 +1,4 @@
-"""One tunnel from either end: streams with their own windows, datagrams, and a beat that shows that both are there."""
+"""One tunnel, at either end: streams with their own windows, datagrams, and heartbeats."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ Opened = Callable[[int, Callable[[], asyncio.Protocol]], Awaitable[object]]
 
 
 class TunnelLost(ConnectionError):
-    """The other end is gone, or does not keep to the rules."""
+    """The other end is gone or violates the protocol."""
 
 
 class Tunnel:
-    """``run`` until it is lost.
+    """One end of a tunnel; ``run`` it until it is lost.
 
-    ``opened`` connects a port that the other end asks for to a protocol of this end. ``first``: streams that one end
-    opens are odd, the other's even. ``quiet`` is called when the other end has said nothing for QUIET_AFTER; while
-    ``drives``, both show often that they are there.
+    ``opened`` connects a port requested by the other end to a protocol of this end. ``first``: number of the first own
+    stream; one end's are odd, the other's even. ``quiet`` is called after QUIET_AFTER s of silence of the other end;
+    while ``drives``, both ends send quick heartbeats.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Tunnel:
         self._heart = Heartbeat(self._loop.time())
 
     async def run(self) -> None:
-        """Carry until the tunnel is lost; then every stream ends. Raises TunnelLost."""
+        """Carry data until the tunnel is lost, then end every stream. Raises TunnelLost."""
         self._heart.hear(self._loop.time())
         beat = asyncio.ensure_future(self._beat())
         try:
@@ -74,7 +74,7 @@ class Tunnel:
             await asyncio.gather(beat, *self._opening, return_exceptions=True)
 
     async def beat_over(self, link: TunnelLink) -> None:
-        """Show over a second connection too that both ends are there, until it is lost or another takes its place."""
+        """Send heartbeats over a second connection, too, until it is lost or replaced."""
         if self._beside is not None:
             self._beside.end("another took its place")
         self._beside = link
@@ -84,7 +84,7 @@ class Tunnel:
             self._beside = None
 
     def accept(self, port: int) -> Callable[[], asyncio.Protocol]:
-        """Return what a server of this end makes for each connection: it is carried to ``port`` of the other end."""
+        """Return the protocol factory of a local server whose connections are carried to ``port`` at the other end."""
 
         def connected() -> asyncio.Protocol:
             if self._over or len(self._streams) >= STREAMS_MAX:
@@ -175,7 +175,7 @@ class Tunnel:
 
 
 class _Turned(asyncio.Protocol):
-    """A connection too many."""
+    """A connection beyond the limit, closed at once."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         cast(asyncio.Transport, transport).abort()

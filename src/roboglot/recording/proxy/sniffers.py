@@ -33,7 +33,7 @@ class Sniffer(ABC):
 
     @abstractmethod
     def from_client(self, data: bytes) -> None:
-        """Parse bytes to the robot. Any error ends the parsing of this connection, not the connection."""
+        """Parse bytes to the robot. An error ends the parsing of this connection, not the connection itself."""
 
     @abstractmethod
     def from_robot(self, data: bytes) -> None:
