@@ -1,4 +1,4 @@
-"""The console's interface from a script's end. Knows no robot and no tool."""
+"""Client of the console's interface. Knows no robot and no tool."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ T = TypeVar("T")
 
 
 class Refused(Exception):
-    """The console did not do it; the text is its reason."""
+    """The console refused or failed; the text is the reason."""
 
 
 class ConsoleClient:
-    """One console at ``url`` (http://127.0.0.1:50080); ``token`` where access is asked for."""
+    """One console at ``url`` (http://127.0.0.1:50080); ``token``: if access is controlled."""
 
     def __init__(self, url: str, token: str = "") -> None:
         self._url = url.rstrip("/")
         self._headers = {"authorization": f"Bearer {token}"} if token else {}
 
     async def get(self, kind: type[T], *path: str) -> T:
-        """Return the JSON below /api/. Raises Refused, also where it is no ``kind``."""
+        """Return the JSON below /api/ as a ``kind``. Raises Refused, even for JSON of another type."""
         return _decoded(await self.fetch(*path), kind)
 
     async def post(self, kind: type[T], *path: str, values: Mapping[str, object]) -> T:
-        """Have something done; the result. Raises Refused, also where it is no ``kind``."""
+        """Post ``values`` and return the result as a ``kind``. Raises Refused, even for JSON of another type."""
         return _decoded(await self.fetch(*path, body=msgspec.json.encode(values)), kind)
 
     async def fetch(self, *path: str, body: bytes | None = None) -> bytes:

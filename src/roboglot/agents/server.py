@@ -1,4 +1,4 @@
-"""The tools: what an agent may ask of robots. Each is bounded, and refused with a reason like any client's wish."""
+"""The tools of an agent. Each is bounded, and refused with a reason like every client's request."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from roboglot.agents.console import ConsoleClient, Refused
 
 T = TypeVar("T")
 SECONDS_MAX = 120.0  # a tool's longest wait for an action or a program
-LOOK = 0.1  # s between two checks of what is under way
+LOOK = 0.1  # s between two checks of a running action
 DEFAULT = "a"
 
 Robot = Annotated[str, Field(min_length=1, max_length=80, description="The robot's name, as `robots` lists it.")]
@@ -66,7 +66,7 @@ class _Faults(msgspec.Struct):
 
 
 class _State(msgspec.Struct):
-    """State read of a robot; no place of the pose is a number before it is known."""
+    """State of a robot; the numbers of the pose are None while it is unknown."""
 
     pose: list[float | None]
     actions: list[dict[str, object]]
@@ -189,7 +189,7 @@ class Tools:
         return "mended"
 
     async def _act(self, robot: str, verb: str, values: Mapping[str, object], wait: float) -> dict[str, object]:
-        """Start an action and wait for its end, at most so long."""
+        """Start an action and wait for its end, at most ``wait`` s."""
         begun = await _asked(self._console.post(_Begun, "robots", robot, verb, values=values))
         number = begun.result.action
         seen: dict[str, object] = {"id": number, "status": "ACCEPTED"}
@@ -205,7 +205,7 @@ class Tools:
 
 
 async def _beats(seconds: float) -> AsyncIterator[None]:
-    """Return an iterator over looks, LOOK apart, for so many seconds; at least one."""
+    """Yield every LOOK s, for ``seconds``; at least once."""
     loop = asyncio.get_running_loop()
     end = loop.time() + seconds
     while True:

@@ -1,1 +1,1 @@
-"""Recorded drives: what a lidar and odometry said, read from the formats that robots and research leave behind."""
+"""Recorded drives: lidar scans and odometry, read from the formats of robots and research."""

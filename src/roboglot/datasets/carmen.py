@@ -1,4 +1,4 @@
-"""CARMEN logs: FLASER, ROBOTLASER1, RAWLASER1 with ODOM, and their PARAM lines. The format of Radish's data sets."""
+"""CARMEN logs, the format of Radish's data sets: FLASER, ROBOTLASER1, RAWLASER1 with ODOM, and PARAM lines."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 
 RANGE_MIN, LEAST_NO_ECHO = 0.03, 5.0  # m
-OFFSET_SAME = 0.01  # m, rad: apparent motion by rounding of a laser fixed to the robot
+OFFSET_SAME = 0.01  # m, rad: apparent motion of a fixed laser by rounding
 LINE_MAX = 200_000  # characters
 
 
 @dataclass(slots=True)
 class _Line:
-    """A scan as its line has it: ``laser`` and ``robot`` poses in the log's frame."""
+    """A scan from one line: ``laser`` and ``robot`` poses in the log's frame."""
 
     stamp: float
     ranges: NDArray[np.float64]
@@ -49,7 +49,7 @@ class _Log:
 
 
 def read_carmen(path: Path) -> DriveLog:
-    """Read the log at ``path``. Raises BadDriveLog when no line of it is a scan of the front laser."""
+    """Read the log at ``path``. Raises BadDriveLog if it has no scan of the front laser."""
     log = _Log()
     with path.open(encoding="ascii", errors="replace") as lines:
         for line in _bounded(lines):
@@ -75,7 +75,7 @@ def _bounded(lines: Iterator[str]) -> Iterator[str]:
 
 
 def _scans(log: _Log) -> Sequence[RecordedScan]:
-    """The scans with what the whole log shows: the laser's place on the robot, and which reading means nothing."""
+    """Return the scans with values from the whole log: the laser's mount, and the reading that means "no echo"."""
     lines = sorted(log.scans, key=lambda line: line.stamp)
     offsets = np.array([_tuple(line.laser.relative_to(line.robot)) for line in lines])
     middle = np.median(offsets, axis=0)
@@ -89,7 +89,7 @@ def _scans(log: _Log) -> Sequence[RecordedScan]:
     for line in lines:
         ranges = echoes(line.ranges, nothing_from, RANGE_MIN)
         scan = LaserScan(line.stamp, ranges, line.angle_min, line.increment, RANGE_MIN, reach, mount=mount)
-        # Logs that were corrected afterwards have the corrected pose in place of the laser's.
+        # Corrected logs have the corrected pose in place of the laser's.
         reference = None if rigid else line.laser.compose(mount.inverse())
         result.append(RecordedScan(scan, line.robot, reference))
     return result
@@ -113,7 +113,7 @@ def _ranges(words: Sequence[str], count: int) -> NDArray[np.float64]:
 
 
 def _stamp(words: Sequence[str]) -> float:
-    """The time at the line's end: ipc_timestamp host logger_timestamp. The first is when the scan was taken."""
+    """Return the time (s) at the line's end: ipc_timestamp host logger_timestamp. The first is the scan's."""
     return float(words[0]) if float(words[0]) > 0 or len(words) < 3 else float(words[2])
 
 
@@ -134,7 +134,7 @@ def _robotlaser(log: _Log, words: list[str]) -> None:
 
 
 def _rawlaser(log: _Log, words: list[str]) -> None:
-    """A scan without a pose: the newest ODOM line has it."""
+    """Read a scan without a pose, which the newest ODOM line gives."""
     if log.odometry is None:
         raise ValueError("a scan before odometry")
     angle_min, increment = float(words[2]), float(words[4])

@@ -1,6 +1,6 @@
-"""Plain tables, a line a scan: stamp, odometry x y yaw, perhaps a reference x y yaw, then the ranges in m.
+"""Plain tables, one line per scan: stamp, odometry x y yaw, optionally a reference x y yaw, then the ranges in m.
 
-The ranges span 180 degrees from the right to the left when they are 180, 181, 360 or 361; otherwise 360 degrees.
+180, 181, 360 or 361 ranges span 180 degrees, from the right to the left; other counts span 360 degrees.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def read_columns(path: Path) -> DriveLog:
 
 
 def table(path: Path) -> NDArray[np.float64]:
-    """The numbers of a text file whose lines all have the same count; lines that begin with # are comments."""
+    """Return the numbers of a text file with lines of equal length; lines that begin with # are comments."""
     rows: list[NDArray[np.float64]] = []
     with path.open(encoding="ascii", errors="replace") as lines:
         for number, line in enumerate(lines, 1):

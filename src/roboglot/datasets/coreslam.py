@@ -1,6 +1,6 @@
-"""The logs of CoreSLAM (Mines ParisTech): 24 columns of state, two of them the wheels' counters, then ranges in mm.
+"""Logs of CoreSLAM (Mines ParisTech): 24 columns of state, two of them the wheels' counters, then ranges in mm.
 
-The robot's figures are those published with the logs. A range of 0 to 19 is an error code of the scanner.
+The robot's dimensions were published with the logs. A range of 0 to 19 is an error code of the scanner.
 """
 
 from __future__ import annotations
@@ -50,6 +50,6 @@ def read_coreslam(path: Path) -> DriveLog:
 
 
 def driven(pose: Pose, way: float, turn: float) -> Pose:
-    """``pose`` after an arc of ``way`` m that turns by ``turn`` rad."""
+    """Return ``pose`` after an arc of ``way`` m that turns by ``turn`` rad."""
     chord = way if abs(turn) < 1e-9 else way * math.sin(turn / 2) / (turn / 2)
     return pose.compose(Pose(chord * math.cos(turn / 2), chord * math.sin(turn / 2), turn))

@@ -1,4 +1,4 @@
-"""One recorded drive, whatever file it came from. SI units, REP-103/105 frames."""
+"""One recorded drive, from a file of every format. SI units, REP-103/105 frames."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ FILE_BYTES_MAX = 4_000_000_000
 SCANS_MAX = 2_000_000
 RAYS_MAX = 8192
 USUAL_SHARE = 0.001  # of all readings: the largest reading means "no echo" if it recurs at least this often
-SICK_NO_ECHO = 80.0  # m, from which these scanners report codes instead of distances
+SICK_NO_ECHO = 80.0  # m: from here on, these scanners report codes instead of distances
 
 
 class BadDriveLog(ValueError):
-    """The file is not a recording that can be read; the message says why."""
+    """The file is no readable recording; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedScan:
-    """A scan, odometry at its time, and the reference pose if the file has one; both poses are base_link's."""
+    """A scan, odometry at its time, and the file's reference pose or None; both are poses of base_link."""
 
     scan: LaserScan
     odometry: Pose
@@ -33,7 +33,7 @@ class RecordedScan:
 
 @dataclass(frozen=True, slots=True)
 class DriveLog:
-    """A drive in the order of its time; ``unread``: records of the file that were left out, by reason."""
+    """A drive in order of time; ``unread``: counts of skipped records, by reason."""
 
     name: str
     scans: Sequence[RecordedScan]
@@ -41,9 +41,9 @@ class DriveLog:
 
 
 def no_echo(ranges: NDArray[np.float64], *, least: float) -> float:
-    """The reading (m) from which a ray found nothing: the largest one if it recurs and exceeds ``least``, else inf.
+    """Return the reading (m) from which rays have no echo: the largest if it recurs and exceeds ``least``, else inf.
 
-    Scanners report "nothing within range" as one fixed large number, which differs from make to make.
+    Scanners report "nothing within range" as one fixed large number, which depends on the make.
     """
     readings = ranges[np.isfinite(ranges)]
     if not readings.size:
@@ -56,7 +56,7 @@ def no_echo(ranges: NDArray[np.float64], *, least: float) -> float:
 
 
 def echoes(ranges: NDArray[np.float64], nothing_from: float, range_min: float) -> NDArray[np.float32]:
-    """``ranges`` as ``LaserScan`` has them: inf from ``nothing_from`` on, NaN below ``range_min``."""
+    """Return ``ranges`` (m) for a ``LaserScan``: inf from ``nothing_from`` on, NaN below ``range_min``."""
     with np.errstate(over="ignore"):  # values beyond float32 become inf
         result = ranges.astype(np.float32)
     with np.errstate(invalid="ignore"):

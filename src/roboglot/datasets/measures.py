@@ -1,7 +1,7 @@
-"""Errors of an estimated trajectory against a reference: absolute after alignment, and of relations.
+"""Errors of an estimated trajectory against a reference: absolute ones after alignment, and errors of relations.
 
-Relations (Kümmerle et al. 2009) say where the robot was at one time as seen from where it was at another; they do not
-punish a small error early in the drive for all that comes after it.
+A relation (Kümmerle et al. 2009) is the pose at one time relative to the pose at another; so a small error early in the
+drive does not affect the errors after it.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class RelationErrors:
 
 
 def absolute_error(estimated: Sequence[Pose], reference: Sequence[Pose]) -> float:
-    """Root of the mean square distance (m) between poses of the same times, after the best rigid alignment."""
+    """Return the RMS distance (m) between poses of the same times, after the best rigid alignment."""
     one = np.array([(pose.x, pose.y) for pose in estimated])
     other = np.array([(pose.x, pose.y) for pose in reference])
     off: NDArray[np.float64] = aligned(one, other) - other
@@ -53,7 +53,7 @@ def absolute_error(estimated: Sequence[Pose], reference: Sequence[Pose]) -> floa
 
 
 def aligned(points: NDArray[np.float64], to: NDArray[np.float64]) -> NDArray[np.float64]:
-    """``points`` (n, 2) turned and shifted to lie on ``to`` (n, 2) as well as they can."""
+    """Return ``points`` (n, 2), rigidly aligned to ``to`` (n, 2) with the least squared distance."""
     middle, target = points.mean(axis=0), to.mean(axis=0)
     left, right = points - middle, to - target
     angle = math.atan2(float((left[:, 0] * right[:, 1] - left[:, 1] * right[:, 0]).sum()), float((left * right).sum()))
@@ -63,7 +63,7 @@ def aligned(points: NDArray[np.float64], to: NDArray[np.float64]) -> NDArray[np.
 
 
 def neighbour_relations(reference: Stamped) -> list[Relation]:
-    """From each pose of ``reference`` to the next."""
+    """Return the relations from each pose of ``reference`` to the next."""
     return [
         Relation(before, after, there.relative_to(here))
         for (before, here), (after, there) in itertools.pairwise(reference)
@@ -71,7 +71,7 @@ def neighbour_relations(reference: Stamped) -> list[Relation]:
 
 
 def read_relations(path: Path) -> list[Relation]:
-    """A relations file: two stamps, then x y z roll pitch yaw of the second pose in the first's frame."""
+    """Read a file of relations: two stamps, then x y z roll pitch yaw of the second pose in the first's frame."""
     relations = []
     with path.open(encoding="ascii", errors="replace") as lines:
         for number, line in enumerate(lines, 1):
@@ -89,7 +89,7 @@ def read_relations(path: Path) -> list[Relation]:
 
 
 def relation_errors(estimated: Stamped, relations: Sequence[Relation]) -> RelationErrors:
-    """Of those relations whose two times ``estimated`` has a pose near."""
+    """Return the errors of the relations with an estimated pose near both times."""
     stamps = np.array([stamp for stamp, _ in estimated])
     shifts, turns = [], []
     for relation in relations:

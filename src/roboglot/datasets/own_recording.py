@@ -1,6 +1,6 @@
-"""Our own recordings (``roboglot up --record``): scans and odometry out of the MCAP file, one robot's.
+"""Our own recordings (``roboglot up --record``): scans and odometry of one robot from the MCAP file.
 
-Of several robots the one with most scans is read. The lidar's limits are not in the file: the farthest echo counts.
+Of several robots, the one with most scans is read. As the file has no limits of the lidar, the farthest echo counts.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ RANGE_MIN = 0.05  # m
 
 
 def read_own_recording(path: Path) -> DriveLog:
-    """Read the recording at ``path``, up to where it is cut off. Raises BadDriveLog, MissingExtra, OSError."""
+    """Read the recording at ``path``, even if it is cut off. Raises BadDriveLog, MissingExtra, OSError."""
     with explaining("reading recordings", "recording"):
         decoding = import_module("google.protobuf.message")
         from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -69,7 +69,7 @@ def read_own_recording(path: Path) -> DriveLog:
 
 
 def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
-    """Schema and bytes of the scans and transforms."""
+    """Yield schema and bytes of scans and transforms."""
     with explaining("reading recordings", "recording"):
         from mcap.records import Channel, Message, Schema
         from mcap.stream_reader import StreamReader

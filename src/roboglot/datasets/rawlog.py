@@ -1,6 +1,6 @@
-"""MRPT ``.rawlog`` files: laser scans with the odometry of actions or of observations, in any version of the classes.
+"""MRPT ``.rawlog`` files: laser scans with odometry of actions or observations, in every version of the classes.
 
-Objects are found by their headers, so classes that matter to no map (images, satellites, gas) need not be known.
+Objects are found by their headers, so classes without use for maps (images, satellites, gas) need not be known.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ RANGE_MIN = 0.03  # m
 
 
 class _Reader:
-    """Little-endian values one after another. Raises struct.error at the end."""
+    """Reads little-endian values in sequence. Raises struct.error at the end."""
 
     def __init__(self, data: bytes, at: int) -> None:
         self._data, self._at = data, at
@@ -60,7 +60,7 @@ class _Reader:
         return np.frombuffer(self._data, kind, count, self._at - size)
 
     def begin(self) -> int:
-        """Skip an object's header; returns its version."""
+        """Skip an object's header; return its version."""
         self._old = self._data[self._at : self._at + 1] < b"\x80"
         (length,) = self.take("I" if self._old else "B")
         self._at += int(length) & 0x7F
@@ -73,7 +73,7 @@ class _Reader:
         return self.array(kind, rows * columns).reshape(rows, columns).astype(np.float64)
 
     def end(self) -> None:
-        """Objects end with this mark, except in old files."""
+        """Read the mark at the end of an object, which old files lack."""
         if not self._old and self.take("B") != (0x88,):
             raise ValueError("no object ends here")
 
@@ -127,7 +127,7 @@ def _unpacked(path: Path) -> bytes:
 
 
 def _joined(scans: Sequence[_Scan], stamped: Sequence[tuple[float, Pose]]) -> list[RecordedScan]:
-    """Each scan with odometry at its time, between two readings; turns are taken the short way."""
+    """Return scans with odometry interpolated at their times; angles are interpolated the short way."""
     ordered = sorted(stamped, key=lambda item: item[0])
     times = np.array([stamp for stamp, _ in ordered])
     yaws = np.unwrap([pose.yaw for _, pose in ordered])
@@ -140,7 +140,7 @@ def _joined(scans: Sequence[_Scan], stamped: Sequence[tuple[float, Pose]]) -> li
 
 
 def _movement(data: bytes, at: int) -> Pose:
-    """The mean of how the robot moved."""
+    """Return the mean pose of a movement."""
     found = POSE_HEADER.search(data, at, at + POSE_WITHIN)
     if found is None:
         raise ValueError("the motion has no mean pose")
@@ -176,7 +176,7 @@ def _stamp(reader: _Reader) -> float:
 
 
 def _mount(reader: _Reader) -> tuple[Pose, bool]:
-    """The scanner's pose in the plane, and whether it hangs upside down. ValueError if it leans."""
+    """Return the scanner's pose in the plane, and True if it is upside down. Raises ValueError if it is tilted."""
     version = reader.begin()
     if version == 2:
         x, y, _, w, i, j, k = reader.take("7d")

@@ -1,4 +1,4 @@
-"""Drives an estimator with a recording as if a robot did: odometry and lidar components whose readings are recorded."""
+"""Feeds an estimator from a recording in place of a robot: odometry and lidar components with recorded readings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ GAP_MAX = 0.5  # s between two scans up to which a speed is computed
 
 
 class ReplayedOdometry(Odometry):
-    """Odometry of the scan that was played last, with the drive's first pose as its origin."""
+    """Odometry of the last played scan, with the drive's first pose as origin."""
 
     def __init__(self) -> None:
         self._reading = OdometryReading(0.0, ORIGIN, STILL, 0.0)
@@ -23,7 +23,7 @@ class ReplayedOdometry(Odometry):
         return self._reading
 
     def take(self, stamp: float, pose: Pose) -> None:
-        """The next recorded pose."""
+        """Set the next recorded pose; ``stamp`` in s."""
         before = self._reading
         seconds, moved = stamp - before.stamp, pose.relative_to(before.pose)
         twist = STILL
@@ -33,7 +33,7 @@ class ReplayedOdometry(Odometry):
 
 
 class ReplayedLidar(Lidar):
-    """The scan that was played last."""
+    """The last played scan."""
 
     rate = 0.0
 
@@ -45,7 +45,7 @@ class ReplayedLidar(Lidar):
         return self._scan
 
     def take(self, scan: LaserScan) -> None:
-        """The next recorded scan."""
+        """Set the next recorded scan."""
         self._scan = scan
 
 
@@ -58,7 +58,7 @@ class Replay:
         self._origin: Pose | None = None
 
     def play(self, recorded: RecordedScan) -> Pose:
-        """Publish one scan; returns odometry's pose (odom) at its time."""
+        """Publish one scan; return the odometry pose (odom) at its time."""
         if self._origin is None:
             self._origin = recorded.odometry
         pose = recorded.odometry.relative_to(self._origin)

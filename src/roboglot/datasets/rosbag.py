@@ -1,7 +1,7 @@
-"""Bags of ROS: rosbag2 (a folder with SQLite or MCAP files) and ROS 1's ``.bag``; ``roboglot[logs]`` reads them.
+"""ROS bags: rosbag2 (a folder with SQLite or MCAP files) and ROS 1's ``.bag``; needs ``roboglot[logs]``.
 
-One laser (the topic with most scans), one odometry (``nav_msgs/Odometry``; without it tf's odom to base), and where the
-laser is mounted as tf says, else in the middle.
+Reads one laser (the topic with most scans), one odometry (``nav_msgs/Odometry``, else tf's odom to base), and the
+laser's mount from tf, else the origin of the base.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 ODOM_FRAMES, BASE_FRAMES = ("odom",), ("base_link", "base_footprint")
 CHAIN_MAX = 16  # frames between base and laser
-RAY_SECONDS_MAX = 0.01  # s between two rays that are plausible
+RAY_SECONDS_MAX = 0.01  # plausible s between two rays
 
 
 class Stamp(Protocol):
@@ -84,7 +84,7 @@ class ScanMessage(Protocol):
 
 
 def is_bag(path: Path, head: bytes) -> bool:
-    """Return whether this is a bag: a folder of rosbag2, a ROS 1 bag, or a file of rosbag2 in its folder."""
+    """Return whether this is a bag: a rosbag2 folder, a file in one, or a ROS 1 bag."""
     if path.is_dir():
         return (path / "metadata.yaml").is_file()
     return head.startswith(b"#ROSBAG V2.0") or (path.suffix in (".db3", ".mcap") and _folder(path) is not None)
@@ -118,7 +118,7 @@ def read_bag(path: Path) -> DriveLog:
 
 
 def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
-    """The scans with their odometry, from messages in the order of their arrival."""
+    """Return scans with odometry, from messages in the order of arrival."""
     scans: list[ScanMessage] = []
     wheels, tf_wheels = Track(), Track()
     fixed: dict[str, tuple[str, Pose]] = {}  # frame: its parent and its pose in the parent
@@ -150,7 +150,7 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
 
 
 def _take(transform: TransformStamped, fixed: dict[str, tuple[str, Pose]], wheels: Track) -> None:
-    """Take a transform of tf: the base in odom, or a part on the robot."""
+    """Store a transform of tf: the base in odom, or a part on the robot."""
     above, frame = (name.strip("/") for name in (transform.header.frame_id, transform.child_frame_id))
     pose = _pose(transform.transform.translation, transform.transform.rotation)
     if above in ODOM_FRAMES and frame in BASE_FRAMES:
@@ -160,7 +160,7 @@ def _take(transform: TransformStamped, fixed: dict[str, tuple[str, Pose]], wheel
 
 
 def _mount(fixed: dict[str, tuple[str, Pose]], frame: str) -> Pose:
-    """Return where the laser is on the robot: up tf's tree as far as it goes."""
+    """Return the laser's pose on the robot, composed up tf's tree as far as it reaches."""
     mount, frame = ORIGIN, frame.strip("/")
     for _ in range(CHAIN_MAX):
         if frame in BASE_FRAMES or frame not in fixed:
@@ -190,7 +190,7 @@ def _seconds(stamp: Stamp) -> float:
 
 
 def _pose(position: Vector, q: Quaternion) -> Pose:
-    """The planar part; a rotation by pi around x (a laser upside down) is not one and is left out."""
+    """Return the planar part of a pose; it has no rotation by pi around x (a laser upside down)."""
     yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
     x, y = float(position.x), float(position.y)
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):

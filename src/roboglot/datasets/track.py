@@ -1,4 +1,4 @@
-"""Poses over time, from messages that come at other times than scans."""
+"""Poses over time, from messages with other stamps than the scans."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ APART_MAX = 1.0  # s between a scan and its odometry
 
 
 class Track:
-    """Poses over time, asked for in between."""
+    """Poses over time, interpolated."""
 
     def __init__(self) -> None:
         self._stamps: list[float] = []
@@ -20,13 +20,13 @@ class Track:
         return len(self._stamps)
 
     def add(self, stamp: float, pose: Pose) -> None:
-        """The next one; one that is not later than the last is left out."""
+        """Append a pose; ignored unless ``stamp`` (s) is later than the last."""
         if not self._stamps or stamp > self._stamps[-1]:
             self._stamps.append(stamp)
             self._poses.append(pose)
 
     def at(self, stamp: float) -> Pose | None:
-        """The pose then; None where none is near."""
+        """Return the pose at ``stamp`` (s); None if none is near."""
         index = bisect_left(self._stamps, stamp)
         if index == len(self._stamps):
             return self._poses[-1] if self._stamps and stamp - self._stamps[-1] < APART_MAX else None

@@ -1,1 +1,1 @@
-"""Tools for processes that host robots: a heap that gives back, open files, an end in any case."""
+"""Tools for processes that host robots: heap settings, limit of open files, a guaranteed end."""

@@ -1,4 +1,4 @@
-"""The event loop of commands that pass bytes on."""
+"""The event loop of commands that forward bytes."""
 
 from __future__ import annotations
 

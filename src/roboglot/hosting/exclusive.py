@@ -1,4 +1,4 @@
-"""A folder that one process alone uses."""
+"""A folder for the exclusive use of one process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class FolderInUse(RuntimeError):
 
 
 def lock_folder(folder: Path) -> int:
-    """Make the folder and hold it for this process alone; the lock goes with the process. Raises FolderInUse."""
+    """Create the folder and lock it for this process, until that ends. Raises FolderInUse."""
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     lock = os.open(folder / "lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
     try:

@@ -1,4 +1,4 @@
-"""A socket in a folder that only its owner can open: a line of JSON comes, a line of JSON goes."""
+"""A socket in a folder that only its owner can open: one line of JSON per request and answer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PATH_MAX = 107  # bytes of a socket's path: the system's limit
 
 
 class LocalServer:
-    """Answers the owner of this machine. ``name`` is the command that a warning names when it cannot listen."""
+    """Answers the folder's owner. ``name``: command that a warning names if the server cannot listen."""
 
     def __init__(self, path: Path, name: str, answer: Callable[[bytes], Awaitable[bytes]]) -> None:
         self._path, self._name, self._answer = path, name, answer
@@ -26,7 +26,7 @@ class LocalServer:
         self._callers: set[asyncio.StreamWriter] = set()
 
     async def open(self) -> None:
-        """Listen. Where that cannot be the program can still be used, and a warning says so."""
+        """Listen. On failure, log a warning; the program runs on without the socket."""
         listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._path.unlink(missing_ok=True)  # left by a killed program; no other program uses the folder
@@ -64,7 +64,7 @@ class LocalServer:
 
 
 async def ask(path: Path, request: bytes, seconds: float) -> bytes:
-    """Return the answer's line. Raises OSError; TimeoutError, which is one, if it takes longer than ``seconds``."""
+    """Return the answer's line. Raises OSError; its subclass TimeoutError after ``seconds``."""
 
     async def exchange() -> bytes:
         reader, writer = await asyncio.open_unix_connection(path, limit=ANSWER_MAX)

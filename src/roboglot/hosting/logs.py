@@ -1,4 +1,4 @@
-"""Log lines: one an event, on standard error, with the robot that it is about, and not too many of a kind."""
+"""Log lines: one per event, on standard error, with the robot's name, and limited in rate by kind."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from roboglot.model.client_context import concerned
 
 NOISY = ("uvicorn", "websockets", "httpx", "grpc", "asyncio", "numba")
 LINES_MAX = 50  # of a kind about one robot in PERIOD
-ALL_LINES_MAX = 250  # of a kind about no robot in particular: a start says things of each of 100
+ALL_LINES_MAX = 250  # of a kind about no single robot: a start logs lines for each of 100 robots
 PERIOD = 10.0  # s
 KINDS_MAX = 1024
 
 
 @dataclass(slots=True)
 class _Window:
-    """Lines of one kind since ``began``, s."""
+    """Number of lines of one kind since ``began`` (s)."""
 
     began: float
     lines: int = 0
@@ -27,7 +27,7 @@ class _Window:
 
 
 class BoundsLines(logging.Filter):
-    """Leaves out further lines of a kind that come too fast, as clients can cause, and says how many."""
+    """Drops lines of a kind beyond the limit, as clients can cause them, and logs their number."""
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ def _append(record: logging.LogRecord, text: str) -> None:
 
 
 class NamesRobot(logging.Filter):
-    """Puts the robot's name before a line about one that does not name it."""
+    """Adds the robot's name to lines about a robot that do not contain it."""
 
     def filter(self, record: logging.LogRecord) -> bool:
         if (robot := concerned()) and (name := f"robot {robot}") not in (text := record.getMessage()):
@@ -69,7 +69,7 @@ class NamesRobot(logging.Filter):
 
 
 def set_up_logging(verbose: bool) -> None:
-    """One readable line per event, on standard error."""
+    """Set up logging: one readable line per event, on standard error."""
     handler = logging.StreamHandler()
     handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)-7s %(message)s  (%(name)s)", "%H:%M:%S"))
     if not verbose:

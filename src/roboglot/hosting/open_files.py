@@ -19,7 +19,7 @@ SPARE = 3  # files; below this the program is full
 
 
 def raise_limit() -> None:
-    """Take as many as the system allows."""
+    """Raise this process's limit as far as the system allows."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED if hard == resource.RLIM_INFINITY else min(hard, WANTED)
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -38,7 +38,7 @@ def shortage(robots: int) -> str:
 
 
 def ran_out(error: BaseException | None) -> bool:
-    """Return True if ``error`` or a cause of it is a lack of files."""
+    """Return True if ``error`` or one of its causes is a lack of files."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
             return True
@@ -47,7 +47,7 @@ def ran_out(error: BaseException | None) -> bool:
 
 
 def in_words() -> str:
-    """Return the message for it."""
+    """Return the message for a full program."""
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return (
         f"all {limit} files that this program may have open are in use (a robot needs {EACH}, each client one): {MORE}"
@@ -55,13 +55,13 @@ def in_words() -> str:
 
 
 class OpenFiles:
-    """Watches a loop: at the limit there is one sentence, and another one when it is reached again."""
+    """Watches a loop's open files; logs one line each time the limit is reached."""
 
     def __init__(self) -> None:
         self._full = False
 
     def watch(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Look from now on, until the loop ends."""
+        """Check regularly until the loop ends."""
         loop.set_exception_handler(self.explain)
         self._look(loop)
 

@@ -1,4 +1,4 @@
-"""Settings of the process itself, made before the event loop starts, and its end in any case."""
+"""Settings of the process, made before the event loop starts, and its guaranteed end."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import os
 import sys
 import threading
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
-SWITCH_SECONDS = 0.001  # for which other threads (database, pictures) may keep the main thread waiting
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # from malloc.h
+SWITCH_SECONDS = 0.001  # s for which other threads (database, pictures) may block the main thread
 KEPT, SPARE = 1 << 20, 1 << 21  # bytes of blocks that come from the heap, and of free heap that is not given back
-LAST_SECONDS = 10.0  # after a signal; closing takes one or two
+LAST_SECONDS = 10.0  # s after a signal; closing takes one or two
 
 
 def prepare() -> None:
@@ -22,17 +22,17 @@ def prepare() -> None:
 
 
 def end_in_any_case() -> None:
-    """Cancel all remaining tasks, so that the process ends without being killed."""
+    """End the process after ``LAST_SECONDS`` s even if a thread or task hangs."""
     timer = threading.Timer(LAST_SECONDS, os._exit, (1,))
     timer.daemon = True
     timer.start()
 
 
 def _give_memory_back() -> None:
-    """Have glibc keep one heap and return large blocks at once, which saves 30 MB as maps come and go.
+    """Set glibc to keep one heap and return large blocks at once, which saves 30 MB as maps come and go.
 
-    A scan's matching takes and frees blocks of 400 kB: got from the kernel each time, page by page, they would cost a
-    quarter of all that a robot does that turns.
+    Scan matching allocates and frees blocks of 400 kB: taken from the kernel each time, page by page, they would cost a
+    quarter of a turning robot's processor time.
     """
     with contextlib.suppress(OSError, AttributeError):  # other C libraries lack these options
         mallopt = ctypes.CDLL(None).mallopt

@@ -1,4 +1,4 @@
-"""Text from elsewhere for a terminal: what would move the cursor, colour or reorder is written out instead."""
+"""Foreign text for a terminal, with characters that move the cursor, colour or reorder text as escapes."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _WRITTEN_OUT = {
 
 
 def visible(text: str) -> str:
-    """``text`` with control characters and marks of direction as escapes; line ends and tabs stay."""
+    """Return ``text`` with control characters and direction marks as escapes; line ends and tabs stay."""
     return text.translate(_WRITTEN_OUT).encode("utf-8", "replace").decode()
 
 
 class VisibleFormatter(logging.Formatter):
-    """Log lines hold what clients and programs sent: none of it reaches the terminal as a command."""
+    """Escapes log lines, so that no text of clients and programs reaches the terminal as a command."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The line as the terminal may have it."""
+        """Return the line, escaped."""
         return visible(super().format(record))

@@ -1,4 +1,4 @@
-"""Map annotations kept in the database: one JSON document a robot, with a copy in memory for reading."""
+"""Map annotations in the database: one JSON document per robot, with a copy in memory for reading."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class StoredAnnotations(MapAnnotations):
             self.adopt(changed)
 
     def writing(self, changed: Annotations) -> Callable[[Connection], object]:
-        """Return the transaction that writes them; call it with ``turn`` held. Raises InvalidGoal for too many."""
+        """Return the transaction that writes annotations; call with ``turn`` held. Raises InvalidGoal for too many."""
         for what, entries, most in (
             ("lines", changed.lines, LINES_MAX),
             ("areas", changed.areas, AREAS_MAX),
@@ -59,6 +59,6 @@ class StoredAnnotations(MapAnnotations):
         )
 
     def adopt(self, changed: Annotations) -> None:
-        """Adopt annotations that are written already."""
+        """Adopt written annotations, and publish the change."""
         self._current = changed
         self._events.publish(AnnotationsChanged(stamp=self._clock.time()))

@@ -1,4 +1,4 @@
-"""Installed apps kept in the database with their packages; they take room on the robot's disk."""
+"""Installed apps in the database, with their packages, which take room on the robot's disk."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PIECE = 1 << 20  # bytes
 
 
 class StoredApps(Apps):
-    """The apps of one robot; ``disk`` accounts for the room that each takes."""
+    """The apps of one robot; ``disk`` accounts for their size."""
 
     def __init__(self, database: Transactions, robot: str, clock: Clock, disk: Disk) -> None:
         self._database, self._robot, self._clock, self._disk = database, robot, clock, disk
@@ -52,7 +52,7 @@ class StoredApps(Apps):
         return app
 
     def _write(self, connection: Connection, app: App, package: BinaryIO) -> None:
-        """A piece at a time: the package is never whole in memory."""
+        """Write an app piece by piece, so that its package is never whole in memory."""
         connection.execute(
             "INSERT INTO app (robot, name, version, size, installed_at) VALUES (?, ?, ?, ?, ?)"
             " ON CONFLICT (robot, name) DO UPDATE SET version=excluded.version, size=excluded.size,"
@@ -84,5 +84,5 @@ class StoredApps(Apps):
 
 
 def _place(name: str) -> str:
-    """Under which name an app takes room."""
+    """Return the name of an app in the disk's accounts."""
     return f"app {name}"

@@ -1,6 +1,6 @@
-"""Store of the reference cloud: accounts, the programs their robots saved, favourites, and records.
+"""Store of the reference cloud: accounts, their robots' programs, favourites, and records.
 
-Tokens are kept as hashes. Knows no HTTP, no frame, and not which database it is in.
+Tokens are stored as hashes. Knows no HTTP, no frame and no kind of database.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ NAME_MAX = 64  # characters of an account's name
 
 
 class TooMany(Exception):
-    """An account has as much as it may have."""
+    """An account has reached its limit."""
 
 
 class CloudStore:
-    """Every call is one transaction."""
+    """Store of the cloud; every call is one transaction."""
 
     def __init__(self, database: Transactions) -> None:
         self._database = database
@@ -80,7 +80,7 @@ class CloudStore:
         )
 
     async def record(self, account: str, robot: str, document: str) -> None:
-        """Store what happened on a robot."""
+        """Store an event of a robot."""
 
         def work(connection: Connection) -> None:
             row = (account, robot, document)

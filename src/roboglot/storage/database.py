@@ -1,4 +1,4 @@
-"""One SQLite file, a thread that changes it and one that reads it, every piece of work a transaction. Knows no robot.
+"""One SQLite file, with a thread that writes and one that reads; each piece of work is a transaction. Knows no robot.
 
 WAL with ``synchronous=FULL``: when ``run`` returns, the work survives ``kill -9`` and a power cut.
 """
@@ -28,8 +28,8 @@ ROBOTS = "roboglot.storage.schema"  # tables of the robots' memory
 class Database:
     """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:" for tests.
 
-    ``in_place``: ``run`` waits in place, for a lockstep clock: it could go on meanwhile, never as far as last time, and
-    what the robot does next would depend on how fast the disk is. In memory there is no disk, and it always does.
+    ``in_place``: ``run`` blocks, for a lockstep clock, which would otherwise advance meanwhile by a different amount
+    each time, so that the robot's behaviour would depend on the disk's speed. A database in memory always blocks.
     ``schema``: the package with its tables.
     """
 
@@ -39,10 +39,10 @@ class Database:
         self._connection = self._thread.submit(connect, str(path), schema).result()
         self._reader = None if self._in_place else _Reader(path)
         self._disk: Disk | None = None
-        self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # for all robots: copies share it
+        self._together: list[tuple[Database, Work, asyncio.Future[Any]]] = []  # shared by the copies for single robots
 
     def on(self, disk: Disk) -> Database:
-        """The same file for the robot that has this disk: while nothing is left on it, writing raises Refused."""
+        """Return the same file for the robot with this disk: while the disk is full, writing raises Refused."""
         database = copy.copy(self)
         database._disk = disk
         return database
@@ -54,7 +54,7 @@ class Database:
         return await asyncio.get_running_loop().run_in_executor(self._thread, self._transact, work)
 
     async def read(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work``, which changes nothing, beside what is being written: it waits for no flush of the disk.
+        """Run read-only ``work`` beside writing transactions, without waiting for a flush of the disk.
 
         It sees everything whose ``run`` has returned.
         """
@@ -63,10 +63,10 @@ class Database:
         return await asyncio.get_running_loop().run_in_executor(self._reader.thread, self._reader.read, work)
 
     async def run_together(self, work: Callable[[Connection], T]) -> T:
-        """The same for what many do often: one transaction for all who wait, so that one flush of the disk serves them.
+        """Run frequent ``work`` of many callers in one transaction for all that wait, with one flush of the disk.
 
-        At most one such transaction is queued at a time, so every other ``run`` waits for at most that one. Where
-        one's work fails, the others' is done all the same.
+        At most one such transaction is queued at a time, so every other ``run`` waits for at most that one. If the work
+        of one caller fails, that of the others is still done.
         """
         if self._in_place:
             return self.run_now(work)
@@ -107,7 +107,7 @@ class Database:
         return results
 
     def run_now(self, work: Callable[[Connection], T]) -> T:
-        """The same, waiting in place: for start-up, and where nothing else may go on."""
+        """Run ``work`` and block: for start-up, and where nothing else may run meanwhile."""
         return self._thread.submit(self._transact, work).result()
 
     def _transact(self, work: Callable[[Connection], T]) -> T:
@@ -157,7 +157,7 @@ def _without_cursor(result: T) -> T:
 
 
 class _Reader:
-    """The thread that only reads, with a connection of its own from the first time on."""
+    """The reading thread, with its own connection from the first read on."""
 
     def __init__(self, path: Path | str) -> None:
         self.thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database reader")
@@ -165,7 +165,7 @@ class _Reader:
         self._connection: sqlite3.Connection | None = None
 
     def read(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work`` in one transaction; in the thread."""
+        """Run ``work`` in one transaction; call it in the thread."""
         if self._connection is None:
             self._connection = sqlite3.connect(self._path, isolation_level=None, timeout=5.0)
             self._connection.execute("PRAGMA query_only=ON")
@@ -185,7 +185,7 @@ class _Reader:
 
 @contextlib.contextmanager
 def database_errors() -> Iterator[None]:
-    """Raise the stores' errors instead of SQLite's."""
+    """Raise SQLite's errors as the stores' errors."""
     try:
         yield
     except sqlite3.IntegrityError as error:

@@ -1,4 +1,4 @@
-"""Clients' files kept in the database."""
+"""Clients' files in the database."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class StoredFiles(FileStore):
         await self._database.run(self.writing(name, data))
 
     def writing(self, name: str, data: bytes | None) -> Callable[[Connection], None]:
-        """Return the transaction that writes it, or (None) removes it. Raises InvalidGoal if it is too long."""
+        """Return the transaction that writes a file or, for None, removes it. Raises InvalidGoal if it is too long."""
         if data is not None and len(data) > FILE_BYTES_MAX:
             raise InvalidGoal(f"a file has at most {FILE_BYTES_MAX} bytes")
         row = (self._robot, name, data, self._clock.epoch())

@@ -1,8 +1,8 @@
-"""Registry of robots' homes: which program runs which robot, under which epoch. Knows no robot and no clock.
+"""Registry of robots' homes: the program that runs each robot, with an epoch. Knows no robot and no clock.
 
-A program that has robots counts its renewals up. Who wants one of them compares the count with one seen earlier, by a
-clock of its own: no machine's date matters. Who changes what belongs to a program, or renews it, changes the row with
-its count first, so that only one does.
+A program that holds robots increments its count of renewals. Another program that wants one of them compares the count
+with an earlier one, by its own clock, so that no machine's date matters. Each change of a program's robots, and each
+renewal, first updates the row with the count, so that only one of them happens at a time.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from roboglot.storage.transactions import Connection, Transactions
 class Home:
     """One robot's home: its program, and the address of its doors.
 
-    ``gateway``: HOST:PORT where `roboglot connect` reaches it, empty: nowhere; ``certificate``: its SHA-256 there.
+    ``gateway``: HOST:PORT for `roboglot connect`, empty: none; ``certificate``: the gateway's SHA-256 fingerprint.
     """
 
     robot: str
@@ -29,7 +29,7 @@ class Home:
 
 
 class Occupied(Exception):
-    """Other programs have some of the robots: ``homes``; ``signs`` are those programs' renewals."""
+    """Other programs hold some of the robots: ``homes``; ``signs``: those programs' counts of renewals."""
 
     def __init__(self, homes: Mapping[str, Home], signs: Mapping[str, int]) -> None:
         super().__init__(", ".join(homes))
@@ -37,16 +37,16 @@ class Occupied(Exception):
 
 
 class Homes:
-    """Every call is one transaction."""
+    """The registry; every call is one transaction."""
 
     def __init__(self, database: Transactions) -> None:
         self._database = database
 
     async def take(self, addresses: Mapping[str, str], holder: str, silent: Mapping[str, int]) -> dict[str, int]:
-        """Give all these robots to ``holder``, each with a new epoch, which is returned. Raises Occupied for none.
+        """Give all these robots to ``holder``; return their new epochs. Raises Occupied, and then gives none.
 
-        A robot is free that is new, was released, was this holder's before, or whose holder has renewed no further than
-        ``silent`` says.
+        A robot is free if it is new, was released, was this holder's before, or if its holder's count of renewals is
+        still the one in ``silent``.
         """
 
         def work(connection: Connection) -> dict[str, int]:
@@ -65,7 +65,7 @@ class Homes:
         return await self._database.run(work)
 
     async def renew(self, holder: str) -> dict[str, int]:
-        """Renew all that ``holder`` has; return the epochs of these robots."""
+        """Renew all robots of ``holder``; return their epochs."""
 
         def work(connection: Connection) -> dict[str, int]:
             connection.execute("UPDATE robot_holder SET renewals=renewals+1 WHERE holder=?", (holder,))
@@ -75,28 +75,28 @@ class Homes:
         return await self._database.run(work)
 
     async def signs(self) -> dict[str, int]:
-        """Return how often each program has renewed."""
+        """Return the count of renewals of each program."""
         return await self._database.read(_signs)
 
     async def announce(self, holder: str, gateway: str, certificate: str) -> None:
-        """Say where clients reach the robots that ``holder`` has."""
+        """Store the gateway of ``holder``'s robots."""
         query = "UPDATE robot_home SET gateway=?, certificate=? WHERE holder=?"
         values = (gateway, certificate, holder)
         await self._database.run(lambda connection: connection.execute(query, values).rowcount)
 
     async def of(self, robot: str) -> Home | None:
-        """Return a robot's last home, if it ever had one."""
+        """Return a robot's last home; None if it never had one."""
         homes = await self._database.read(lambda connection: _rows(connection, "WHERE robot=?", (robot,)))
         return homes.get(robot)
 
     async def release(self, holder: str, epochs: Mapping[str, int]) -> None:
-        """Let others have these robots at once, except those that have a later epoch."""
+        """Release these robots, except those with a later epoch."""
         query = "UPDATE robot_home SET holder='' WHERE holder=? AND robot=? AND epoch=?"
         rows = [(holder, robot, epochs[robot]) for robot in sorted(epochs)]
         await self._database.run(lambda connection: connection.executemany(query, rows))
 
     async def free(self, silent: Mapping[str, int], robots: Collection[str]) -> list[str]:
-        """Release those of these robots whose holder has renewed no further than that; return them."""
+        """Release and return those robots whose holder's count of renewals is still the one in ``silent``."""
 
         def work(connection: Connection) -> list[str]:
             held = [
@@ -111,7 +111,7 @@ class Homes:
         return await self._database.run(work)
 
     async def take_back(self, epochs: Mapping[str, int], holder: str) -> dict[str, int]:
-        """Give ``holder`` those robots again that were freed and that no other had since; return their new epochs."""
+        """Return freed robots to ``holder`` unless another program had them since; return their new epochs."""
         query = "UPDATE robot_home SET holder=?, epoch=epoch+1 WHERE robot=? AND holder='' AND epoch=?"
 
         def work(connection: Connection) -> dict[str, int]:
@@ -129,9 +129,9 @@ class Homes:
 
 
 def _locked(connection: Connection, silent: Mapping[str, int], holder: str = "") -> list[str]:
-    """Return those in ``silent`` who have renewed no further; none of them can until the transaction ends.
+    """Return the programs in ``silent`` with unchanged counts, and keep them from renewing until the transaction ends.
 
-    ``holder``: a program that takes robots, which is a sign of it.
+    ``holder``: a program that takes robots, which counts as a sign of life.
     """
     still = []
     for name in sorted({holder, *silent} - {""}):  # always in this order, to prevent deadlocks between programs

@@ -1,4 +1,4 @@
-"""The journals of running programs in a database: calls and answers, so that a run can continue after a crash."""
+"""Journals of running programs in a database: calls and answers, so that a run can continue after a crash."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class DatabaseJournalStore:
         return self._run_now(lambda connection: dict(connection.execute(query, (self._robot,)).fetchall()))
 
     def remove_now(self, ids: Collection[str]) -> None:
-        """Delete these journals; for start-up."""
+        """Delete journals; for start-up."""
         self._run_now(lambda connection: self._remove(connection, ids))
 
     async def _run(self, work: Callable[[Connection], T]) -> T:

@@ -1,4 +1,4 @@
-"""Documents kept in the database: one JSON value per kind, id and robot."""
+"""Documents in the database: one JSON value per kind, id and robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.storage.transactions import Connection, Transactions
 
 
 class StoredLedger(Ledger):
-    """The documents of one robot. ``all`` waits for the database: it is for start-up."""
+    """The documents of one robot. ``all`` blocks: it is for start-up."""
 
     def __init__(self, database: Transactions, robot: str) -> None:
         self._database, self._robot = database, robot

@@ -14,7 +14,7 @@ from roboglot.storage.transactions import Connection, Transactions
 
 
 class StoredMapMemory(MapMemory):
-    """One robot's, of the same database as its parts."""
+    """The map in use of one robot, in the same database as its parts."""
 
     def __init__(
         self,

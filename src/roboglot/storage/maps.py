@@ -1,4 +1,4 @@
-"""Saved maps kept in the database."""
+"""Saved maps in the database."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The robot's members kept in the database, with a copy in memory for reading."""
+"""The robot's members in the database, with a copy in memory for reading."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class StoredMembers(Members):
         await self._update(self.get(name), column, value)
 
     async def _update(self, member: Member, column: str, value: object) -> None:
-        """``column`` is one of ours, never from outside."""
+        """Update one column; ``column`` is a constant of ours, never input."""
         await self._database.run(lambda c: c.execute(f"UPDATE member SET {column}=? WHERE id=?", (value, member.id)))
 
     def _check_free(self, name: str) -> None:

@@ -1,4 +1,4 @@
-"""The database that a configuration names: a file, or a PostgreSQL server by its URL."""
+"""Opens the database of a configuration: a file, or a PostgreSQL server by its URL."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from roboglot.storage.transactions import Transactions
 
 
 def open_registry(where: str) -> Transactions:
-    """Open the registry of robots' homes: a server's URL, or a file. Raises as ``open_database`` does."""
+    """Open the registry of robots' homes: a server's URL, or a file. Raises the errors of ``open_database``."""
     return open_database(Path(), where) if "://" in where else open_database(Path(where))
 
 
 def read_registry(where: str) -> Transactions:
-    """Open it to look up homes only: on a server, a role suffices that may read the table ``robot_home``.
+    """Open the registry read-only; on a server, a role that may read the table ``robot_home`` suffices.
 
-    Raises as ``open_database`` does, and OSError for a file that is not there.
+    Raises the errors of ``open_database``, and OSError for a missing file.
     """
     if "://" in where:
         return open_database(Path(), where, only_read=True)
@@ -27,9 +27,9 @@ def read_registry(where: str) -> Transactions:
 
 
 def open_private(file: Path, schema: str, url: str = "") -> Transactions:
-    """Open a ``file`` of its own that its owner alone may read, or the server that keeps the same tables.
+    """Open a separate ``file`` that only its owner may read, or the server with the same tables.
 
-    Raises as ``open_database`` does.
+    Raises the errors of ``open_database``.
     """
     if not url:
         file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -46,12 +46,11 @@ def open_database(
     only_read: bool = False,
     schema: str = ROBOTS,
 ) -> Transactions:
-    """Open PostgreSQL by its ``url``, or without one the ``file``, whose tables are those of ``schema``.
+    """Open PostgreSQL by its ``url``, or without one the ``file`` with the tables of ``schema``.
 
-    ``robots``: this program alone writes what belongs to them, in the order of its calls. ``only_read``: a server's
-    tables stay as they are, and nothing can be written. Raises ValueError for another
-    kind of URL, or a database of a newer program; OSError if the server or its driver is missing or a robot is taken;
-    sqlite3.Error for a file that is none of SQLite's.
+    ``robots``: only this program writes their data, in the order of its calls. ``only_read``: a server's tables are not
+    migrated, and cannot be written. Raises ValueError for another kind of URL or a database of a newer program; OSError
+    if the server or its driver is missing or a robot is taken; sqlite3.Error for a file that is no SQLite database.
     """
     if not url:
         return Database(file, in_place=in_place, schema=schema)

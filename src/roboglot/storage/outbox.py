@@ -1,4 +1,4 @@
-"""Documents that wait to be sent, in order. Knows neither their meaning nor where they go."""
+"""Documents that wait to be sent, in order. Knows neither their meaning nor their destination."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Outbox:
         self._robot = robot
 
     async def put(self, document: str) -> None:
-        """Add it at the end."""
+        """Append a document."""
 
         def work(connection: Connection) -> None:
             connection.execute("INSERT INTO cloud_outbox (robot, document) VALUES (?, ?)", (self._robot, document))
@@ -30,12 +30,12 @@ class Outbox:
             await self._database.run(work)
 
     async def first(self) -> tuple[int, str] | None:
-        """The oldest and its number."""
+        """Return the oldest document with its number; None if there is none."""
         query = "SELECT seq, document FROM cloud_outbox WHERE robot=? ORDER BY seq LIMIT 1"
         return await self._database.run(lambda connection: connection.execute(query, (self._robot,)).fetchone())
 
     async def remove(self, number: int) -> None:
-        """Drop a document that was sent or never will be."""
+        """Delete a document that was sent, or never will be."""
         await self._database.run(
             lambda connection: connection.execute("DELETE FROM cloud_outbox WHERE seq=?", (number,))
         )

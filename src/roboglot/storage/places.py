@@ -1,4 +1,4 @@
-"""Places kept in the database, with a copy in memory for reading."""
+"""Places in the database, with a copy in memory for reading."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class StoredPlaces(Places):
         self._publish()
 
     def writing(self, places: Sequence[PointOfInterest], *, alone: bool = False) -> Callable[[Connection], object]:
-        """Return the transaction that writes them, ``alone`` instead of all others. Raises InvalidGoal for too many."""
+        """Return the transaction that writes places; ``alone``: replace all others. Raises InvalidGoal for too many."""
         new = {place.id: place for place in places}
         if len(new if alone else self._places.keys() | new.keys()) > PLACES_MAX:
             raise InvalidGoal(f"more than {PLACES_MAX} places")
@@ -62,7 +62,7 @@ class StoredPlaces(Places):
         return work
 
     def adopt(self, places: Sequence[PointOfInterest]) -> None:
-        """Take over written places in place of all others."""
+        """Replace all places by written ones."""
         self._places = {place.id: place for place in places}
         self._publish()
 

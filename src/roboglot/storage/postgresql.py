@@ -1,7 +1,7 @@
-"""A PostgreSQL database by URL, for what many robots share. Needs the extra ``roboglot[postgresql]`` (psycopg 3).
+"""A PostgreSQL database by URL, shared by many robots. Needs the extra ``roboglot[postgresql]`` (psycopg 3).
 
-Every piece of work is a transaction in one of a few threads, each with a connection of its own; one that was lost while
-nothing was under way is made anew. Knows no robot.
+Every piece of work is a transaction in one of a few threads, each with its own connection, which is renewed if it was
+lost while idle. Knows no robot.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ MIGRATION_LOCK = 0x726F626F  # the program that opens an empty database first cr
 class PostgreSQL:
     """Open with ``PostgreSQL(url)``; close with ``close``. Raises OSError if the database can't be used.
 
-    ``robots``: those that this program alone may write. Everything is then written in the order of the calls, over one
-    connection that holds a lock of the server's for each of them: no other program gets it before the connection is
-    lost, and nothing is written by one that has lost it. ``in_place``: ``run`` waits in place, for a lockstep clock.
-    ``only_read``: tables stay as they are, and writing fails.
+    ``robots``: only this program may write their data. All writes are then in the order of the calls, over one
+    connection that holds a server lock for each robot: no other program gets the lock while the connection lasts, and a
+    program that has lost it writes nothing. ``in_place``: ``run`` blocks, for a lockstep clock. ``only_read``: no
+    migration of tables; writing fails.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class PostgreSQL:
             raise
 
     def on(self, disk: Disk) -> PostgreSQL:
-        """Return the same for the robot that has this disk: while nothing is left on it, writing raises DiskFull."""
+        """Return the same database for the robot with this disk: while the disk is full, writing raises DiskFull."""
         database = copy.copy(self)
         database._disk = disk
         return database
@@ -72,7 +72,7 @@ class PostgreSQL:
     async def run(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` as one transaction in a thread; an exception rolls it back.
 
-        Raises DatabaseError, also where the transaction may have been kept: when the connection broke at its end.
+        Raises DatabaseError, even if the transaction may have been committed, as the connection broke at its end.
         """
         if self._in_place:
             return self.run_now(work)
@@ -81,14 +81,14 @@ class PostgreSQL:
     run_together = run  # the server itself combines disk flushes of transactions that end together
 
     async def read(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work``, which changes nothing, beside what is being written."""
+        """Run read-only ``work`` beside writing transactions."""
         if self._in_place:
             return self.run_now(work)
         reading = functools.partial(self._transact, work, read_only=True)
         return await asyncio.get_running_loop().run_in_executor(self._readers, reading)
 
     def run_now(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work`` and wait in place: for start-up, and where nothing else may go on."""
+        """Run ``work`` and block: for start-up, and where nothing else may run meanwhile."""
         return self._threads.submit(self._transact, work).result()
 
     def _transact(self, work: Callable[[Connection], T], *, read_only: bool = False) -> T:
@@ -167,7 +167,7 @@ class PostgreSQL:
 
 
 class _Rows:
-    """A result whose texts are as they were stored."""
+    """A result with texts unescaped."""
 
     def __init__(self, cursor: psycopg.Cursor[Any]) -> None:
         self._cursor = cursor
@@ -188,7 +188,7 @@ class _Rows:
 
 
 class _Statements:
-    """A connection that takes ``?`` for parameters, and any character in a text, as SQLite does."""
+    """A connection that, like SQLite, takes ``?`` for parameters and every character in a text."""
 
     def __init__(self, connection: psycopg.Connection[object]) -> None:
         self._connection = connection
@@ -202,12 +202,12 @@ class _Statements:
 
 
 def _marked(query: str) -> bytes:
-    """None of our statements has a question mark or a percent sign of its own."""
+    """Return a statement with ``%s`` for each ``?``; no statement of ours has other ``?`` or ``%``."""
     return query.replace("?", "%s").encode()
 
 
 def _storable(values: Sequence[object]) -> Sequence[object]:
-    """Write the character 0, which PostgreSQL's texts cannot hold, as ``ESCAPE`` and a digit."""
+    """Return values with the character 0, which PostgreSQL texts cannot hold, as ``ESCAPE`` and a digit."""
     return [
         value.replace(ESCAPE, f"{ESCAPE}1").replace("\0", f"{ESCAPE}0")
         if isinstance(value, str) and ("\0" in value or ESCAPE in value)
@@ -226,7 +226,7 @@ def _restored(row: Sequence[object]) -> tuple[object, ...]:
 
 
 def _is_there(connection: Connection) -> None:
-    """Raise DatabaseError if this is no database of ours, or of an earlier program."""
+    """Raise DatabaseError if this is no database of ours, or one of an earlier version."""
     connection.execute("SELECT gateway FROM robot_home WHERE robot=''")
 
 

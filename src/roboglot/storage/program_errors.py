@@ -1,4 +1,4 @@
-"""Failures of the database as the program stores report them."""
+"""Translates database errors to those of the program stores."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboglot.storage.transactions import DatabaseError, DiskFull
 
 @contextmanager
 def store_errors() -> Iterator[None]:
-    """Raise StoreError where the database fails or the robot's disk is full."""
+    """Raise StoreError if the database fails or the robot's disk is full."""
     try:
         yield
     except (DatabaseError, DiskFull) as error:

@@ -1,7 +1,7 @@
 """Lease of a program's robots in the registry: taken before doors open, renewed, and lost in time.
 
-The holder gives its robots up ``HOLD`` s after it began its last successful renewal; another program takes them when it
-has seen no renewal for ``LEASE`` s. Both count by a clock that no one can set, so that a robot never runs twice.
+The holder gives up its robots ``HOLD`` s after the start of its last successful renewal; another program takes them
+after ``LEASE`` s without a renewal. Both use a clock that cannot be set, so that a robot never runs twice.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ HOLDER = "holder"  # file in the data folder
 
 
 def uptime() -> float:
-    """Return s that no change of the date moves, and that a machine's sleep counts in."""
+    """Return uptime in s, unaffected by changes of the date, including the machine's sleep."""
     return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 
 
 def holder_of(folder: Path) -> str:
-    """Return the name under which a data folder's program holds robots; made at the first time.
+    """Return the name under which a data folder's program holds robots; generated at the first call.
 
-    The folder's lock keeps a second program out: what was held under this name before is free.
+    As the folder's lock excludes a second program, robots held under this name before are free.
     """
     file = folder / HOLDER
     with contextlib.suppress(FileNotFoundError):
@@ -42,7 +42,7 @@ def holder_of(folder: Path) -> str:
 
 
 class Residence:
-    """Residence of the robots of one program. ``lost`` is called once with a robot's name when it must stop."""
+    """Lease of one program's robots. ``lost`` is called once with the name of a robot that must stop."""
 
     def __init__(
         self,
@@ -60,13 +60,13 @@ class Residence:
         self._keeping: list[asyncio.Task[None]] = []
 
     def why_not(self, robot: str) -> str:
-        """Return why the robot may not be moved from here; empty: it may."""
+        """Return why this program may not move the robot; empty: it may."""
         if robot in self._elsewhere:
             return "the robot runs in another program now"
         return "" if self._now() < self._until else "the registry of robots has not confirmed that it runs here"
 
     async def take(self) -> None:
-        """Take the robots, if need be after the wait for a program that is gone. Raises OSError if one is in use."""
+        """Take the robots, if necessary after waiting for a dead program's lease. Raises OSError if one is in use."""
         began, silent = self._now(), dict[str, int]()
         try:
             try:
@@ -81,9 +81,9 @@ class Residence:
         self._until = began + HOLD
 
     async def _wait_for(self, signs: Mapping[str, int]) -> float:
-        """Take the robots when they are released, or no sign of their holders came for ``LEASE`` s.
+        """Take the robots when they are released, or after ``LEASE`` s without a sign of life of their holders.
 
-        Returns when that began. Raises Occupied, DatabaseError.
+        Return the start time of the successful attempt. Raises Occupied, DatabaseError.
         """
         end = self._now() + LEASE
         while (left := end - self._now()) > 0:
@@ -97,14 +97,14 @@ class Residence:
         return began
 
     async def announce(self, gateway: str, certificate: str) -> None:
-        """Say in the registry where `roboglot connect` reaches these robots. Raises OSError."""
+        """Register the gateway for `roboglot connect` to these robots. Raises OSError."""
         try:
             await self._homes.announce(self._holder, gateway, certificate)
         except DatabaseError as error:
             raise OSError(f"the registry of robots: {error}") from None
 
     def keep(self) -> None:
-        """Renew from now on."""
+        """Renew the lease regularly from now on."""
         loop = asyncio.get_running_loop()
         self._keeping = [
             loop.create_task(self._renew_always(), name="renewals of robots' homes"),
@@ -112,7 +112,7 @@ class Residence:
         ]
 
     async def close(self) -> None:
-        """Stop renewing, and let other programs have the robots."""
+        """Stop renewing, and release the robots."""
         for task in self._keeping:
             task.cancel()
         self._until = -float("inf")
@@ -138,7 +138,7 @@ class Residence:
         self.look()
 
     def look(self) -> None:
-        """Report robots that were lost, and those that are confirmed again."""
+        """Report lost robots, and robots confirmed again."""
         for robot in self._addresses:
             why = self.why_not(robot)
             if not why and robot in self._reported:
@@ -158,7 +158,7 @@ class Residence:
                 log.warning("the registry of robots cannot be reached: %s", error)
 
     async def _watch(self) -> None:
-        """Notice the end of the lease also while a renewal waits for an answer."""
+        """Detect the end of the lease, even while a renewal waits for an answer."""
         while True:
             await asyncio.sleep(min(PERIOD, max(0.01, self._until - self._now())))
             self.look()

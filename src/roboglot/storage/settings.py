@@ -1,4 +1,4 @@
-"""Settings kept in the database: one JSON value per key and robot."""
+"""Settings in the database: one JSON value per key and robot."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class StoredSettings(Settings):
         self._values[key] = kept
 
     def writing(self, key: str, value: object) -> Callable[[Connection], object]:
-        """Return the transaction that writes it."""
+        """Return the transaction that writes a setting."""
         row = (self._robot, key, json.dumps(value))
         return lambda connection: connection.execute(
             "INSERT INTO setting (robot, key, value) VALUES (?, ?, ?)"

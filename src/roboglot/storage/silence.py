@@ -1,7 +1,7 @@
-"""Watch over robots' homes: frees those whose program shows no sign any more, so that the next one need not wait.
+"""Watches robots' homes and frees those of dead programs, so that their successors need not wait.
 
-A program that starts on a robot's home would wait ``LEASE`` s for a sign of the old one, after the time in which the
-cluster noticed its end and started the new one. Who watches all the while waits meanwhile.
+Without it, a new program would wait ``LEASE`` s for a sign of life of the old one, after the cluster has detected the
+old one's end and started the new one. A watcher's ``LEASE`` s begin with the end itself.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ GAP_MAX = 2.0  # s without a check after which silence is counted from zero
 
 @dataclass(frozen=True, slots=True)
 class _Sight:
-    """First sighting of a program at its current number of renewals, with its time."""
+    """A program's current count of renewals, and the time at which it was first seen."""
 
     renewals: int
     since: float
 
 
 class Silence:
-    """Of the programs that run ``robots``. Counts by this machine's uptime.
+    """Watcher of the programs that run ``robots``, by this machine's uptime.
 
-    The registry may have been out of reach for the programs too while it was for us: such a time counts for none.
+    Time in which the registry is unreachable does not count as silence, as the programs may not have reached it either.
     """
 
     def __init__(self, homes: Homes, robots: Collection[str], now: Callable[[], float] = uptime) -> None:
@@ -40,7 +40,7 @@ class Silence:
         self._done: dict[str, int] = {}  # programs whose robots were freed, with their renewals by then
 
     async def look(self) -> list[str]:
-        """Look once; return the robots that were freed. Raises DatabaseError."""
+        """Check once; return the freed robots. Raises DatabaseError."""
         began = self._now()
         signs = await self._homes.signs()
         ended = self._now()
@@ -61,7 +61,7 @@ class Silence:
         return freed
 
     async def look_always(self) -> None:
-        """Look again and again, also when the registry cannot be reached."""
+        """Check regularly, even after failures of the registry."""
         while True:
             try:
                 await self.look()

@@ -1,4 +1,4 @@
-"""Interface between stores and any database: transactions, in SQL with ``?`` for parameters."""
+"""Interface between stores and databases: transactions, in SQL with ``?`` for parameters."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ T = TypeVar("T")
 
 
 class DatabaseError(RobotError):
-    """The database failed; the work was not done, or (its connection broke at the end) perhaps."""
+    """The database failed; the work was not done, or perhaps was, if the connection broke at its end."""
 
 
 class AlreadyThere(DatabaseError):
-    """A row of this key exists."""
+    """A row with this key exists."""
 
 
 class DiskFull(Refused):
-    """No room is left on the robot's disk, or on the one where its database is."""
+    """No room is left on the robot's disk, or on the database's disk."""
 
 
 class Rows(Protocol):
@@ -31,7 +31,7 @@ class Rows(Protocol):
         """Number of changed rows."""
 
     def fetchone(self) -> Any:
-        """The next row; None: there is none left."""
+        """Return the next row; None after the last."""
 
     def fetchall(self) -> list[Any]:
         """Return the remaining rows."""
@@ -50,25 +50,25 @@ class Connection(Protocol):
 
 
 class Transactions(Protocol):
-    """A database. Every call is one transaction, which what ``work`` raises rolls back. Raises DatabaseError, DiskFull.
+    """A database. Every call is one transaction; an error of ``work`` rolls it back. Raises DatabaseError, DiskFull.
 
-    What one caller writes with ``run`` and ``run_together`` is done in the order of the calls.
+    Calls of ``run`` and ``run_together`` by one caller are done in their order.
     """
 
     def on(self, disk: Disk) -> Self:
-        """Return the same for the robot that has this disk: while nothing is left on it, writing raises DiskFull."""
+        """Return the same database for the robot with this disk: while the disk is full, writing raises DiskFull."""
 
     async def run(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work``: when this returns it is kept."""
+        """Run ``work``; it is stored when this returns."""
 
     async def run_together(self, work: Callable[[Connection], T]) -> T:
-        """Run what many do often; works that wait at the same time may be kept by one flush."""
+        """Run frequent ``work`` of many callers; works that wait at the same time may share one flush."""
 
     async def read(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work``, which changes nothing, beside what is being written; it sees all that is kept."""
+        """Run read-only ``work`` beside writing transactions; it sees all stored data."""
 
     def run_now(self, work: Callable[[Connection], T]) -> T:
-        """Run ``work`` and wait in place: for start-up, and where nothing else may go on."""
+        """Run ``work`` and block: for start-up, and where nothing else may run meanwhile."""
 
     def close(self) -> None:
-        """Finish what is queued, then let go of the database."""
+        """Finish queued work, then close the database."""

@@ -12,9 +12,9 @@ OF_OTHERS = frozenset({"cloud_record"})  # tables that mention a robot but belon
 
 
 def copy_robot(robot: str, source: Path, target: Path) -> int:
-    """Copy all rows of ``robot``, replacing those that ``target`` has of it; returns their number.
+    """Copy all rows of ``robot``, replacing its rows in ``target``; return their number.
 
-    The target keeps them when this returns. The two files may not be in use. A missing source holds nothing.
+    The rows are stored when this returns. The two files may not be in use. A missing source counts as empty.
     """
     if not source.exists():
         return 0
@@ -52,7 +52,7 @@ def _columns(connection: sqlite3.Connection, table: str) -> list[tuple[int, str,
 
 
 def _copy(connection: sqlite3.Connection, table: str, robot: str) -> int:
-    """Copy without the row's own number, which only says in what order rows came."""
+    """Copy rows without their numbers, which only give their order."""
     columns = _columns(connection, table)
     keys = [column for column in columns if column[5]]
     numbered = keys[0][1] if len(keys) == 1 and keys[0][2] == "INTEGER" else None

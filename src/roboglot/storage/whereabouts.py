@@ -1,4 +1,4 @@
-"""Whereabouts of robots, by the registry of their homes: for clients that follow one from program to program."""
+"""Gateways of robots, from the registry of their homes, for clients that follow a robot from program to program."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PORT_MAX = 65535
 
 @dataclass(frozen=True, slots=True)
 class Gateway:
-    """Behind which a robot is: its address, the SHA-256 of its certificate, and the epoch of the robot's home."""
+    """Gateway of a robot: address, SHA-256 of its certificate, and epoch of the robot's home."""
 
     host: str
     port: int
@@ -25,13 +25,13 @@ class Gateway:
 
 
 class Whereabouts:
-    """Asks the registry."""
+    """Looks gateways up in the registry."""
 
     def __init__(self, homes: Homes) -> None:
         self._homes = homes
 
     async def of(self, robot: str) -> Gateway | None:
-        """Return the robot's gateway; None: nothing runs it, or not behind a gateway. Raises OSError."""
+        """Return the robot's gateway; None if the robot does not run, or has no gateway. Raises OSError."""
         try:
             home = await self._homes.of(robot)
         except DatabaseError as error:
@@ -39,7 +39,7 @@ class Whereabouts:
         return _gateway(home) if home is not None and home.holder and home.gateway else None
 
     async def moved(self, robot: str, epoch: int) -> None:
-        """Return when the robot is behind a gateway under another epoch; a registry that is away knows of none."""
+        """Return when the robot has a gateway under another epoch; wait on while the registry is unreachable."""
         while True:
             await asyncio.sleep(PERIOD)
             try:
@@ -52,7 +52,7 @@ class Whereabouts:
 
 
 def _gateway(home: Home) -> Gateway:
-    """Read a home. Raises OSError if the registry's text is no address."""
+    """Return a home's gateway. Raises OSError if its text in the registry is no address."""
     host, _, port = home.gateway.rpartition(":")
     if not (host and port.isascii() and port.isdigit() and 0 < int(port) <= PORT_MAX):
         raise OSError(f"the registry has no gateway of robot {home.robot}, but {home.gateway!r}")
