@@ -61,18 +61,12 @@ NAMING = ("join network", "join a network")
 _quoted = re.compile(r"(['\"]).*\1", re.DOTALL)
 _quoted_in_json = re.compile(rb"'[^\"]*'|\\\".*\\\"", re.DOTALL)
 # People in the lists of visual programming, at its own door and inside a dog's 2001: the name is what describes each.
-# \2 is the quote in its form; the fields come in any order.
-_MODE = rb"mode\2\s*:\s*\2(?:personnel|face|voiceprint)\2"
-_VALUE = rb"(?:(?!(?<!\\)\2).)*"
-_listed = re.compile(
-    rb'((\\*")' + _MODE + rb"[^{}]*?\2describe\2\s*:\s*\2)" + _VALUE + rb"((?<!\\)\2)"
-    rb'|((\\*")describe\5\s*:\s*\5)'
-    + _VALUE.replace(rb"\2", rb"\5")
-    + rb"((?<!\\)\5\s*,[^{}]*?\5"
-    + _MODE.replace(rb"\2", rb"\5")
-    + rb")",
-    re.DOTALL,
-)
+PEOPLE = (b"personnel", b"face", b"voiceprint")  # modes
+# \1: what escapes a quote, in JSON inside a JSON string once or more. Looked for from its begin on alone, and without
+# going back, since a regular expression lets no other thread run: a client's message must not stop the robot.
+_TEXT = rb".*?(?<!\\)(?:\1\\\1\\)*"  # to its end, with the escaped backslashes there
+_listed = re.compile(rb'(?<!\\)(\\{0,63})"(mode|describe)\1"\s*:\s*\1"(?P<value>' + _TEXT + rb')\1"', re.DOTALL)
+_brace = re.compile(rb"[{}]")
 
 
 class Redaction:
@@ -85,9 +79,9 @@ class Redaction:
         # Looked for one by one: an expression with all of them takes ten times as long, and no thread runs meanwhile.
         low = {field.encode().lower() for field in fields}  # bytes of letters beyond ASCII have no other case
         self._names = sorted(name for name in low if not any(other in name for other in low - {name}))
-        # JSON, also inside a JSON string, where each quote is escaped once or more: \1 is the quote in that form.
+        # JSON, also inside a JSON string, where each quote is escaped once or more.
         self._in_json = re.compile(
-            rb'(\\*")(' + names + rb")\1(\s*:\s*)(?:\1.*?(?<!\\)\1|-?[\d.][\d.eE+-]*|\[[^\[\]{}]*\])",
+            rb'(?<!\\)(\\*)"(' + names + rb')\1"(\s*:\s*)(?:\1"' + _TEXT + rb'\1"|-?[\d.][\d.eE+-]*|\[[^\[\]{}]*\])',
             re.IGNORECASE | re.DOTALL,
         )
         self._in_query = re.compile(rb"([?&; ](?:" + names + rb")=)[^&;\s\"]*", re.IGNORECASE)
@@ -96,14 +90,14 @@ class Redaction:
         """Return ``payload`` with secrets redacted."""
         low = payload.lower()
         if self._names and b"describe" in low:
-            payload = _listed.sub(rb"\1\4" + REDACTED + rb"\3\6", payload)
+            payload = _without_people(payload)
         for name in self._names:
             if name in low:
                 return self._without(payload)
         return payload
 
     def _without(self, payload: bytes) -> bytes:
-        payload = self._in_json.sub(rb"\1\2\1\3\1" + REDACTED + rb"\1", payload)
+        payload = self._in_json.sub(rb'\1"\2\1"\3\1"' + REDACTED + rb'\1"', payload)
         return self._in_query.sub(rb"\1" + REDACTED, payload)
 
     def of(self, door: str, operation: str) -> Redaction:
@@ -130,6 +124,32 @@ class Redaction:
             return value
         hidden = REDACTED.decode()
         return value | {"goal": hidden, "reason": reason.replace(goal, hidden)}
+
+
+def _without_people(payload: bytes) -> bytes:
+    """Return ``payload`` without what describes a person: in one object (no brace between), fields in any order."""
+    objects: dict[bytes, list[list[re.Match[bytes]]]] = {}  # by their form of quotes
+    field = _listed.search(payload)
+    while field is not None:
+        found = objects.setdefault(field[1], [])
+        if not found or _brace.search(payload, found[-1][-1].end(), field.start()):
+            found.append([])
+        found[-1].append(field)
+        field = _listed.search(payload, field.start("value"))  # also inside of it
+    spans = [
+        one.span("value")
+        for found in objects.values()
+        for fields in found
+        if any(one[2] == b"mode" and one["value"] in PEOPLE for one in fields)
+        for one in fields
+        if one[2] == b"describe"
+    ]
+    parts, rest = list[bytes](), 0
+    for begin, end in sorted(spans):
+        if begin >= rest:  # not inside of another
+            parts += payload[rest:begin], REDACTED
+            rest = end
+    return b"".join((*parts, payload[rest:]))
 
 
 def without_picture(exchange: Exchange) -> Exchange:
