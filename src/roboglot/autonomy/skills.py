@@ -1,4 +1,4 @@
-"""Gives a robot the skills that its parts allow, and starts what they need. Knows no algorithm."""
+"""Gives a robot the skills that its parts allow, and starts them. Knows no algorithm."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ UNAVAILABLE = "navigation unavailable"  # the fault raised while there is neithe
 class Autonomy:
     """Adds Driving, and with a Lidar Localization, Mapping, Navigation and Docking, to ``robot``.
 
-    A robot that drives by itself, as some real ones do, keeps its own skills.
+    A robot with its own Driving, like some real ones, keeps its own skills.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -117,7 +117,7 @@ class Autonomy:
             self._shoves = InertialDisplacement(robot)
 
     def _add_mapped(self, robot: Robot, driving: OdometryDriving) -> None:
-        """Add what a map makes possible."""
+        """Add the skills that need a map."""
         if Vision in robot or UltraWideband in robot:
             robot.add(Following, SightFollowing(robot))
         belief = Belief(robot[Odometry])
@@ -146,7 +146,7 @@ class Autonomy:
             robot.add(Industry, CallBook(robot))
 
     def _add_annotated(self, robot: Robot, belief: Belief) -> None:
-        """Add what lives on drawings on the map."""
+        """Add the skills that need annotations of the map."""
         if Reflectors in robot:
             self._landmarks = LandmarkKeeper(robot, belief)
             robot.add(LaserLandmarks, self._landmarks)
@@ -157,11 +157,11 @@ class Autonomy:
 
     @property
     def ready(self) -> bool:
-        """True if the kernels are loaded: before, localization is odometry, there is no map and navigation waits."""
+        """True once the kernels are loaded; before, localization is odometry, there is no map and navigation waits."""
         return self._slam is not None
 
     async def start(self, *, wait: bool) -> None:
-        """Load the kernels; return at once, or with ``wait`` when all is ready."""
+        """Load the kernels; return at once, or with ``wait`` once all is ready."""
         if self._shoves is not None:
             self._shoves.start()
         if self._course is None:
@@ -199,7 +199,7 @@ class Autonomy:
                 part.close()
 
     async def _load(self, course: Course, *, wait: bool) -> None:
-        """Load the kernels in a thread; compile them first where they are not, with progress in the log.
+        """Load the kernels in a thread; compile missing ones first, with progress in the log.
 
         With ``wait`` there is no fault meanwhile: no time passes, and a lockstep run is the same on every machine.
         """
@@ -239,7 +239,7 @@ class Autonomy:
                 await compile_beside(report=_log_progress)
 
     def _report(self, level: FaultLevel | None, message: str) -> None:
-        """Set the one fault of Health that says why there is no navigation, or clear it."""
+        """Set the fault of Health for missing navigation, or clear it (None)."""
         if Health in self._robot:
             health = self._robot[Health]
             health.set(UNAVAILABLE, False, "autonomy", FaultLevel.WARNING)

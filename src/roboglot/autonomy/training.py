@@ -28,7 +28,7 @@ KIND_MAX = 32  # characters
 
 
 class HeardWords(TrainingWords):
-    """Kept as one list in the settings."""
+    """Trained words, kept as one list in the settings."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

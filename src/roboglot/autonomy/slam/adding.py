@@ -1,4 +1,4 @@
-"""Adding of scans to the map, of those that are worth it."""
+"""Adding of scans to the map, if they show something new."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FILL_AFTER, FILL_AFTER_YAW = 0.4, math.radians(20.0)
 
 
 class Adding:
-    """Adds scans to the belief's map, and to the keyframes that loops are closed with."""
+    """Adds scans to the belief's map, and to the keyframes of loop closing."""
 
     def __init__(self, robot: Robot, belief: Belief, loops: LoopCloser) -> None:
         self._robot, self._belief, self._loops = robot, belief, loops
@@ -26,19 +26,19 @@ class Adding:
         self._added_at = -math.inf
 
     def is_due(self, pose: Pose, stamp: float) -> bool:
-        """Return whether a scan taken at ``pose`` adds something new."""
+        """Return whether a scan taken at ``pose`` (map) is to be added."""
         if not self._belief.map.scans or self._added is None:
             return True
         return _is_apart(pose, self._added, ADD_AFTER, ADD_AFTER_YAW) or stamp - self._added_at >= ADD_PERIOD - 1e-6
 
     def add(self, scan: ScanPoints, pose: Pose, stamp: float, way: float) -> None:
-        """Add a scan taken at ``pose`` now, after ``way`` m."""
+        """Add a scan just taken at ``pose`` (map), after ``way`` m."""
         fill = self._is_new_ground(pose)
         self._added, self._added_at = pose, stamp
         self.paint(scan, pose, way, fill=fill)
 
     def paint(self, scan: ScanPoints, pose: Pose, way: float, *, fill: bool = True) -> None:
-        """Add a scan taken at ``pose`` at any time; ``fill``: clear the floor between the rays, too."""
+        """Add a scan taken at ``pose`` (map) at any time; ``fill``: clear the floor between the rays, too."""
         belief = self._belief
         drawn = self._robot[MapAnnotations].current if MapAnnotations in self._robot else Annotations()
         maintained = drawn.areas_of(AreaKind.MAINTENANCE)
@@ -51,11 +51,11 @@ class Adding:
             self._loops.note(scan, pose, way)
 
     def shift(self, pose: Pose) -> None:
-        """The map was straightened: the newest scan lies at ``pose`` now."""
+        """Note that the newest scan is at ``pose`` on the straightened map."""
         self._added = self._filled = pose
 
     def _is_new_ground(self, pose: Pose) -> bool:
-        """Return whether the gaps between rays are worth clearing here: not at every step."""
+        """Return whether to clear the gaps between rays here: only some way after the last time."""
         last = self._filled if self._belief.map.scans > 1 else None
         if last and not _is_apart(pose, last, FILL_AFTER, FILL_AFTER_YAW):
             return False

@@ -26,7 +26,7 @@ def _sure() -> NDArray[np.float64]:
 
 @dataclass(slots=True)
 class Belief:
-    """The pose in map is ``map_to_odom`` composed with live odometry; ``covariance`` (x, y, yaw) is the pose's."""
+    """Belief; the pose in map is ``map_to_odom`` composed with odometry, its ``covariance`` (x, y, yaw) in m2, rad2."""
 
     odometry: Odometry
     map_to_odom: Pose = ORIGIN
@@ -50,37 +50,37 @@ class Belief:
 
     @property
     def in_doubt(self) -> bool:
-        """True if the pose says little: the place is not known, or scans have not confirmed it yet."""
+        """True if the pose is lost, or scans have not confirmed it yet."""
         return self.localizing and (self.lost is not None or not self.confirmed)
 
     @property
     def is_certain(self) -> bool:
-        """True if nothing speaks against the pose now: robots that end somewhere ask before they say so."""
+        """True if nothing contradicts the pose now; drives check it before they report success."""
         return not self.localizing or not (self.in_doubt or self.contradicted)
 
     @property
     def pose(self) -> Pose:
-        """base_link in map, now."""
+        """Current pose of base_link in map (m, rad)."""
         return self.map_to_odom.compose(self.odometry.reading.pose)
 
     def move_to(self, pose: Pose, odometry: Pose) -> None:
-        """Believe that base_link was at ``pose`` when odometry said ``odometry``."""
+        """Set the pose (map) of base_link at the time of ``odometry`` (odom)."""
         self.map_to_odom = pose.compose(odometry.inverse())
 
     def take_pose(self, pose: Pose) -> None:
-        """Use a pose that a client gave."""
+        """Set a pose (map) given by a client."""
         self.move_to(pose, self.odometry.reading.pose)
         self.covariance = np.diag(SET_BY_CLIENT)
         self.search = True
 
     def take_map(self, grid: EvidenceGrid, pose: Pose) -> None:
-        """Use ``grid`` from now on; the client says that the robot is at ``pose`` in it."""
+        """Use ``grid`` from now on, with the robot at ``pose`` in it, given by a client."""
         self.take_pose(pose)
         self.map, self.frame, grid.given = grid, grid.fingerprint(), grid.evidence < 0
         self.revision += 1
 
     def start_anew(self) -> None:
-        """Forget the map; here is its new origin."""
+        """Forget the map; the present pose becomes the new origin."""
         self.move_to(ORIGIN, self.odometry.reading.pose)
         self.covariance, self.search, self.map, self.frame = _sure(), False, EvidenceGrid(), ""
         self.revision += 1

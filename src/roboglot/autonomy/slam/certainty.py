@@ -1,7 +1,7 @@
-"""Certainty of a pose: a scan is compared with the map point by point. Needs the kernels.
+"""Certainty of a pose: compares a scan with the map point by point. Needs the kernels.
 
-People and other things that the map lacks hide some of its walls, but no ray of theirs passes through one: points that
-hang together in the midst of free floor are set aside, and the rest has to fit all the closer.
+People and other things that are not on the map hide some of its walls, but their rays pass through none: clusters of
+points on free floor are set aside, and the remaining points have to fit more closely.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ PAINTED, PAINTED_SHARE, PAINTED_POINTS = 12.0, 0.8, 200  # weight of a surface; 
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """Support for a pose: of ``points`` echoes, how many the map explains, or denies (behind walls, in free floor)."""
+    """Support for a pose, as numbers of ``points``: ``fitting``, ``hidden`` by walls, ``floating`` on free floor."""
 
     points: int
     fitting: int
@@ -46,22 +46,22 @@ class Support:
 
     @property
     def agreement(self) -> float:
-        """Share of what the map explains of all that it has an opinion on; 1 where it has none."""
+        """Share of fitting points among those on known cells; 1 if there are none."""
         judged = self.fitting + self.hidden + self.floating
         return self.fitting / judged if judged else 1.0
 
     @property
     def known(self) -> float:
-        """Share of the points that the map has an opinion on."""
+        """Share of the points on known cells."""
         return (self.fitting + self.hidden + self.floating) / max(1, self.points)
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A scan at a place, as shares: ``aside`` is what ``things`` hide, the others are of the rest.
+    """A scan at a place, as shares of points: ``aside``, set aside as ``things``; all others of the remaining points.
 
-    ``agreement``, ``close``: of the points near a ``well_known`` surface those within 8 and 4 cm of it; ``exact``: of
-    all points those within 4 cm of any; ``crossing``: those on a surface that are seen through another one.
+    ``agreement``, ``close``: within 8 and 4 cm, of the points near a ``well_known`` surface; ``exact``: within 4 cm of
+    any surface; ``crossing``: on a surface seen through another one.
     """
 
     aside: float
@@ -76,9 +76,9 @@ class Look:
     crossing: float
 
     def is_sure(self, sigma: float) -> bool:
-        """Return whether this is the pose, and not a similar-looking place that the map lacks.
+        """Return whether this is the pose, and not a similar place outside the map.
 
-        ``sigma``: m, of the match in its worst direction.
+        ``sigma``: standard deviation of the match in its worst direction, m.
         """
         if self.things > THINGS_MAX or self.aside > THINGS_SHARE or sigma > SURE_SIGMA:
             return False
@@ -93,16 +93,16 @@ class Look:
 
     @property
     def is_undisputed(self) -> bool:
-        """Return whether no ray contradicts the pose, which makes up for a map that was seen only for a moment."""
+        """Return whether no ray contradicts the pose, which compensates for a map of few scans."""
         return self.aside + self.hidden + self.floating == 0.0 and self.close >= CROWDED_CLOSE
 
     @property
     def is_exact(self) -> bool:
-        """Return whether nothing at all contradicts the pose."""
+        """Return whether nearly all points are close to surfaces, and hardly a ray contradicts the pose."""
         return self.exact >= EXACT and self.hidden <= EXACT_HIDDEN and self.crossing <= SURE_CROSSING
 
     def is_outdone_by(self, other: Look) -> bool:
-        """Return whether ``other`` is exact and this place is not nearly so."""
+        """Return whether ``other`` is exact and this place clearly less so."""
         return other.is_exact and self.exact < other.exact - OUTDONE
 
 
@@ -143,7 +143,7 @@ def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
 
 
 def is_well_painted(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> bool:
-    """Return whether nearly all of ``scan`` lies on surfaces shown by many scans, not on what may drive along."""
+    """Return whether nearly all of ``scan`` lies on surfaces shown by many scans, not on moving things."""
     points, corner = np.ascontiguousarray(scan.points[:: max(1, len(scan.points) // PAINTED_POINTS)]), grid.corner
     sensor = np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
@@ -152,7 +152,7 @@ def is_well_painted(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> bool:
 
 
 def _said(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, points: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """The map's verdict on each of ``points`` (n, 2; base_link)."""
+    """Return the map's verdict on each of ``points`` (n, 2; base_link)."""
     corner, sensor = grid.corner, pose.compose(Pose(scan.sensor.x, scan.sensor.y))
     ends = scan.in_frame(pose, points)
     ends -= (corner.x, corner.y)
@@ -161,7 +161,7 @@ def _said(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, points: NDArray[np.f
 
 
 def _things(points: NDArray[np.float64], floating: NDArray[np.intp]) -> list[list[int]]:
-    """Return groups of ``floating`` points (numbers) that hang together as things of a person's size."""
+    """Return clusters of ``floating`` points (numbers) of the size of a person or a few."""
     groups: list[list[int]] = []
     for number in floating.tolist():
         last = groups[-1][-1] if groups else -1
@@ -175,5 +175,5 @@ def _things(points: NDArray[np.float64], floating: NDArray[np.intp]) -> list[lis
 
 
 def _count(points: NDArray[np.float64], group: list[int]) -> int:
-    """Return as how many things it counts: people may stand side by side."""
+    """Return the number of things in a cluster: people may stand side by side."""
     return math.ceil(float(np.hypot(*np.ptp(points[group], 0))) / THING_SIZE)

@@ -1,9 +1,9 @@
-"""Odometry against the scan, where they contradict: in a crowd that moves along, most points say that the robot stands.
+"""Decides between contradicting odometry and scan: in a crowd moving along, most points suggest that the robot stands.
 
-A static world speaks with one voice. Where the points that distinguish both poses disagree, some of them lie on things
-that move, and the wheels are believed: their pose, matched to walls alone, for a match with all points near it would be
-misled as well. Robots that drive ahead drag matches back by millimetres a step, which no single step shows: hence the
-last seconds are judged too. Needs the kernels.
+In a static world, all points that distinguish both poses agree. If they disagree, some are on moving things, and the
+wheels are believed: their pose, matched to walls alone, as a match with all points would be misled, too. Robots driving
+ahead drag matches back by millimetres per step, too little for a single step: so the last seconds are judged too. Needs
+the kernels.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ PAST_TURN_MAX = 2.0  # rad turned within them, at most
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Place of base_link at ``stamp``, by the ``wheels`` alone and as believed (map); all until then is summed.
+    """Pose of base_link at ``stamp``, by the ``wheels`` alone and as believed (map); sums up to that time.
 
-    ``way``: m driven; ``variance``: m2, of the wheels' noise.
+    ``way``: m driven; ``variance`` of the wheels' noise, m2.
     """
 
     stamp: float
@@ -54,7 +54,7 @@ class Moment:
 
 
 class WheelWitness:
-    """Asks the wheels about every match: over the newest step, and over the last seconds."""
+    """Checks every match against the wheels, over the newest step and over the last seconds."""
 
     def __init__(self, odometry: OdometryLearner) -> None:
         self._odometry = odometry
@@ -62,11 +62,11 @@ class WheelWitness:
         self._wheels, self._variance = Pose(), 0.0
 
     def forget(self) -> None:
-        """The pose was set, or is in doubt: the wheels know nothing of that."""
+        """Forget the past, as the pose was set or is in doubt."""
         self._past.clear()
 
     def note(self, stamp: float, pose: Pose, way: float) -> None:
-        """The robot is believed to have been at ``pose`` (map), after ``way`` m."""
+        """Note the believed ``pose`` (map) at ``stamp``, after ``way`` m."""
         while self._past and stamp - self._past[0].stamp > PASTS[-1]:
             self._past.popleft()
         self._variance += self._odometry.noise.newest.way
@@ -75,9 +75,9 @@ class WheelWitness:
     def contest(
         self, grid: EvidenceGrid, scan: ScanPoints, before: Pose, best: Match, prior: NDArray[np.float64], step: Pose
     ) -> Match | None:
-        """Return the pose by the wheels, if they are believed rather than the ``best`` match; else None.
+        """Return the pose by the wheels, if it is more credible than the ``best`` match; else None.
 
-        Odometry says ``before`` (``prior``: its covariance) after the newest ``step`` (base_link before it).
+        ``before``: pose by odometry (``prior``: its covariance) after the newest ``step`` (in the last base_link).
         """
         way = math.hypot(step.x, step.y)
         if way > WAY_MAX or abs(step.yaw) > TURN_MAX:
@@ -105,12 +105,12 @@ class WheelWitness:
         return driven
 
     def _forget_since(self, then: Moment) -> None:
-        """Drop the poses believed after ``then``: they were wrong, and must not testify against a true one."""
+        """Drop the poses believed after ``then``: they were wrong, and must not contradict a true one."""
         while self._past[-1] is not then:
             self._past.pop()
 
     def _sigma(self, way: float, variance: float) -> float:
-        """Return the standard deviation (m) of wheels after ``way`` m, with ``variance`` (m2) by noise."""
+        """Return the standard deviation (m) of the wheels after ``way`` m, with ``variance`` (m2) of noise."""
         return STILL + math.sqrt(variance) + self._odometry.bias.scale_doubt * way
 
 
@@ -125,7 +125,7 @@ def contested(
 ) -> Match | None:
     """Return the pose by odometry, if the scan's points do not clearly speak for the ``best`` match; else None.
 
-    Odometry says ``before`` (``prior``: its covariance; ``sigma``: its standard deviation, m) after ``way`` m.
+    ``before``: pose by odometry (``prior``: its covariance; ``sigma``: its standard deviation, m) after ``way`` m.
     """
     if best.pose.distance_to(before) < max(CONTRADICTION, SIGMAS * sigma):
         return None
@@ -152,7 +152,7 @@ def contested(
 
 
 def _by_walls(grid: EvidenceGrid, scan: ScanPoints, before: Pose, tight: NDArray[np.float64]) -> Match:
-    """Return where the wheels put the robot, as far as walls say nothing else; judged by the whole scan."""
+    """Return the wheels' pose, corrected by walls only; the match is judged by the whole scan."""
     points = scan.points[:: math.ceil(len(scan.points) / MATCH_POINTS_MAX)]
     walls = np.ascontiguousarray(points[on_walls(points)])
     if len(walls) >= POINTS_MIN:

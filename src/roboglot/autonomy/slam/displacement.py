@@ -1,6 +1,6 @@
-"""True if the robot was moved by something else than its wheels: where scans put it against where odometry does.
+"""Detects motion of the robot by anything but its wheels, from the scans' poses against odometry's.
 
-Odometry's own errors grow with the way and are in the prior of each match; a shove is more than these, and sudden.
+Odometry's own errors grow with the distance and are in the prior of each match; a shove is larger, and sudden.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ QUIET = 1.0  # s after a pose was set in which corrections are ignored
 
 
 class DisplacementWatch:
-    """Gets the correction of every trusted match."""
+    """Watch over the corrections of all trusted matches."""
 
     def __init__(self) -> None:
         # stamp; x, y in map; m driven; m, the prior's standard deviation
@@ -28,15 +28,15 @@ class DisplacementWatch:
         self._quiet_until = -math.inf
 
     def forget(self, stamp: float) -> None:
-        """The pose was set, or is in doubt: what is corrected now was wrong before."""
+        """Forget past corrections, and ignore the next ones: the pose was set, or is in doubt."""
         self._corrections.clear()
         self._quiet_until = stamp + QUIET
 
     def check(self, stamp: float, before: Pose, seen: Pose, prior: NDArray[np.float64], way: float) -> float | None:
-        """Return once how far (m) the robot was displaced lately; None if it was not.
+        """Return a recent displacement (m), once; None: there was none.
 
-        Odometry says ``before``, the scan says ``seen``; ``prior``: variances before the match; ``way``: m driven since
-        the last one.
+        ``before``: pose by odometry, ``seen``: by the scan (map); ``prior``: covariance before the match; ``way``: m
+        driven since the last one.
         """
         if stamp < self._quiet_until:
             return None

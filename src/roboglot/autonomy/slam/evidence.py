@@ -47,11 +47,11 @@ class EvidenceGrid:
 
     @property
     def corner(self) -> Point:
-        """The map position (m) of the corner of cell (0, 0)."""
+        """Corner of cell (0, 0) in map, m."""
         return Point(self.first_column * RESOLUTION, self.first_row * RESOLUTION)
 
     def fingerprint(self) -> str:
-        """A name that grids have in common only if they are the same and lie at the same place."""
+        """Return a name that only equal grids at the same place have in common."""
         place = np.array((self.first_row, self.first_column, *self.evidence.shape), np.int64)
         return hashlib.blake2b(place.tobytes() + self.evidence.tobytes(), digest_size=8).hexdigest()
 
@@ -64,7 +64,7 @@ class EvidenceGrid:
         return cast("T", value)
 
     def make_room(self, min_x: float, min_y: float, max_x: float, max_y: float) -> None:
-        """Grow until the rectangle (map, m) is inside, or there are CELLS_MAX of them, GRID_MAX along a side."""
+        """Grow to contain the rectangle (map, m), up to CELLS_MAX cells, and GRID_MAX along a side."""
         row0, column0 = math.floor(min_y / RESOLUTION), math.floor(min_x / RESOLUTION)
         row1, column1 = math.floor(max_y / RESOLUTION) + 1, math.floor(max_x / RESOLUTION) + 1
         height, width = self.evidence.shape
@@ -99,7 +99,7 @@ class EvidenceGrid:
             self.given = given
 
     def seen_from(self, column: int, row: int) -> EvidenceGrid:
-        """The same map with its origin at the corner of that cell, counted from the present origin."""
+        """Return a view of this map with its origin at the corner of a cell, counted from the present origin."""
         moved = EvidenceGrid()
         moved.evidence, moved.surface, moved.marks = self.evidence, self.surface, self.marks
         moved.first_column, moved.first_row = self.first_column - column, self.first_row - row
@@ -107,14 +107,14 @@ class EvidenceGrid:
         return moved
 
     def copy(self) -> EvidenceGrid:
-        """The same, to be changed without changing this one."""
+        """Return an independent copy."""
         copied = self.seen_from(0, 0)
         copied.evidence, copied.surface, copied.marks = self.evidence.copy(), self.surface.copy(), self.marks.copy()
         copied.frozen = self.frozen
         return copied
 
     def empty_like(self) -> EvidenceGrid:
-        """A map of the same size and place that says nothing yet, for ``copy_rows``."""
+        """Return an empty map of the same size and place, for ``copy_rows``."""
         copied = self.seen_from(0, 0)
         copied.evidence, copied.surface, copied.marks = (
             np.zeros(array.shape, array.dtype) for array in (self.evidence, self.surface, self.marks)
@@ -123,12 +123,12 @@ class EvidenceGrid:
         return copied
 
     def copy_rows(self, other: EvidenceGrid, rows: slice) -> None:
-        """Take over these rows of ``other``, which has the same size."""
+        """Copy rows from ``other``, which has the same size."""
         for mine, its in ((self.evidence, other.evidence), (self.surface, other.surface), (self.marks, other.marks)):
             mine[rows] = its[rows]
 
     def occupancy(self) -> OccupancyGrid:
-        """The map as the model has it, trimmed to what is known; must not be written to."""
+        """Return the model's form of the map, trimmed to known cells; read only."""
         if self._drawn_scans != self.scans:
             rows, columns = (np.flatnonzero(self.evidence.any(axis=axis)) for axis in (1, 0))
             known = self.evidence[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if len(rows) else self.evidence
@@ -146,17 +146,17 @@ def _holds(interval: tuple[int, int], begin: int, end: int) -> bool:
 
 
 def is_too_large(height: int, width: int) -> bool:
-    """Return whether a map cannot have so many cells."""
+    """Return whether a map of this size has too many cells."""
     return max(height, width) > GRID_MAX or height * width > CELLS_MAX
 
 
 def _side(other: int) -> int:
-    """Return the number of cells that one side may have beside the ``other``."""
+    """Return the most cells for one side, given the ``other``."""
     return min(GRID_MAX, CELLS_MAX // max(1, other))
 
 
 def _grown(begin: int, end: int, wanted_begin: int, wanted_end: int, empty: bool, most: int) -> tuple[int, int]:
-    """The interval [begin, end) grown over the wanted one, with room to spare, up to ``most`` cells."""
+    """Return the interval [begin, end) grown to contain the wanted one, with room to spare, up to ``most`` cells."""
     if empty:
         begin = end = (wanted_begin + wanted_end) // 2
     elif begin <= wanted_begin and wanted_end <= end:

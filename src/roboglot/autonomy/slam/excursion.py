@@ -1,4 +1,4 @@
-"""Excursions: a map of its own while the pose in the old one is lost, joined when it is found again."""
+"""Excursions: separate maps while the pose in the old map is lost, joined to it when the pose is found again."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ JOINED_AT_ONCE = 4  # views added per scan, so that the loop is not held up
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A scan, and where it was taken (base_link), in the excursion's frame or in map."""
+    """A scan and the pose of base_link at that time, in the excursion's frame or in map."""
 
     scan: ScanPoints
     pose: Pose
 
 
 class Excursion:
-    """A separate map that begins with its first scan, at its own origin."""
+    """A separate map, with its origin at its first scan."""
 
     def __init__(self, noise: LearntNoise) -> None:
         self._noise = noise
@@ -53,7 +53,7 @@ class Excursion:
         self.way = 0.0  # m
 
     def take(self, scan: ScanPoints, step: Pose, way: float, turn: float) -> None:
-        """Go on by odometry's ``step`` (base_link before) of so much way (m) and turn (rad), and look."""
+        """Move by odometry's ``step`` (in the last base_link; ``way`` m, ``turn`` rad), match, and keep views."""
         self._pose, self.way = self._pose.compose(step), self.way + way
         self._covariance = self._noise.spread(self._covariance, way, turn)
         if self._grid.scans:
@@ -69,13 +69,13 @@ class Excursion:
                 self._views.append(View(scan.thinned(RAYS_KEPT_MAX), self._pose))
 
     def placed(self, pose: Pose) -> list[View]:
-        """Return its views in map, with the robot at ``pose`` now."""
+        """Return the views in map, with the robot at ``pose`` now."""
         back = pose.compose(self._pose.inverse())
         return [View(view.scan, back.compose(view.pose)) for view in self._views]
 
 
 class Excursions:
-    """Begins an excursion when the place is lost, and has ``add`` add its views to the map when it is known again."""
+    """Begins an excursion when the pose is lost, and passes its views to ``add`` when the pose is known again."""
 
     def __init__(self, belief: Belief, noise: LearntNoise, add: Callable[[ScanPoints, Pose], None]) -> None:
         self._belief, self._noise, self._add = belief, noise, add
@@ -84,11 +84,11 @@ class Excursions:
         self._map = belief.map
 
     def forget(self) -> None:
-        """Start anew, unconnected with anything before: there were no scans for a while."""
+        """Drop the excursion, as a gap in the scans separates it from the next ones."""
         self._now = None
 
     def take(self, scan: ScanPoints, odometry: Pose, step: Pose, turn: float, *, sure: bool) -> None:
-        """A scan came after odometry's ``step``; ``sure``: scans may be added to the map."""
+        """Take a scan after odometry's ``step``; ``sure``: scans may be added to the map."""
         belief = self._belief
         if belief.map is not self._map:
             self._map, self._now = belief.map, None

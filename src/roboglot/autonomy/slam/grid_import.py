@@ -1,7 +1,7 @@
-"""A grid from elsewhere (a file, another robot) as the arrays that localization and mapping go on with.
+"""Import of a grid (from a file, another robot) into the arrays of localization and mapping.
 
-A grid does not say where in its cells the surfaces lie, nor from which side they were seen: they are put into the
-cells' middle, seen from where the floor is free. Both get better with the first scans that are added.
+A grid does not have the surfaces' places in its cells, nor the sides they face: they are assumed in the cells' middle,
+facing free floor. Both improve with the first scans.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SAME = 1e-4  # relative difference of resolutions that count as equal: files use
 
 
 def evidence_of(grid: OccupancyGrid) -> EvidenceGrid:
-    """``grid`` on cells of this map. Raises InvalidGoal if it is larger than the map can be."""
+    """Return ``grid`` resampled to the map's cells. Raises InvalidGoal if it is too large or has no place."""
     imported = EvidenceGrid()
     known = grid.trimmed()
     if not known.width:
@@ -43,7 +43,7 @@ def evidence_of(grid: OccupancyGrid) -> EvidenceGrid:
 
 
 def _resampled(grid: OccupancyGrid) -> tuple[NDArray[np.int8], int, int]:
-    """Cells of RESOLUTION, and the row and column of the first, counted from the origin."""
+    """Return cells of RESOLUTION, and row and column of the first, from the origin. Raises InvalidGoal."""
     finer = RESOLUTION / grid.resolution
     row, column = grid.origin.y / RESOLUTION, grid.origin.x / RESOLUTION
     if not all(map(math.isfinite, (row, column, finer))) or finer <= 0.0:
@@ -68,7 +68,7 @@ def _resampled(grid: OccupancyGrid) -> tuple[NDArray[np.int8], int, int]:
 
 
 def _surfaces(cells: NDArray[np.int8]) -> NDArray[np.float32]:
-    """Return the surfaces and the sides that they face, as ``kernels.occupancy`` has it."""
+    """Return the surfaces and the sides that they face, in the form of ``kernels.occupancy``."""
     height, width = cells.shape
     free = np.pad(cells < 0, 1).astype(np.float32)
     towards_x, towards_y = np.zeros((2, height, width), np.float32)

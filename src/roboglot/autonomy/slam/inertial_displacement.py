@@ -1,7 +1,7 @@
-"""Shoves of robots without a lidar: what the accelerometer feels and the wheels do not explain.
+"""Shoves of robots without a lidar: acceleration that the wheels do not explain.
 
-The difference of both accelerations, integrated twice with a leak, is the way of a shove. The leaks keep the
-accelerometer's constant error from growing: a slow push over seconds is not felt, a blow is.
+The difference of both accelerations, integrated twice with a leak, is the distance of a shove. The leaks bound the
+accelerometer's constant error: blows are detected, slow pushes over seconds are not.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class InertialDisplacement:
                     self._robot.events.publish(RobotDisplaced(stamp=self._robot.clock.time(), distance=shoved))
 
     def _check(self) -> float | None:
-        """Take the newest reading; return how far (m) the robot was shoved once that no longer grows."""
+        """Take the newest reading; return the distance of a shove (m) once it no longer grows, else None."""
         felt, odometry = self._imu.reading, self._odometry.reading
         seconds = felt.stamp - self._stamp
         if seconds <= 0.0:

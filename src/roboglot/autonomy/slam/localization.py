@@ -1,4 +1,4 @@
-"""Localization from Lidar and Odometry: the component. The estimator that moves the belief is slam.py's."""
+"""The localization component, from Lidar and Odometry. The estimator that moves the belief is in slam.py."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SEARCH_PERIOD = 0.5  # s between two scans that are tried
 
 
 class LidarLocalization(Localization):
-    """Pure odometry until the estimator runs, which is set as ``estimator`` when it is loaded."""
+    """Localization; pure odometry until ``estimator`` is set, once loaded."""
 
     estimator: Slam | None = None
 
@@ -98,7 +98,7 @@ class LidarLocalization(Localization):
             await self._robot.clock.sleep(SEARCH_PERIOD)
 
     async def _search_driving(self, region: Region | None, source: str) -> None:
-        """Look, and drive on while more than one place, or none, explains what was seen."""
+        """Search, and drive on while several places, or none, explain the scans. Raises NotReady, NotLocalized."""
         deadline = self._robot.clock.time() + AROUND_SECONDS
         while self.estimator is None:
             if self._robot.clock.time() > deadline:
@@ -121,14 +121,14 @@ class LidarLocalization(Localization):
         raise NotLocalized(f"{why} after {AROUND_SECONDS:g} s of looking around")
 
     async def _look(self, region: Region | None) -> tuple[list[Match], Pose]:
-        """Return candidate poses of the newest scan, and odometry at its time."""
+        """Return candidate poses (map) of the newest scan, and odometry (odom) at its time."""
         if self.estimator is None or (search := self.estimator.placing(region)) is None:
             return [], ORIGIN
         odometry, work = search
         return await computed(self._robot.clock, work), odometry
 
     async def _settle(self, place: Match, odometry: Pose) -> bool:
-        """Believe ``place`` and match newer scans there; whether the robot stands where they say."""
+        """Believe ``place`` and match newer scans there; return whether they confirm it."""
         from roboglot.autonomy.slam.look_around import settle  # needs the kernels, which are loaded by now
 
         assert self.estimator is not None

@@ -1,7 +1,7 @@
-"""Looking again: whether the one place that was found is right, or which of several that look alike.
+"""Further scans to confirm a found place, or to decide between similar ones.
 
-A newer scan must fit the one, too: the robot may be carried on while the search looks at a scan. Of several, those are
-kept that still fit after driving on a little. A lidar that sees all around learns nothing by turning, so the robot goes
+A newer scan must confirm a single place, as the robot may be carried on during the search. Of several places, those are
+kept that still fit after a short drive: turning would not change the view of an all-round lidar, so the robot drives to
 where the scan shows room. Needs the kernels.
 """
 
@@ -40,7 +40,7 @@ SETTLED, SETTLED_YAW = 0.02, math.radians(1.0)  # m, rad between two scans of a 
 
 
 async def settle(clock: Clock, estimator: Slam, belief: Belief) -> bool:
-    """Believe what newer scans say around the found place, until one confirms it; False if they do not fit there."""
+    """Follow newer scans around the found place until one confirms it; return False if they do not fit there."""
     end, seen = clock.time() + SETTLE_SECONDS, estimator.newest
     while clock.time() < end:
         await clock.sleep(LISTEN_PERIOD)
@@ -68,14 +68,14 @@ def _matched(belief: Belief, newest: ScanTaken) -> Match | None:
 
 @dataclass(slots=True)
 class Hypotheses:
-    """The places that have explained every scan so far, as of ``odometry``; none before the first look."""
+    """Places that explain every scan so far, at ``odometry``; none before the first scan."""
 
     places: Sequence[Match] = ()
     odometry: Pose = ORIGIN
     complete: bool = False  # whether all candidates are in the list
 
     def narrow(self, found: Sequence[Match], odometry: Pose) -> Match | None:
-        """Keep those that ``found`` has, too; the place, when only one is left."""
+        """Keep the places that are in ``found``, too; return the place if only one is left, else None."""
         step = odometry.relative_to(self.odometry)
         expected = [place.pose.compose(step) for place in self.places]
         left = [match for match in found if any(_is_same(match.pose, pose) for pose in expected)]
@@ -87,7 +87,7 @@ class Hypotheses:
 
 
 async def go_on(robot: Robot, reader: ScanReader, source: str) -> bool:
-    """Drive to where the newest scan shows room; False if there is none, or the robot cannot or must not drive."""
+    """Drive to where the newest scan shows room; return False if there is none, or the robot cannot drive there."""
     scan, radius = robot[Lidar].scan, robot.description.radius
     if Driving not in robot or scan is None or (DockContact in robot and robot[DockContact].docked):
         return False
@@ -102,7 +102,7 @@ async def go_on(robot: Robot, reader: ScanReader, source: str) -> bool:
 
 
 async def _watched(robot: Robot, move: Action, goes: Callable[[LaserScan], bool]) -> bool:
-    """Wait for ``move``, cancelled when a scan says that it must not go on; whether it came to its end."""
+    """Wait for ``move``, and cancel it if a scan does not pass ``goes``; return whether it succeeded."""
     try:
         while not move.status.ended:
             await robot.clock.sleep(PERIOD)
@@ -118,7 +118,7 @@ async def _watched(robot: Robot, move: Action, goes: Callable[[LaserScan], bool]
 
 
 def room(scan: ScanPoints, yaw: float, radius: float) -> float:
-    """Return how far (m) the hull can go towards ``yaw`` (base_link) by ``scan``; inf if nothing is there."""
+    """Return the free distance (m) of the hull towards ``yaw`` (base_link) by ``scan``; inf: no obstacle."""
     along = scan.points @ np.array([math.cos(yaw), math.sin(yaw)])
     aside = np.abs(scan.points @ np.array([-math.sin(yaw), math.cos(yaw)]))
     ahead = along[(aside < radius + BESIDE) & (along > 0.0)]
@@ -126,7 +126,7 @@ def room(scan: ScanPoints, yaw: float, radius: float) -> float:
 
 
 def open_way(scan: ScanPoints, radius: float) -> Pose | None:
-    """A turn and a way (base_link) of which ``scan`` shows that the hull has room; the longest, rather ahead."""
+    """Return the longest free way by ``scan`` as a turn (yaw) and a distance (x), preferably ahead; None: none."""
     best, way = 0.0, None
     for number in range(DIRECTIONS):
         yaw = wrap_angle(math.tau * number / DIRECTIONS)

@@ -1,7 +1,7 @@
-"""Closing loops: knows a place again after a long way, has all poses since straightened and the map painted anew.
+"""Loop closing: recognizes a place after a long way, then corrects all poses since, and rebuilds the map.
 
-Keeps a scan every half metre or so (keyframes) with the poses between them as a graph. A map that came from elsewhere
-has no keyframes: it stays as it was, and what is seen on it holds the new ones to it.
+Keeps a scan about every half metre (keyframes), with their relative poses as a graph. A loaded map has no keyframes: it
+stays unchanged, and matches with it constrain the new keyframes.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ LOOP_NOISE, LOOP_YAW_NOISE = 0.02, math.radians(0.3)
 
 @dataclass(slots=True)
 class Keyframe:
-    """A scan, where it was taken (base_link in map), and the metres driven until then."""
+    """A scan, the pose of base_link (map) at that time, and the distance driven until then, m."""
 
     scan: ScanPoints
     pose: Pose
@@ -60,7 +60,7 @@ class Keyframe:
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """``first`` seen again from ``second``, which lies at ``between`` in its frame; ``correction`` of the map there."""
+    """Keyframe ``first`` seen again from ``second``, at ``between`` in its frame; ``correction`` of the map there."""
 
     first: int
     second: int
@@ -69,7 +69,7 @@ class Sighting:
 
 
 class LoopCloser:
-    """Gets every scan that is added to the map."""
+    """Loop closer on the scans that are added to the map."""
 
     def __init__(self, belief: Belief) -> None:
         self._belief = belief
@@ -77,7 +77,7 @@ class LoopCloser:
         self._begin(None)
 
     def _begin(self, grid: EvidenceGrid | None) -> None:
-        """Forget all; ``grid`` has got its first scan, unless it came from elsewhere."""
+        """Forget all keyframes; ``grid`` has only its first scan, or was loaded."""
         self._map = grid
         self._given = grid.copy() if grid is not None and grid.scans != 1 else None  # the part that never moves
         self._held_at = 0.0  # m driven when the given map was last seen
@@ -98,13 +98,13 @@ class LoopCloser:
 
     @property
     def anchor(self) -> tuple[int, Pose] | None:
-        """Number and pose of the keyframe that the robot is at; None before the first, and on another map."""
+        """Number and pose of the robot's present keyframe; None before the first, and on another map."""
         if not self._frames or self._belief.map is not self._map:
             return None
         return self._last, self._frames[self._last].pose
 
     def note(self, scan: ScanPoints, pose: Pose, way: float) -> None:
-        """A scan was added at ``pose`` after ``way`` m."""
+        """Note a scan that was added at ``pose`` (map) after ``way`` m."""
         if self._belief.map is not self._map:
             self._begin(self._belief.map)
         if not self._is_new(pose):
@@ -128,7 +128,7 @@ class LoopCloser:
         self._close(number)
 
     def advance(self, pose: Pose) -> Pose | None:
-        """Go on with straightening, if a loop was closed: the straightened ``pose`` of the robot when that is done."""
+        """Continue straightening after a closed loop; return the robot's corrected ``pose`` at the end, else None."""
         if self._work is None:
             return None
         if self._belief.map is not self._map:
@@ -155,7 +155,7 @@ class LoopCloser:
         return number
 
     def _is_new(self, pose: Pose) -> bool:
-        """Return whether a keyframe is needed here; goes over to an old one that will do."""
+        """Return whether a keyframe is needed here; otherwise an old one nearby becomes the present one."""
         if not self._frames:
             return True
         last = self._frames[self._last].pose
@@ -170,7 +170,7 @@ class LoopCloser:
         return True
 
     def _hold(self, given: EvidenceGrid, number: int, way: float) -> None:
-        """Tie keyframe ``number`` to the first one if the given map shows that it is where it is believed."""
+        """Tie keyframe ``number`` to the first one if the given map confirms its pose."""
         frame = self._frames[number]
         seen = fit(given, frame.scan, frame.pose, FREE, iterations=0)
         self._near = seen.known >= NEAR_SHARE * seen.points
@@ -204,7 +204,7 @@ class LoopCloser:
         self._work = Straightening([f.scan for f in frames], [f.pose for f in frames], self._edges, self._given)
 
     def _known_again(self, number: int) -> Sighting | None:
-        """The same place as long ago, if the newest keyframe shows one."""
+        """Return the sighting of an old place from the newest keyframe; None: there is none."""
         frame = self._frames[number]
         reach = min(DRIFT_MAX, DRIFT + DRIFT_PER_METRE * frame.way)
         if self._given is not None and frame.way == self._held_at:
@@ -233,7 +233,7 @@ class LoopCloser:
         return Sighting(first, second, between, found.compose(self._frames[second].pose.inverse()))
 
     def _local_map(self, middle: int) -> EvidenceGrid:
-        """Return a map of the scans around keyframe ``middle``, in map."""
+        """Return a grid of the scans around keyframe ``middle``, in map."""
         grid, centre = EvidenceGrid(), self._frames[middle].pose
         for frame in self._frames[max(0, middle - AROUND) : middle + AROUND + 1]:
             if frame.pose.distance_to(centre) < LOCAL_REACH:
@@ -241,13 +241,13 @@ class LoopCloser:
         return grid
 
     def _agree(self, one: Sighting, other: Sighting) -> bool:
-        """Return whether both corrections move the robot's place to the same one."""
+        """Return whether both corrections lead to the same pose."""
         here = self._frames[other.second].pose
         a, b = one.correction.compose(here), other.correction.compose(here)
         return a.distance_to(b) < AGREED and abs(wrap_angle(a.yaw - b.yaw)) < AGREED_YAW
 
     def _apply(self, work: Straightening) -> None:
-        """Take over the straightened poses and map; keyframes that came meanwhile move with the newest of those."""
+        """Take over the straightened poses and map; later keyframes move with the newest straightened one."""
         count = len(work.after)
         self.moved = tuple(zip(work.before, work.after, strict=True))
         shift = work.after[-1].compose(work.before[-1].inverse())
@@ -262,7 +262,7 @@ class LoopCloser:
 
 
 def _size(correction: Pose, here: Pose) -> tuple[float, float]:
-    """Return how far the correction moves ``here``: m, rad."""
+    """Return the correction's shift (m) and turn (rad) at ``here``."""
     return correction.compose(here).distance_to(here), abs(correction.yaw)
 
 

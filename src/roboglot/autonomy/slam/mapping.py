@@ -1,4 +1,4 @@
-"""Mapping from Lidar and Odometry: the component. The estimator that fills the map is slam.py's."""
+"""The mapping component, from Lidar and Odometry. The estimator that fills the map is in slam.py."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ORIGIN_MAX = 10_000.0  # m from the origin to the new one
 
 
 class LidarMapping(Mapping):
-    """Empty until the estimator runs."""
+    """Mapping, empty until the estimator runs."""
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot = robot

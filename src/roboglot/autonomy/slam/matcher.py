@@ -1,6 +1,6 @@
-"""Scans against the map: the best pose near a prior, in a window, or anywhere. Moves no belief.
+"""Matches scans to the map: the best pose near a prior, in a window, or anywhere. Moves no belief.
 
-Needs the kernels, hence is imported only when they are loaded.
+Needs the kernels, so it is imported once they are loaded.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ RIVAL_SUPPORTED = 0.06  # … and how much less of it the map may support
 class Match:
     """A matched pose; ``strain``: squared distance from the prior in its standard deviations.
 
-    ``fit`` of the ``points`` lie on surfaces, ``known`` on known ground.
+    ``fit``: number of the ``points`` on surfaces; ``known``: on known cells.
     """
 
     pose: Pose
@@ -63,7 +63,7 @@ class Match:
 
     @property
     def agreement(self) -> float:
-        """Share of points that fit, of those on known ground."""
+        """Share of fitting points among those on known cells."""
         return self.fit / max(self.known, POINTS_MIN)
 
     @property
@@ -73,13 +73,13 @@ class Match:
 
     @property
     def quality(self) -> float:
-        """The same, but less when hardly anything is known around."""
+        """Share of fitting points, reduced where few cells are known."""
         return min(1.0, self.fit / max(self.known, KNOWN_SHARE * self.points))
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A place where a scan may have been taken, and what the map says of it there."""
+    """A possible place of a scan, with the map's support for it."""
 
     match: Match
     said: Support
@@ -87,7 +87,7 @@ class Candidate:
 
     @property
     def is_place(self) -> bool:
-        """True if it fits well enough to be compared with others, people in the way or not."""
+        """True if the scan fits well enough, even with people in view, to compare the place with others."""
         match, said, look = self.match, self.said, self.look
         if match.fit < POINTS_MIN or said.hidden > PLACE_HIDDEN * said.points:
             return False
@@ -107,9 +107,9 @@ def fit(
     iterations: int = ITERATIONS_MAX,
     most: int = MATCH_POINTS_MAX,
 ) -> Match:
-    """The best pose near ``prior`` (base_link in map), from ``start`` on; with 0 ``iterations`` the start, judged.
+    """Return the best pose near ``prior`` (base_link in map), from ``start`` on; with 0 ``iterations`` the start.
 
-    At most so many of the points are used.
+    ``most``: the most points to use.
     """
     points, corner = scan.points, grid.corner
     if len(points) > most:
@@ -128,9 +128,9 @@ def fit(
 
 
 def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[float, float]) -> Pose:
-    """The pose within ``window`` (m, rad) of ``centre`` at which most points lie on occupied cells.
+    """Return the pose within ``window`` (m, rad) of ``centre`` with the most points on occupied cells.
 
-    Of poses that are about as good, the one nearer to the centre.
+    Of similarly good poses, the one nearest to the centre wins.
     """
     corner, half = grid.corner, (NEARBY + window[0]) / RESOLUTION
     row, column = ((v - c) / RESOLUTION for v, c in ((centre.y, corner.y), (centre.x, corner.x)))
@@ -147,9 +147,9 @@ def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[flo
 
 
 def place(grid: EvidenceGrid, scan: ScanPoints, region: Region | None) -> Match | None:
-    """Return where in the whole map (or in ``region``) the scan fits, from the scan alone; None if nowhere.
+    """Return the best match in the whole map (or ``region``) by the scan alone; None: there is none.
 
-    The best of the ``places``, whether or not others look like it.
+    Other places may match equally well, unlike in ``places``.
     """
     found, _ = _candidates(grid, scan, region, 1)
     return found[0].match if found else None
@@ -158,10 +158,10 @@ def place(grid: EvidenceGrid, scan: ScanPoints, region: Region | None) -> Match 
 def places(
     grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int = PLACES_MAX, known: Pose | None = None
 ) -> list[Match]:
-    """The places in the map (or in ``region`` of it) that explain the scan about equally well, the best first.
+    """Return the places in the map (or ``region``) that explain the scan about equally well, the best first.
 
-    More than one: the scan alone does not say where the robot is. None: it is nowhere in the map, or at a place that
-    the map knows too little of. In a ``region``, or at the pose where the robot is ``known`` to be, less is enough.
+    Several places: the scan alone is ambiguous. None: the place is not on the map, or too little of it is known. In a
+    ``region``, or at a pose that is ``known`` already, less certainty suffices.
     """
     candidates, complete = _candidates(grid, scan, region, most)
     alike = _alike(candidates)
@@ -178,7 +178,7 @@ def places(
 
 
 def _alike(candidates: list[Candidate]) -> list[Candidate]:
-    """Return those of ``candidates`` (the best first) that explain the scan about as well as the best."""
+    """Return the ``candidates`` (best first) that explain the scan about as well as the best one."""
     if not candidates:
         return []
     first = candidates[0].said  # what distinguishes it from a rival may lie on unknown ground
@@ -192,9 +192,9 @@ def _alike(candidates: list[Candidate]) -> list[Candidate]:
 
 
 def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, most: int) -> tuple[list[Candidate], bool]:
-    """Places where the scan may have been taken, and what the map says of it there; the best first.
+    """Return possible places of the scan, the best first, and whether these are all.
 
-    At most so many are looked at; also returns whether these were all.
+    ``most``: the most places to examine.
     """
     points, corner = scan.nearby(PLACE_POINTS_MAX), grid.corner
     if len(points) < POINTS_MIN:
@@ -222,7 +222,7 @@ def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, mos
 
 
 def _floor(grid: EvidenceGrid, region: Region | None) -> NDArray[np.uint8]:
-    """1 where base_link may be."""
+    """Return a grid with 1 where base_link may be, else 0."""
     floor, corner = (grid.evidence < 0).astype(np.uint8), grid.corner
     if region is not None:
         row0, col0, row1, col1 = (

@@ -17,7 +17,7 @@ from roboglot.model.geometry import Pose
 def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maintained: Sequence[Area] = ()) -> None:
     """Add ``scan``, taken with base_link at ``pose`` in map; ``fill``: clear the floor between the rays too.
 
-    If areas are ``maintained``, nothing changes outside them.
+    With ``maintained`` areas, nothing changes outside them.
     """
     ends = scan.in_frame(pose, scan.ends)
     (min_x, min_y), (max_x, max_y) = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
@@ -32,7 +32,7 @@ def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maint
 
 
 def _freeze(grid: EvidenceGrid, maintained: Sequence[Area]) -> None:
-    """Let scans change cells inside the areas only; everywhere if there are none."""
+    """Let scans change cells inside the areas only; without areas, all cells."""
     frame = GridFrame(grid.corner, (grid.evidence.shape[0], grid.evidence.shape[1]))
     changing = np.full(frame.shape, not maintained)
     for area in maintained:

@@ -1,4 +1,4 @@
-"""Maps a recorded drive with the estimator that robots use. Needs the kernels."""
+"""Maps a recorded drive with the robots' estimator. Needs the kernels."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RADIUS = 0.3  # m, for a robot of unknown hull
 class MappedDrive:
     """Result of a replay; ``seconds`` of processor time and ``qualities`` (0..1) of each scan, ``news``: its events.
 
-    ``noise``: odometry's learnt noise of way and yaw, as multiples of what was assumed.
+    ``noise``: learnt noise of odometry's way and yaw, as multiples of the assumed one.
     """
 
     grid: OccupancyGrid
@@ -39,7 +39,7 @@ class MappedDrive:
 
 
 def map_recording(recording: DriveLog, progress: Callable[[int], None] = lambda _done: None) -> MappedDrive:
-    """Play ``recording`` to the estimator; ``progress`` is called with the number of scans played."""
+    """Return the map of ``recording``; ``progress`` is called with the number of scans played."""
     plate = Description(
         maker="", model="recording", serial="", hardware_version="", software_version="", radius=RADIUS, height=RADIUS
     )

@@ -21,9 +21,9 @@ ECHO_SHARE_MIN = 0.1  # share of echoes below which the scan is ignored
 
 @dataclass(frozen=True, slots=True)
 class ScanPoints:
-    """``ends`` (n, 2) of the rays in base_link (m), ``hit`` 1 where there was an echo, ``points``: the echoes alone.
+    """``ends`` (n, 2) of the rays in base_link (m), ``hit``: 1 for those with an echo, ``points``: the echoes alone.
 
-    Rays without an echo end where their ``clear_range`` does.
+    Rays without an echo end at the scan's ``clear_range``.
     """
 
     ends: NDArray[np.float64]
@@ -32,14 +32,14 @@ class ScanPoints:
     sensor: Point
 
     def in_frame(self, pose: Pose, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """``points`` (n, 2; base_link) as seen from the frame in which base_link is at ``pose``."""
+        """Return ``points`` (n, 2; base_link) in the frame in which base_link is at ``pose``."""
         c, s = np.cos(pose.yaw), np.sin(pose.yaw)
         turned: NDArray[np.float64] = points @ np.array([[c, s], [-s, c]])
         turned += (pose.x, pose.y)
         return turned
 
     def beside(self, pose: Pose, discs: Sequence[tuple[float, float, float]]) -> ScanPoints:
-        """The same without the rays that end in one of ``discs`` (x, y, radius; m), base_link at ``pose`` there."""
+        """Return the scan without the rays that end in ``discs`` (x, y, radius; m), in the frame of ``pose``."""
         if not discs or not len(self.ends):
             return self
         ends, kept = self.in_frame(pose, self.ends), np.ones(len(self.ends), bool)
@@ -51,12 +51,12 @@ class ScanPoints:
         return ScanPoints(ends, hit, np.ascontiguousarray(ends[hit > 0]), self.sensor)
 
     def nearby(self, most: int) -> NDArray[np.float64]:
-        """Return at most so many of the points that a search or a judgement looks at, evenly chosen."""
+        """Return at most ``most`` of the points within NEARBY m, evenly chosen (n, 2; base_link)."""
         near = self.points[np.hypot(self.points[:, 0], self.points[:, 1]) < NEARBY]
         return np.ascontiguousarray(near[:: max(1, -(-len(near) // most))])
 
     def thinned(self, most: int) -> ScanPoints:
-        """The same with at most so many rays, evenly chosen."""
+        """Return the scan with at most ``most`` rays, evenly chosen."""
         step = -(-len(self.ends) // most)
         if step <= 1:
             return self
@@ -76,13 +76,13 @@ class ScanReader:
         self._rays_of: Callable[..., tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.float64]]] | None = None
 
     def load_kernel(self) -> None:
-        """Sort rays by the compiled kernel from now on: the same to the last bit, in a fifth of the time."""
+        """Use the compiled kernel from now on: identical results in a fifth of the time."""
         from roboglot.kernels.occupancy import rays_of
 
         self._rays_of = rays_of
 
     def read(self, scan: LaserScan) -> ScanPoints:
-        """The scan's points, computed once; none if hardly a ray returned."""
+        """Return the scan's points, computed once; empty if hardly a ray has an echo."""
         if self._last is None or self._last[0] is not scan:
             self._last = scan, self._compute(scan)
         return self._last[1]
@@ -123,7 +123,7 @@ class ScanReader:
 
 
 def _deskewed(ends: NDArray[np.float64], velocity: Twist, increment: float) -> NDArray[np.float64]:
-    """``ends`` (n, 2), each in base_link as it was ``increment`` s after the one before, in base_link at the first."""
+    """Return ``ends`` (n, 2), taken ``increment`` s apart, in base_link at the time of the first."""
     seconds = increment * np.arange(len(ends))
     yaw = velocity.yaw * seconds
     c, s = np.cos(yaw), np.sin(yaw)

@@ -1,6 +1,6 @@
 """The estimator behind localization and mapping: matches every scan to the map, then adds it to the map.
 
-Needs the kernels, hence is imported only when they are loaded. Uses nothing but scans and odometry.
+Needs the kernels, so it is imported once they are loaded. Uses scans and odometry only.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # larger corrections are reported as a
 
 
 class Slam:
-    """Listens to the lidar from ``start`` to ``close``."""
+    """Estimator that listens to the lidar until ``close``."""
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot = robot
@@ -108,13 +108,13 @@ class Slam:
         self._timer.cancel()
 
     def _listen(self) -> None:
-        """Notice that no scans come."""
+        """Check for missing scans."""
         clock = self._robot.clock
         self.whereabouts.check_silence(clock.time())
         self._timer = clock.call_later(SILENCE_PERIOD, self._listen)
 
     def placing(self, region: Region | None) -> tuple[Pose, Callable[[], list[Match]]] | None:
-        """Odometry at the newest scan, and what finds the map's (``region``'s) places like it, in any thread."""
+        """Return odometry at the newest scan, and a function, for any thread, that finds its places on the map."""
         if self._newest is None or not self._belief.map.scans:
             return None
         belief, odometry, scan = self._belief, self._newest.odometry, self._belief.reader.read(self._newest.scan)
@@ -129,20 +129,20 @@ class Slam:
 
     @property
     def way(self) -> float:
-        """Metres driven."""
+        """Distance driven, m."""
         return self._way
 
     def settle(self) -> None:
-        """Finish straightening the map, however long that takes."""
+        """Finish straightening the map now."""
         while self._loops.straightening and self._newest is not None:
             self._straighten(self._newest.odometry, self._newest.stamp)
 
     def trajectory(self) -> list[TrajectoryPoint]:
-        """Poses of the scans since the map was begun, corrected as the map is."""
+        """Return the poses of the scans since the map's beginning, with all later corrections."""
         return self._trajectory.points(self._loops.keyframes)
 
     def _jumped(self, event: PoseJumped) -> None:
-        """The next scans show whether a pose that someone gave is right."""
+        """Forget the past of a pose that jumped; let the next scans check one that was given."""
         self._displacement.forget(event.stamp)
         if event.given:
             self._turns.forget()
@@ -156,7 +156,7 @@ class Slam:
         return self._matched_odometry is not None
 
     def believe(self, found: Match, odometry: Pose, means: RecoveryMeans = RecoveryMeans.WHOLE_MAP) -> None:
-        """The robot was found to have been there when odometry said ``odometry``."""
+        """Believe a found pose at the time of ``odometry`` (odom)."""
         self._belief.move_to(found.pose, odometry)
         self._witness.forget()
         self._belief.covariance, self._belief.search = found.covariance, False
@@ -207,7 +207,7 @@ class Slam:
         return self._belief.search or self._belief.lost is not None or not self.whereabouts.sure
 
     def _is_held(self, scan: LaserScan, odometry: Pose) -> bool:
-        """Return whether the wheels turn in vain; the belief stays where it was then."""
+        """Return whether the wheels turn in vain, and keep the belief's place then."""
         belief, last = self._belief, self._matched_odometry or odometry
         before = belief.map_to_odom.compose(last)
         stayed = self._slip.check(scan, odometry, belief.map_to_odom.compose(odometry))
@@ -216,9 +216,9 @@ class Slam:
         return self._slip.slips and belief.localizing
 
     def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, moved: Pose | None, seconds: float) -> None:
-        """Match, judge how well it fits, and move the belief if it may be moved.
+        """Match the scan, judge the fit, and move the belief if localization is enabled.
 
-        Odometry ``moved`` (base_link before) in the ``seconds`` since the last match; None if that says nothing.
+        ``moved``: odometry's step (in the last base_link) in the ``seconds`` since the last match; None if unusable.
         """
         belief = self._belief
         if belief.localizing and moved:
@@ -258,7 +258,7 @@ class Slam:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
 
     def _contested(self, best: Match, scan: ScanPoints, before: Pose, prior: NDArray[np.float64]) -> Match | None:
-        """Return the pose by odometry while things that move around would mislead the match."""
+        """Return the pose by odometry while moving things mislead the match, else None."""
         if self._belief.search or self._belief.in_doubt:  # badly fitting scans alone do not justify consulting it less
             self._witness.forget()
             return None
@@ -268,21 +268,21 @@ class Slam:
         return driven
 
     def _check_displaced(self, before: Pose, best: Match, prior: NDArray[np.float64], stamp: float) -> float | None:
-        """Return how far (m) something other than its wheels moved the robot; None if scans show nothing."""
+        """Return the robot's displacement (m) by anything but its wheels; None: there was none."""
         if self._belief.in_doubt or not _is_sure(best):
             self._displacement.forget(stamp)
             return None
         return self._displacement.check(stamp, before, best.pose, prior, math.hypot(self._step.x, self._step.y))
 
     def _doubt(self, shoved: float, stamp: float) -> None:
-        """Something displaced the robot: look around, and believe nothing until scans confirm it."""
+        """Report a displacement, search around, and doubt the pose until scans confirm it."""
         log.warning("robot %s was displaced by %.2f m", self._robot.id, shoved)
         self._belief.search, self._belief.quality = True, min(self._belief.quality, DISPLACED_QUALITY)
         self.whereabouts.be_displaced(stamp)
         self._robot.events.publish(RobotDisplaced(stamp=stamp, distance=shoved))
 
     def _judge(self, best: Match, scan: ScanPoints, odometry: Pose, stamp: float, usual: float) -> None:
-        """Ask the map whether the scan can have been taken there; look everywhere when it fits worse than ``usual``."""
+        """Judge the pose by the map's support; search everywhere if the scan fits worse than ``usual``."""
         belief = self._belief
         if best.agreement < SURE_QUALITY or best.known < KNOWN_SURE * best.points or self._is_unsure:
             self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
@@ -293,7 +293,7 @@ class Slam:
             self._look_everywhere(scan, odometry, stamp, best.agreement)
 
     def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float, agreement: float) -> None:
-        """Search the whole map for where ``scan`` was taken; a known place is given up only for a much better one."""
+        """Search the whole map for the place of ``scan``; a known place is given up only for a much better one."""
         belief, grid = self._belief, self._belief.map
         self._looked_at, self._looking = stamp, True
 
@@ -316,7 +316,7 @@ class Slam:
         self._search = compute_soon(self._robot.clock, lambda: places(grid, scan, None), then)
 
     def _coarse(self, scan: ScanPoints, before: Pose, stamp: float) -> Pose:
-        """Return the pose to begin the match at: found by a search when odometry may be too far off."""
+        """Return the start pose of the match, by a search if odometry may be too far off."""
         if self._belief.lost is not None and stamp - self._looked_at < LOST_PERIOD:
             return before
         x, y, yaw = (math.sqrt(self._belief.covariance[k, k]) for k in range(3))
@@ -327,7 +327,7 @@ class Slam:
         return search(self._belief.map, scan, before, window)
 
     def _doubted(self, best: Match, scan: ScanPoints, before: Pose, stamp: float) -> Match:
-        """Return ``best``, or a better match found without odometry: wheels slip, robots are pushed."""
+        """Return ``best``, or a better match found without odometry, as wheels slip and robots are pushed."""
         belief = self._belief
         lost = belief.quality < LOST_QUALITY and stamp - self._searched_at >= LOST_PERIOD
         if belief.search or lost:
@@ -351,7 +351,7 @@ class Slam:
         return self.whereabouts.sure and not self._belief.contradicted and self._way >= self._mapped_from and fits
 
     def _straighten(self, odometry: Pose, stamp: float) -> None:
-        """Go on with what a closed loop needs; when it is done, the robot stands elsewhere on a better map."""
+        """Continue straightening after a closed loop; at the end, move the belief to the corrected pose."""
         belief, pose = self._belief, self._belief.map_to_odom.compose(odometry)
         straightened = self._loops.advance(pose)
         if straightened is None:
@@ -365,12 +365,12 @@ class Slam:
 
 
 def _is_covered(ranges: NDArray[np.float32]) -> bool:
-    """True if hardly a ray measured anything."""
+    """Return whether nearly all rays are NaN."""
     if not math.isnan(np.minimum.reduce(ranges, initial=np.inf)):  # no NaN passes this
         return False
     return bool(np.count_nonzero(np.isnan(ranges)) > (1.0 - ECHO_SHARE_MIN) * len(ranges))
 
 
 def _is_sure(best: Match) -> bool:
-    """Return whether an error there is odometry's: otherwise, the match may be wrong."""
+    """Return whether the match is good enough to judge odometry by it."""
     return best.agreement >= TRUSTED and best.known >= KNOWN_SURE * best.points

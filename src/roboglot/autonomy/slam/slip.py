@@ -1,6 +1,6 @@
-"""True if the wheels turn in vain, by two scans: what should come closer or go away stays where it is, and close by.
+"""Detects wheels that turn in vain, by two scans: ranges that should change stay, at an obstacle close by.
 
-Needed where the map does not show it: in a corridor, pressed against something that hides its end.
+Needed where matches cannot detect it: in a corridor, pressed against an obstacle that hides its end.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STEEP = 0.3  # cosine between ray and surface below which a range is ignored
 
 
 class SlipWatch:
-    """Gets every scan with odometry's pose; ``radius`` is the hull's."""
+    """Watch over every scan with odometry's pose; ``radius`` of the hull, m."""
 
     def __init__(self, radius: float) -> None:
         self._radius = radius
@@ -33,7 +33,7 @@ class SlipWatch:
         self.slips = False
 
     def check(self, scan: LaserScan, odometry: Pose, pose: Pose) -> Pose | None:
-        """``pose`` is the belief. When the wheels turn out to slip: where the robot has stayed since an older scan."""
+        """Return the pose of an older scan, where the robot has stayed, when slip begins; else None."""
         before, moved = self._scan, odometry.relative_to(self._odometry)
         if before is None or len(before.ranges) != len(scan.ranges) or abs(moved.yaw) > TURN_MAX:
             self._begin(scan, odometry, pose)
@@ -50,7 +50,7 @@ class SlipWatch:
         self._scan, self._odometry, self._pose = scan, odometry, pose
 
     def _stays(self, before: LaserScan, now: LaserScan, moved: Pose) -> bool:
-        """True if the rays that would change by ``moved`` (base_link) did not."""
+        """Return whether the ranges that ``moved`` (base_link) would change stayed."""
         reach = self._radius + CONTACT + math.hypot(before.mount.x, before.mount.y)
         if not (before.ranges < reach).any():
             return False

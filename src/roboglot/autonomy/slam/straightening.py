@@ -1,6 +1,6 @@
-"""Straightens the keyframes after a loop was closed and paints the map anew, a slice at every scan.
+"""Straightens the keyframes after a closed loop and rebuilds the map, a slice at every scan.
 
-The robot goes on with the old map meanwhile; no slice takes longer than some milliseconds, however large the map.
+The robot uses the old map meanwhile; a slice takes some milliseconds at most, for maps of any size.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Edge = tuple[int, int, Pose, float, float]  # two keyframes, the second in the f
 
 
 class Straightening:
-    """One run: first the poses, then the map, which begins as a copy of ``given``."""
+    """One straightening: first the poses, then the map, which begins as a copy of ``given``, if there is one."""
 
     def __init__(
         self, scans: Sequence[ScanPoints], poses: Sequence[Pose], edges: Sequence[Edge], given: EvidenceGrid | None
@@ -42,7 +42,7 @@ class Straightening:
         self.grid = EvidenceGrid()
 
     def step(self) -> bool:
-        """Do a slice of the work; whether that was the last one."""
+        """Do a slice of the work; return whether it was the last one."""
         if self._painted < 0:
             self._relax()
         elif self._given is not None and self._copied < self._given.evidence.shape[0]:
@@ -73,7 +73,7 @@ class Straightening:
             self.grid = self._given.empty_like()
 
     def _make_room(self) -> None:
-        """Once for all, because growing copies the map."""
+        """Grow the map to its final size at once, as growing copies it."""
         reach = max(float(np.abs(scan.ends).max()) for scan in self._scans) * 1.5
         x, y = self._poses[:, 0], self._poses[:, 1]
         self.grid.make_room(*(float(v) for v in (x.min() - reach, y.min() - reach, x.max() + reach, y.max() + reach)))

@@ -20,7 +20,7 @@ FIELDS = 11  # stamp, keyframe, x, y, yaw, and the covariance's upper triangle
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryPoint:
-    """base_link in map at ``stamp``; ``covariance`` (3, 3) of x, y, yaw; ``keyframe``: whether its scan is kept."""
+    """Pose of base_link in map at ``stamp``; ``covariance`` (3, 3) of x, y, yaw; ``keyframe``: its scan is kept."""
 
     stamp: float
     pose: Pose
@@ -29,7 +29,7 @@ class TrajectoryPoint:
 
 
 class Trajectory:
-    """Takes a step of ``belief`` for every scan that was matched; ``newest``: its stamp (s)."""
+    """Trajectory of ``belief``, a step for every matched scan; ``newest``: stamp of the last one (s)."""
 
     def __init__(self, belief: Belief) -> None:
         self._belief, self._map = belief, belief.map
@@ -37,11 +37,11 @@ class Trajectory:
         self.newest = -math.inf
 
     def clear(self) -> None:
-        """Forget all: another map is used from now on."""
+        """Forget all steps, for another map."""
         self._steps, self.newest = array("d"), -math.inf
 
     def follow(self, stamp: float, odometry: Pose, anchor: tuple[int, Pose] | None, *, drives: bool) -> None:
-        """Add where the belief is, now and then while standing; another map begins another trajectory."""
+        """Add the believed pose, seldom while standing; another map begins another trajectory."""
         belief = self._belief
         if self._map is not belief.map:
             self._map = belief.map
@@ -50,7 +50,7 @@ class Trajectory:
             self.add(stamp, belief.map_to_odom.compose(odometry), belief.covariance, anchor)
 
     def add(self, stamp: float, pose: Pose, covariance: NDArray[np.float64], anchor: tuple[int, Pose] | None) -> None:
-        """``anchor``: number and pose of the keyframe that the step goes with; without one the step stays put."""
+        """Add a step; ``anchor``: number and pose of the keyframe that moves it; None: it stays."""
         self.newest = stamp
         number, origin = anchor or (-1, Pose())
         local = pose.relative_to(origin)
@@ -60,7 +60,7 @@ class Trajectory:
             del self._steps[: len(self._steps) // FIELDS // 2 * FIELDS]
 
     def points(self, keyframes: Sequence[Pose]) -> list[TrajectoryPoint]:
-        """All steps, with the keyframes where they are now."""
+        """Return all steps (map), by the present poses of the keyframes."""
         result, seen = [], set()
         for row in np.frombuffer(self._steps, np.float64).reshape(-1, FIELDS).tolist():
             stamp, number, x, y, yaw, *upper = row

@@ -9,7 +9,7 @@ from roboglot.model.events import ScanTaken
 
 
 class Turns:
-    """Calls ``take`` with every scan: at once in lockstep, else in a turn of the loop, before the next scan comes."""
+    """Calls ``take`` with every scan: at once in lockstep, else in a turn of the loop, before the next scan."""
 
     __slots__ = ("_clock", "_queued", "_take", "_waiting")
 
@@ -19,7 +19,7 @@ class Turns:
         self._queued = False
 
     def hear(self, event: ScanTaken) -> None:
-        """Take it when it is this robot's turn; one that waits is taken now, so none is lost where turns are late."""
+        """Queue a scan for this robot's turn; take a waiting one now, so that late turns lose none."""
         self._catch_up()
         self._waiting = event
         if not self._queued:
@@ -27,11 +27,11 @@ class Turns:
             self._clock.in_turn(self._have_turn)
 
     def forget(self) -> None:
-        """Leave out the scan that waits: the robot has been put elsewhere since it was taken."""
+        """Drop the waiting scan: its place is no longer the robot's."""
         self._waiting = None
 
     def close(self) -> None:
-        """Take no more."""
+        """Drop the waiting scan, as the estimator is being closed."""
         self._waiting = None
 
     def _have_turn(self) -> None:

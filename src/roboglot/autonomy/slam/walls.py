@@ -1,4 +1,4 @@
-"""Echoes of what surely stands: straight surfaces wider than any robot. All else may drive along."""
+"""Echoes of things that surely stand still: straight surfaces wider than any robot. All others may move."""
 
 from __future__ import annotations
 

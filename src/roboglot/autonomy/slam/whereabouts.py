@@ -1,4 +1,4 @@
-"""True if the robot knows its place in the map: notices when it no longer does, says why, and when it does again."""
+"""Watches whether the pose in the map is known: reports its loss with a reason, and its recovery."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ INTERVAL_GAIN = 0.1
 
 
 class Whereabouts:
-    """Hears what the map says of every matched scan; keeps ``belief.lost``."""
+    """Watch over the map's support for every matched scan; sets ``belief.lost``."""
 
     def __init__(self, belief: Belief, events: EventStream) -> None:
         self._belief, self._events = belief, events
@@ -37,7 +37,7 @@ class Whereabouts:
         self.sure = True  # whether scans may be added to the map
 
     def hear(self, stamp: float) -> bool:
-        """Note a scan; return whether the lidar was silent for so long before it that the robot may have been moved."""
+        """Note a scan; return whether the silence before it was long enough to move the robot unnoticed."""
         gap, self._heard_at = stamp - self._heard_at, stamp
         if not math.isfinite(gap) or gap <= 0.0:
             return False
@@ -48,7 +48,7 @@ class Whereabouts:
         return blind
 
     def check_silence(self, now: float) -> None:
-        """Report that the lidar has been silent for too long by now."""
+        """Report a loss of the pose if the lidar has been silent for too long."""
         if self._belief.localizing and self._belief.map.scans and self._is_blind(now - self._heard_at):
             self.lose(LostReason.NO_SCANS, now)
 
@@ -56,7 +56,7 @@ class Whereabouts:
         return math.isfinite(gap) and gap > max(BLIND_SECONDS, BLIND_INTERVALS * self._interval)
 
     def judge(self, support: Support, stamp: float) -> None:
-        """The map said this of a scan at the believed pose."""
+        """Update doubt and confirmation by the map's support for a scan at the believed pose."""
         judged = support.fitting + support.hidden + support.floating
         denied = support.hidden >= DENIED_HIDDEN * support.points or (
             support.agreement < DENIED_AGREEMENT and judged >= DENIED_SHARE * support.points
@@ -84,14 +84,14 @@ class Whereabouts:
             self.sure = True
 
     def lose(self, reason: LostReason, stamp: float) -> None:
-        """The place is not known; reported once until it is found."""
+        """Note that the pose is lost; publish it once until it is found."""
         first, self._belief.lost, self.sure = self._belief.lost is None, reason, False
         if first:
             self._lost_at, self._good = stamp, 0
             self._events.publish(LocalizationLost(stamp=stamp, reason=reason, quality=self._belief.quality))
 
     def find(self, means: RecoveryMeans, stamp: float) -> None:
-        """The place is known; scans are added to the map when some more have confirmed it."""
+        """Note that the pose is known; scans are added to the map after further confirmations."""
         belief = self._belief
         self._doubts, self._doubted_at, belief.confirmed = 0, math.inf, True
         if belief.lost is None:
@@ -101,14 +101,14 @@ class Whereabouts:
         self._events.publish(LocalizationRecovered(stamp=stamp, means=means, pose=belief.pose, seconds=seconds))
 
     def be_given(self, stamp: float) -> None:
-        """Take a pose from a client: the map has to confirm it before anything is added there."""
+        """Note a pose given by a client, which scans have to confirm before any is added to the map."""
         self.find(RecoveryMeans.GIVEN, stamp)
         self.be_displaced(stamp)
 
     def be_displaced(self, stamp: float) -> None:
-        """Something moved the robot: the map has to confirm where it is now."""
+        """Note a displacement: scans have to confirm the pose."""
         self._given_at, self._good, self.sure, self._belief.confirmed = stamp, 0, False, False
 
     def begin(self) -> None:
-        """A new map: its first scan defines the place."""
+        """Begin a new map, whose first scan defines the pose."""
         self._doubts, self._doubted_at, self.sure, self._belief.confirmed = 0, math.inf, True, True

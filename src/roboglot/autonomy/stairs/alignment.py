@@ -1,6 +1,6 @@
-"""Standing square before stairs: to a place before the first step, whose edge is looked at again and again.
+"""Alignment with stairs: drives to a place straight before the first step, while measuring its edge repeatedly.
 
-Odometry carries it from one look to the next; neither a map nor the lidar's pose is needed.
+Odometry bridges the measurements; neither a map nor a localized pose is needed.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class SeenStairAlignment(StairAlignment):
 
 
 class _Approach:
-    """One alignment under way; ``_goal`` is where base_link is to stand, ``_seen_at`` when the edge was seen last."""
+    """One alignment under way; ``_goal``: base_link's goal (odom), ``_seen_at``: time of the last sighting, s."""
 
     def __init__(self, robot: Robot, sight: StairSight, direction: StairDirection, action: Action) -> None:
         self._robot, self._sight, self._direction, self._action = robot, sight, direction, action
@@ -66,7 +66,7 @@ class _Approach:
         self._seen_at = -math.inf
 
     async def run(self) -> None:
-        """Look, go there, look again. Raises NotFound, Expired."""
+        """Measure the edge, drive, and repeat until aligned. Raises NotFound, Expired."""
         self._action.report(AlignmentStage.LOOKING)
         self._sight.forget()
         await self._look_standing()
@@ -90,7 +90,7 @@ class _Approach:
             await self._clock.sleep(PERIOD)
 
     async def _go(self, deadline: float) -> None:
-        """Drive until it is close enough to brake."""
+        """Drive until close enough to brake. Raises NotFound, Expired."""
         while True:
             held_at = self._clock.time()
             if await self._action.hold(self._brake):
@@ -115,7 +115,7 @@ class _Approach:
             await self._clock.sleep(PERIOD)
 
     def _look(self) -> bool:
-        """True if the eyes had something new; if it shows the edge, the goal is set anew."""
+        """Return whether there was a new reading; if it shows the edge, update the goal."""
         if not self._sight.look():
             return False
         if (edge := self._sight.find(self._direction)) is not None:
@@ -124,14 +124,14 @@ class _Approach:
         return True
 
     def _place_before(self, edge: StepEdge) -> Pose:
-        """Return the pose to stand at, base_link: straight before the edge, amid as much of it as is seen."""
+        """Return the goal in base_link: straight before the edge, centred on its visible part."""
         aside = (min(edge.left, SIDE) - min(edge.right, SIDE)) / 2
         if abs(edge.foot.yaw) > SQUARE or abs(aside) < ASIDE:
             aside = 0.0
         return edge.foot.compose(Pose(-self._robot.description.radius - BEFORE, aside))
 
     def _left(self) -> Pose:
-        """Return the rest of the way, base_link."""
+        """Return the goal in base_link (m, rad)."""
         left = self._goal.relative_to(self._odometry.reading.pose)
         return Pose(left.x, left.y, wrap_angle(left.yaw))
 

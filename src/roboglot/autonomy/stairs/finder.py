@@ -1,7 +1,7 @@
 """The edge of the first step, from points on the ground ahead. Pure geometry in base_link, m; knows no robot.
 
-Upwards it is a riser: low, straight, with nothing as high as a wall right behind it. Downwards it is where the floor
-ends: a line between what was seen of the floor and where rays passed through its plane.
+Upwards, it is a riser: low, straight, without a wall right behind it. Downwards, it is the end of the floor: a line
+between points of the floor and points where rays passed through its plane.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class StepEdge:
 
 
 def find_riser(points: Points, walls: Points | None) -> StepEdge | None:
-    """Of points (n x 3); ``walls`` (n x 2): what stands higher than any step, None if nothing looks there."""
+    """Return the riser in points (n x 3), or None; ``walls`` (n x 2): points above any step, None: not measured."""
     x, y, z = points.T
     bearing = np.arctan2(y, x)
     ahead = (x > 0.0) & (x < REACH) & (np.abs(bearing) < WIDE)
@@ -77,7 +77,7 @@ def find_riser(points: Points, walls: Points | None) -> StepEdge | None:
 
 
 def find_drop(floor: Points, beyond: Points) -> StepEdge | None:
-    """Between points (n x 2) of the floor and those (m x 2) where there is none."""
+    """Return the edge between points (n x 2) of the floor and those (m x 2) ``beyond`` it, or None."""
     line = _parting(floor, beyond)
     if line is None:  # the points may be a sheer side that forms a corner with the edge
         line = _parting(*(points[np.abs(points[:, 1]) < CORRIDOR] for points in (floor, beyond)))
@@ -90,7 +90,7 @@ def find_drop(floor: Points, beyond: Points) -> StepEdge | None:
 
 
 def _nearest_in_slices(points: Points) -> Points:
-    """The nearest point of each direction."""
+    """Return the nearest point in each direction."""
     away = np.hypot(points[:, 0], points[:, 1])
     order = np.argsort(away)
     slices = np.floor(np.arctan2(points[order, 1], points[order, 0]) / SLICE)
@@ -100,7 +100,7 @@ def _nearest_in_slices(points: Points) -> Points:
 
 
 def _line_through(points: Points) -> Pose | None:
-    """Return the line that most of them lie on."""
+    """Return the line through most of the points; None: there is none."""
     kept = points
     for _ in range(4):
         if len(kept) < 4:
@@ -113,7 +113,7 @@ def _line_through(points: Points) -> Pose | None:
 
 
 def _fit(points: Points) -> Pose:
-    """The line of least squares, as the foot of its perpendicular from the origin."""
+    """Return the line of least squares, as the foot of its perpendicular from the origin."""
     middle = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
     normal = axes[-1]
@@ -131,19 +131,19 @@ def _across(points: Points, line: Pose) -> tuple[Points, Points]:
 
 
 def _blocked(taller: Points, line: Pose) -> bool:
-    """True if something taller than a step leaves no room to stand behind the riser."""
+    """True if an obstacle taller than a step leaves no tread behind the riser."""
     behind, aside = _across(taller, line)
     return bool(((np.abs(aside) < CORRIDOR) & (np.abs(behind) < TREAD_MIN)).any())
 
 
 def _tread_seen(u: Points, v: Points, z: Points) -> bool:
-    """True if there are points of something level right behind the riser."""
+    """True if there are points of a level tread right behind the riser."""
     tread = z[(u > 2 * FACE) & (u < TREAD_MIN) & (np.abs(v) < CORRIDOR)]
     return len(tread) >= FACE_POINTS_MIN and float(np.std(tread)) < FLOOR
 
 
 def _parting(floor: Points, beyond: Points) -> Pose | None:
-    """The line between both, if there is one."""
+    """Return the line that separates both sets of points; None: there is none."""
     if len(floor) < FLOOR_POINTS_MIN or len(beyond) < PASSES_MIN:
         return None
     wrong = _wrong_sides(floor, beyond)

@@ -1,4 +1,4 @@
-"""View of the ground ahead, gathered from several looks of the robot's eyes while it moves. Knows no stairs."""
+"""View of the ground ahead, from several readings of the time-of-flight sensors in motion. Knows no stairs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class _Look:
-    """From ``pose`` (odom): ``points`` (n x 3), and where rays passed through the floor's plane (m x 2), base_link."""
+    """Reading at ``pose`` (odom): ``points`` (n x 3), and rays' crossings of the floor's plane (m x 2), base_link."""
 
     pose: Pose
     points: Points
@@ -43,7 +43,7 @@ class _Look:
 
 
 class StairSight:
-    """Looks when asked, at most as often as the eyes measure."""
+    """View that is updated by ``look``, at most at the sensors' rate."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot, self._scans = robot, ScanReader()
@@ -51,12 +51,12 @@ class StairSight:
         self._stamp = -math.inf
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Forget all readings."""
         self._looks.clear()
         self._stamp = -math.inf
 
     def look(self) -> bool:
-        """Add what the eyes see now; False if they have measured nothing new."""
+        """Add the sensors' present readings; return False if there is nothing new."""
         seen = _through_zones(self._robot)
         if seen is None or seen[0] <= self._stamp:
             return False
@@ -65,7 +65,7 @@ class StairSight:
         return True
 
     def hints(self, direction: StairDirection) -> bool:
-        """True if a single look shows anything that may be a step: a quick answer, right as far as the eyes reach."""
+        """Return whether the present reading alone shows a possible step: quick, within the sensors' range."""
         seen = _through_zones(self._robot)
         if seen is None:
             return False
@@ -75,7 +75,7 @@ class StairSight:
         return int(((points[:, 2] > FLOOR) & (points[:, 2] < STEP_MAX)).sum()) >= HINTS
 
     def find(self, direction: StairDirection) -> StepEdge | None:
-        """The edge of the first step, by all looks, from where the robot stands now."""
+        """Return the edge of the first step by all readings, in the present base_link; None: there is none."""
         if not self._looks:
             return None
         here = self._robot[Odometry].reading.pose
@@ -115,7 +115,7 @@ def _at_floor(rays: Points, ways: Points, eye: Vector3) -> Points:
 
 
 def _moved(points: Points, pose: Pose) -> Points:
-    """Points given in ``pose``, in the frame that it is given in; heights stay."""
+    """Return ``points`` of the frame at ``pose`` in the frame of ``pose`` itself; heights stay."""
     c, s = math.cos(pose.yaw), math.sin(pose.yaw)
     moved = points.copy()
     moved[:, 0] = c * points[:, 0] - s * points[:, 1] + pose.x

@@ -1,1 +1,1 @@
-"""Robots among robots: what moves around, who goes first, and where to let others pass."""
+"""Robots among robots: moving things around, right of way, and places to let others pass."""

@@ -1,4 +1,4 @@
-"""Announcements by radio: the robot's pose and next metres to others, and theirs to it."""
+"""Announcements by radio: the robot's pose and next metres, and those of others."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ AROUND = 0.1  # m around an announced hull in which echoes are its own
 
 
 class Announcer:
-    """Announces ``way`` (n, 2; map, m) with the robot's place as long as it lives; silent without a radio or a map."""
+    """Announces the robot's pose and ``way`` (n, 2; map, m) until ``close``; silent without a radio or a map."""
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
@@ -30,19 +30,19 @@ class Announcer:
         self._stop = robot.events.listen(ScanTaken, self._announce)
 
     def close(self) -> None:
-        """Fall silent."""
+        """Stop announcing."""
         self._stop()
         if TrafficRadio in self._robot:
             self._robot[TrafficRadio].announce(None)
 
     @property
     def frame(self) -> str:
-        """Names the map that announcements are about; "" while there are none."""
+        """Name of the announcements' map; "" while the robot announces nothing."""
         speaks = TrafficRadio in self._robot and not self._belief.in_doubt
         return self._belief.frame if speaks else ""
 
     def heard(self, stamp: float) -> list[Announcement]:
-        """Return others' announcements that are new, near, and of the same map."""
+        """Return others' announcements that are recent, near, and on the same map."""
         frame = self.frame
         if not frame:
             return []

@@ -1,4 +1,4 @@
-"""Things on a map that may be gone: they stand alone, in it or in what scans added to a loaded one.
+"""Things on a map that may be gone: they stand alone, on the map or among the cells that scans added to a loaded one.
 
 Needs the kernels.
 """
@@ -20,9 +20,9 @@ GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map s
 
 
 def without_doubtful(grid: EvidenceGrid) -> NDArray[np.int16]:
-    """A copy of the map's evidence that is free where something stands alone that may go away.
+    """Return a copy of the map's evidence with free cells in place of single things that may go away.
 
-    Who stood in a door is no part of its wall: the map that was given had floor there.
+    A person mapped in a door is not part of its wall, as the loaded map had floor there.
     """
     shown: NDArray[np.int16] = without_things(grid.evidence, THING_CELLS)
     if grid.given is not None:
@@ -32,7 +32,7 @@ def without_doubtful(grid: EvidenceGrid) -> NDArray[np.int16]:
 
 
 def without_gone(evidence: NDArray[np.int16], corner: Point, gone: NDArray[np.float64]) -> NDArray[np.int16]:
-    """A copy in which nothing stands around ``gone`` (n, 2; map, m) any more."""
+    """Return a copy with free cells in place of obstacles around ``gone`` (n, 2; map, m)."""
     kept = evidence.copy()
     reach = math.ceil(GONE_NEAR / RESOLUTION)
     for x, y in ((gone - (corner.x, corner.y)) / RESOLUTION).tolist():

@@ -1,4 +1,4 @@
-"""Moving aside for robots that go first or stand face to face, and waiting until they have passed."""
+"""Moving aside for robots with right of way or face to face, and waiting until they have passed."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Points = NDArray[np.float64]
 
 
 class Courtesy:
-    """Courtesy of one drive: knows when to give way, and does."""
+    """Courtesy of one drive: decides when to give way, and does so."""
 
     def __init__(self, course: Course, lookout: Lookout, action: Action) -> None:
         self._course, self._lookout, self._action = course, lookout, action
@@ -46,14 +46,14 @@ class Courtesy:
         self._faced = self._asides = 0
 
     def is_due(self, follower: Follower) -> bool:
-        """True if the robot should go aside now; ask at every step."""
+        """Return whether to move aside now; to be called at every step."""
         traffic = self._traffic
         stands = follower.speed < STANDS and follower.stop_at - follower.along < 0.4
         ruled = stands and traffic.meeting is not None and traffic.meeting.stands_in_it
         return self._is_due(ruled, stands and self._lookout.blocked and traffic.is_faced(self._course.belief.pose))
 
     def is_due_without_route(self) -> bool:
-        """Return whether to give way although no route is found: the other robots may find none because of this one."""
+        """Return whether to give way without a route of its own: this robot may block the others' routes."""
         pose, traffic = self._course.belief.pose, self._traffic
         return self._is_due(traffic.is_in_the_way(pose), traffic.is_faced(pose))
 
@@ -70,7 +70,7 @@ class Courtesy:
         return now - self._faced_since > FACED_AFTER + FACED_MORE * chance(self._robot.id, self._faced)
 
     async def give_way(self, follower: Follower) -> None:
-        """Go aside, and return when the way is free, or after a while."""
+        """Move aside, and wait until the way is free, or for a while."""
         carrot, beyond = follower.carrot()
         path = follower.route.ahead(self._course.belief.pose, carrot, beyond, OLD_WAY)
         ruled = self._ruled_since < math.inf
@@ -87,7 +87,7 @@ class Courtesy:
             self._lookout.follower = follower
 
     async def go_aside(self, top: float) -> None:
-        """Leave the others' ways at up to ``top`` m/s, if there is room beside them, and stand."""
+        """Leave the others' ways at up to ``top`` m/s, if there is room, and stop."""
         pose, traffic = self._course.belief.pose, self._traffic
         ruled = self._ruled_since < math.inf
         self._asides += 1
@@ -117,7 +117,7 @@ class Courtesy:
             return None
 
     async def _go(self, follower: Follower) -> None:
-        """Drive there, as long as it gets on."""
+        """Drive along the route, as long as there is progress."""
         belief, base = self._course.belief, self._robot[Base]
         self._lookout.follower = follower
         begun = moved = self._clock.time()
@@ -136,7 +136,7 @@ class Courtesy:
             await self._clock.sleep(PERIOD)
 
     async def _wait(self, path: Points, least: float, most: float, ruled: bool) -> None:
-        """Wait until no other wants to come along ``path``."""
+        """Wait ``least`` to ``most`` s until no other robot is about to use ``path``."""
         traffic, begun = self._traffic, self._clock.time()
         free_since = begun
         while True:
@@ -151,6 +151,6 @@ class Courtesy:
 
 
 def chance(name: str, times: int) -> float:
-    """From 0 to 1, by a robot's name and how often it was asked: not the same for two that stand face to face."""
+    """Return a number from 0 to 1 by a robot's name and a count, different for robots face to face."""
     digest = hashlib.blake2b(f"{name} {times}".encode(), digest_size=4).digest()
     return int.from_bytes(digest, "big") / 2**32

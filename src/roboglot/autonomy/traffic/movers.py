@@ -1,4 +1,4 @@
-"""Moving things around the robot, by its own lidar: echoes that the map does not explain, tracked over scans.
+"""Moving things around the robot, by its lidar: echoes that the map does not explain, tracked over scans.
 
 Knows no robot and no radio; needs the kernels. All positions are in map, m.
 """
@@ -34,7 +34,7 @@ Points = NDArray[np.float64]
 
 @dataclass(slots=True)
 class Mover:
-    """Something that stands or moves: ``vx`` and ``vy`` in m/s, 0 for what hardly moves; ``radius`` in m."""
+    """A thing that stands or moves: ``vx`` and ``vy`` in m/s, 0 if it hardly moves; ``radius`` in m."""
 
     x: float
     y: float
@@ -48,12 +48,12 @@ class Mover:
 
     @property
     def point(self) -> Point:
-        """Middle of the mover."""
+        """Middle of the mover in map, m."""
         return Point(self.x, self.y)
 
     @property
     def speed(self) -> float:
-        """m/s."""
+        """Speed, m/s."""
         return float(np.hypot(self.vx, self.vy)) if self.vx or self.vy else 0.0
 
     def take(self, x: float, y: float, stamp: float) -> None:
@@ -75,13 +75,13 @@ class Mover:
 
 
 class MoverTracker:
-    """Give it every scan's echoes."""
+    """Tracker of movers over all scans."""
 
     def __init__(self) -> None:
         self.movers = list[Mover]()
 
     def observe(self, echoes: Points, grid: EvidenceGrid, pose: Pose, stamp: float) -> Sequence[Mover]:
-        """All that stands or moves around; ``echoes`` (n, 2) in the order of the scan."""
+        """Return the things around that are not on the map; ``echoes`` (n, 2; map) in the order of the scan."""
         self.movers = [mover for mover in self.movers if stamp - mover.stamp <= FORGOTTEN]
         free = list(self.movers)
         corner = grid.corner
@@ -100,7 +100,7 @@ class MoverTracker:
 
 
 def _expected(movers: Sequence[Mover], x: float, y: float, stamp: float) -> Mover | None:
-    """Return the mover that is expected to be here."""
+    """Return the mover whose predicted place is nearest to (x, y); None: none is near."""
     best, found = SAME, None
     for mover in movers:
         seconds = stamp - mover.stamp
@@ -111,7 +111,7 @@ def _expected(movers: Sequence[Mover], x: float, y: float, stamp: float) -> Move
 
 
 def _things(echoes: Points, pose: Pose) -> list[tuple[float, float]]:
-    """The middles of what hangs together."""
+    """Return the middles of clusters of echoes."""
     if len(echoes) < ECHOES_MIN:
         return []
     gaps = np.hypot(*(echoes - np.concatenate((echoes[-1:], echoes[:-1]))).T) > LINK

@@ -1,4 +1,4 @@
-"""Narrow places of the map, in which two robots cannot pass each other: doors, corridors, gaps. Needs the kernels."""
+"""Narrow places of the map, where two robots cannot pass each other: doors, corridors, gaps. Needs the kernels."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ AROUND = 2 * math.ceil(HALF / RESOLUTION) + 4  # cells around a piece that count
 
 
 def narrow(evidence: NDArray[np.int16]) -> NDArray[np.bool_]:
-    """The free cells in which no disc as wide as two robots fits."""
+    """Return the mask of free cells where no disc as wide as two robots fits."""
     reach = HALF / RESOLUTION
     wide = distances((evidence > 0).astype(np.uint8), reach + 1.0) >= reach
     found: NDArray[np.bool_] = (distances(wide.astype(np.uint8), reach + 2.0) > reach + 1.0) & (evidence < 0)
@@ -28,7 +28,7 @@ def narrow(evidence: NDArray[np.int16]) -> NDArray[np.bool_]:
 
 
 class NarrowPlaces:
-    """Finds them in the map around the robot as it was a moment ago, piece by piece."""
+    """Finder of narrow places in a recent copy of the map around the robot, piece by piece."""
 
     def __init__(self) -> None:
         self._looked_at, self._around, self._grid = -math.inf, Point(), EvidenceGrid()
@@ -38,7 +38,7 @@ class NarrowPlaces:
     def at(self, grid: EvidenceGrid, points: NDArray[np.float64], now: float) -> NDArray[np.bool_]:
         """Return which of ``points`` (n, 2; map; the first is the robot's) lie in a narrow place.
 
-        No disc as wide as two robots fits there into the free floor.
+        No disc as wide as two robots fits into the free floor there.
         """
         here = Point(float(points[0, 0]), float(points[0, 1]))
         if grid is not self._grid or now - self._looked_at > KEPT or here.distance_to(self._around) > MOVED:
@@ -55,7 +55,7 @@ class NarrowPlaces:
         return found
 
     def _look(self, grid: EvidenceGrid, here: Point) -> None:
-        """Take a copy of the map."""
+        """Copy the map around ``here``."""
         rows, columns = GridFrame(grid.corner, grid.evidence.shape).around((here,), REACH)
         self._evidence = grid.evidence[rows, columns].copy()
         height, width = self._evidence.shape
@@ -64,7 +64,7 @@ class NarrowPlaces:
         self._first = (grid.first_column + columns.start, grid.first_row + rows.start)
 
     def _examine(self, down: int, along: int) -> None:
-        """Look at one piece, and as far around it as matters there."""
+        """Examine one piece, with the cells around it that matter."""
         self._known[down, along] = True
         row, column = down * TILE, along * TILE
         top, left = max(0, row - AROUND), max(0, column - AROUND)

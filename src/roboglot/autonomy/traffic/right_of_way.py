@@ -1,7 +1,6 @@
-"""Right of way where robots meet: by their announcements, if they use the same map; else by what the lidar sees.
+"""Right of way where robots meet: by their announcements on a common map, else by the lidar.
 
-A robot inside a narrow place goes first, then one of higher priority, then the name decides. All positions are in map,
-m.
+A robot inside a narrow place goes first, then one of higher priority, then by name. All positions are in map, m.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """Next metres of another robot: ``points`` (n, 2) every STEP or so, from where it is; ``radius`` of its hull."""
+    """Next metres of another robot: ``points`` (n, 2) about STEP apart, from its place; ``radius`` of its hull."""
 
     points: Points
     speed: float
@@ -50,23 +49,23 @@ class Way:
 
     @property
     def seconds(self) -> Points:
-        """Times from now at which it comes to each point, s."""
+        """Times from now until the robot is at each point, s."""
         steps = np.hypot(*np.diff(self.points, axis=0, prepend=self.points[:1]).T)
         times: Points = np.cumsum(steps) / max(self.speed, SLOW)
         return times
 
     def distances(self, path: Points) -> Points:
-        """Metres between each point of ``path`` and each of its own."""
+        """Return the distances (m) between all points of ``path`` and all points of this way."""
         away: Points = np.hypot(*(path[:, None] - self.points[None, :]).transpose(2, 0, 1))
         return away
 
     def is_within(self, reach: float, pose: Pose) -> bool:
-        """True if it is now within ``reach`` m of ``pose``."""
+        """True if the robot is now within ``reach`` m of ``pose``."""
         x, y = self.points[0].tolist()
         return math.hypot(x - pose.x, y - pose.y) < reach
 
     def stopping(self) -> Points:
-        """The points that it cannot help coming to."""
+        """Return the points within its stopping distance."""
         reach = self.speed * REACTION + self.speed**2 / (2.0 * DECELERATION)
         steps = np.zeros(len(self.points))
         ahead = self.points[1:] - self.points[:-1]
@@ -76,7 +75,7 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """The first place of a path that is not to be driven to before ``way`` is free: ``along`` m from its begin."""
+    """Conflict of a path with ``way``: the robot must wait before ``along`` m until the other has passed."""
 
     along: float
     way: Way
@@ -89,21 +88,21 @@ def rank(announcement: Announcement) -> tuple[bool, int, str]:
 
 
 def announced_way(other: Announcement, mine: Announcement, *, lively: bool = True) -> Way:
-    """The way that a robot announced."""
+    """Return the way that another robot announced."""
     points = [(other.pose.x, other.pose.y), *((point.x, point.y) for point in other.way)]
     outranks = rank(other) < rank(mine)
     return Way(np.array(points), other.speed, other.radius, outranks, other.robot, lively)
 
 
 def expected_way(mover: Mover, *, lively: bool = True) -> Way:
-    """Straight on."""
+    """Return a mover's way, straight on."""
     speed = mover.speed
     points = straight_on(mover, speed * SIGHT + STEP if speed > 0.0 else STEP)
     return Way(points, speed, mover.radius, outranks=False, lively=lively)
 
 
 def straight_on(mover: Mover, far: float) -> Points:
-    """Points up to ``far`` m ahead of where it is, the way that it moved last."""
+    """Return points up to ``far`` m ahead of a mover, in the direction of its last motion."""
     if far <= STEP:
         return np.array([(mover.x, mover.y)])
     away = np.arange(0.0, far, STEP)
@@ -114,14 +113,14 @@ def straight_on(mover: Mover, far: float) -> Points:
 
 
 def through_narrow(mover: Mover, points: Points, narrow: NDArray[np.bool_]) -> Way:
-    """The way of one that is where two cannot pass: out of there, before others come in. ``points`` lie straight on."""
+    """Return the way of a mover in a narrow place: along ``points`` (straight on) out of it, with right of way."""
     wide = np.flatnonzero(~narrow)
     end = (int(wide[0]) if len(wide) else len(points)) + OUT
     return Way(points[:end], mover.speed, mover.radius, outranks=True, lively=True)
 
 
 def shifted(way: Way) -> Points:
-    """Return the way's points moved to its right, so that others plan to pass on the other side."""
+    """Return the way's points shifted to its right, so that plans pass on the other side."""
     if len(way.points) < 2:
         return way.points
     ahead = way.points[-1] - way.points[0]
@@ -131,7 +130,7 @@ def shifted(way: Way) -> Points:
 
 
 def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> Iterator[Meeting]:
-    """Yield the meetings with others if the hull went on along ``path`` (dense) at ``speed`` m/s."""
+    """Yield the meetings with others if the hull continues along ``path`` (dense) at ``speed`` m/s."""
     mine = path[:: round(STEP / SPACING)]
     if len(mine) < 2:
         return
@@ -157,7 +156,7 @@ def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> 
 
 
 def _directions(points: Points) -> Points:
-    """Unit vectors along a way."""
+    """Return unit vectors along a way (n, 2)."""
     ahead = np.diff(points, axis=0, append=points[-1:])
     ahead[-1] = ahead[-2]
     length = np.hypot(*ahead.T)
@@ -166,7 +165,7 @@ def _directions(points: Points) -> Points:
 
 
 def free_of_movers(path: Points, pose: Pose, radius: float, ways: Sequence[Way]) -> float:
-    """Metres along ``path`` that the hull can go and still stand clear of whatever brakes now; inf: all."""
+    """Return the distance along ``path`` that stays clear of others that brake now, m; inf: all of it."""
     free = math.inf
     for way in ways:
         if len(way.points) < 2:

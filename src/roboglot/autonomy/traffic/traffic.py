@@ -1,4 +1,4 @@
-"""One robot among others: sees and hears where they go, tells them where it goes, and knows where it has to wait."""
+"""One robot among others: tracks their motion and announcements, announces its own way, and decides where to wait."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ Points = NDArray[np.float64]
 
 
 class Traffic:
-    """Announces where the robot stands as long as it lives; the rest is asked by drives."""
+    """Traffic around one robot, which announces its pose until ``close``; drives ask for the rest."""
 
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
@@ -65,7 +65,7 @@ class Traffic:
         self.giving_way = False  # the robot has to leave: no rule holds it up
 
     def close(self) -> None:
-        """Fall silent."""
+        """Stop announcing."""
         self._announcer.close()
 
     # -- others --------------------------------------------------------------------------------------------------------
@@ -89,19 +89,19 @@ class Traffic:
         self._ways += [self._expected(mover, pose, stamp, inside=inside) for mover in movers]
 
     def _is_inside(self, pose: Pose, heard: list[Announcement], movers: list[Mover], stamp: float) -> bool:
-        """True if two cannot pass where it is, and there are others."""
+        """True if the robot is in a narrow place, and there are others."""
         if not heard and not any(stamp - mover.moved_at <= LIVELY for mover in movers):
             return False
         return bool(self._narrow_at(np.array([(pose.x, pose.y)]))[0])
 
     def _goes(self, other: Announcement) -> bool:
-        """True if it announces a way, or did so a moment ago."""
+        """True if another robot announces a way, or did so a moment ago."""
         if other.way:
             self._went[other.robot] = other.stamp
         return other.stamp - self._went.get(other.robot, -math.inf) <= LIVELY
 
     def _expected(self, mover: Mover, pose: Pose, stamp: float, *, inside: bool) -> Way:
-        """Route of a robot that announces none: it goes first if it is in a narrow place and this robot is not."""
+        """Return the way of a robot that announces none: it goes first if only it is in a narrow place."""
         stood = stamp - mover.moved_at
         if not inside and stood <= STOPPED:
             points = straight_on(mover, THROUGH)
@@ -119,24 +119,24 @@ class Traffic:
 
     @property
     def moving(self) -> list[Point]:
-        """Return the current places of robots that have a goal."""
+        """Current places of moving robots and things, and of those with a route."""
         return [Point(*way.points[0].tolist()) for way in self._ways if len(way.points) >= 2]
 
     def far(self, pose: Pose) -> list[Point]:
-        """Places of those that will be elsewhere before the robot comes there."""
+        """Return the places of others that will have left before the robot gets there."""
         return [Point(*way.points[0].tolist()) for way in self._ways if way.lively and not way.is_within(FAR, pose)]
 
     def is_closed_by_others(self, place: Point) -> bool:
-        """True if one that is on its way somewhere stands there, and will leave."""
+        """True if another robot that is under way stands there, and will leave."""
         here = Pose(place.x, place.y)
         return any(way.lively and way.is_within(IN_IT, here) for way in self._ways)
 
     def is_among_others(self, pose: Pose) -> bool:
-        """True if robots, or other things that move, are near."""
+        """True if robots or other moving things are near."""
         return any((way.name or way.speed > 0.0) and way.is_within(AROUND, pose) for way in self._ways)
 
     def free(self, path: Points, pose: Pose, speed: float, radius: float) -> float:
-        """Metres along ``path`` (dense) that are free of what moves, and of what goes first."""
+        """Return the distance along ``path`` (dense) free of movers and of others' right of way, m; inf: all."""
         if not self._ways:
             self.meeting, self.meets = None, False
             return math.inf
@@ -150,7 +150,7 @@ class Traffic:
         return free
 
     def _before_narrow(self, path: Points, along: float) -> float:
-        """Return where to wait for a meeting ``along`` metres ahead: outside of narrow places."""
+        """Return the distance to the waiting point for a meeting ``along`` m ahead, outside of narrow places, m."""
         narrow = self._narrow_at(path)
         last = min(int(along / SPACING), len(narrow) - 1)
         if narrow[0] or not narrow[last]:
@@ -166,7 +166,7 @@ class Traffic:
         return self._narrow.at(self._belief.map, path, self._robot.clock.time())
 
     def shunned(self) -> list[tuple[Points, float]]:
-        """Routes to avoid, with the metres around them: of robots that go first or announce nothing."""
+        """Return ways to avoid, with their distances (m): of robots with right of way or without announcements."""
         mine = self._robot.description.radius
         return [
             (way.points if way.outranks else shifted(way), mine + way.radius + CLEAR)
@@ -175,12 +175,12 @@ class Traffic:
         ]
 
     def to_leave(self) -> list[tuple[Points, float]]:
-        """Routes that a robot giving way must leave clear, with the metres."""
+        """Return the ways that a robot giving way must leave clear, with their distances (m)."""
         mine = self._robot.description.radius
         return [(way.points, mine + way.radius + 2 * CLEAR) for way in self._ways if way.outranks or not way.name]
 
     def is_in_the_way(self, pose: Pose) -> bool:
-        """True if one that goes first wants to where the robot stands."""
+        """True if the robot stands in the way of another with right of way."""
         here, mine = np.array([(pose.x, pose.y)]), self._robot.description.radius + CLEAR
         return any(
             way.outranks and len(way.points) >= 2 and bool((way.distances(here) < mine + way.radius).any())
@@ -188,18 +188,18 @@ class Traffic:
         )
 
     def is_faced(self, pose: Pose) -> bool:
-        """True if what stands close may be another robot, or a person."""
+        """True if another robot, or a person, may stand close."""
         reach = self._robot.description.radius + FACING
         return any(way.is_within(reach, pose) for way in self._ways)
 
     def face_to_face(self, pose: Pose) -> list[tuple[Points, float]]:
-        """Return what would have to be free for robots close by: they may want to go where this one came from."""
+        """Return the way that robots close by may need: where this one came from, with its distance (m)."""
         mine, trail = self._robot.description.radius, [(point.x, point.y) for point in self._trail]
         near = [tuple(way.points[0].tolist()) for way in self._ways if way.is_within(mine + FACING, pose)]
         return [(np.array([*trail, (pose.x, pose.y), *near]), 2 * mine + CLEAR)]
 
     def is_free(self, path: Points, *, ruled: bool) -> bool:
-        """True if none that goes first, or else none at all, is about to come to ``path`` or stands on it."""
+        """True if no other way is near ``path``; ``ruled``: only ways with right of way count."""
         mine = self._robot.description.radius + CLEAR
         ways = [way for way in self._ways if way.outranks or not ruled]
         return not any((way.distances(path) < mine + way.radius).any() for way in ways)
@@ -207,7 +207,7 @@ class Traffic:
     # -- itself --------------------------------------------------------------------------------------------------------
 
     def follow(self, path: Points) -> None:
-        """Announce a drive along ``path`` (dense), up to where it has to wait for others."""
+        """Announce a drive along ``path`` (dense), up to the place to wait for others."""
         announcer = self._announcer
         if not announcer.frame:
             return

@@ -1,4 +1,4 @@
-"""Waiting places: the nearest place beside the others' ways to let them pass. Needs the kernels."""
+"""Waiting places: the nearest place off the others' ways, to let them pass. Needs the kernels."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Points = NDArray[np.float64]
 
 
 def shun(cost: NDArray[np.float32], frame: GridFrame, ways: Sequence[tuple[Points, float]]) -> None:
-    """Make the cells dearer that lie within so many metres of where others go."""
+    """Raise the cost of the cells within each way's distance (m)."""
     for points, reach in ways:
         window, away = _distances(frame, points[:SHUN_POINTS], reach)
         cost[window] += np.where(away < reach, np.float32(SHUN_COST), np.float32(0.0))
@@ -36,9 +36,9 @@ def waiting_place(
     here: Point,
     ways: Sequence[tuple[Points, float]],
 ) -> Point | None:
-    """The place that takes the least to reach and lies farther from all ways than their metres; None if none does.
+    """Return the place of least cost that keeps the distances (m) to all ways; None: there is none.
 
-    Where two cannot pass it would be in a third one's way: a place beyond that is better, up to a few metres off.
+    In a narrow place it would block a third robot: a place beyond is better, up to a few metres off.
     """
     rows, columns = frame.around((here,), REACH)
     near = np.ascontiguousarray(cost[rows, columns])
@@ -63,7 +63,7 @@ def waiting_place(
 
 
 def _distances(frame: GridFrame, points: Points, reach: float) -> tuple[tuple[slice, slice], Points]:
-    """The part of a grid around ``points``, and how far each of its cells is from the nearest of them, m."""
+    """Return the part of a grid around ``points``, and its cells' distances to the nearest of them, m."""
     window = frame.around(tuple(Point(x, y) for x, y in points.tolist()), reach)
     x, y = frame.centres(*window)
     away = np.full((window[0].stop - window[0].start, window[1].stop - window[1].start), math.inf)

@@ -1,4 +1,4 @@
-"""Learns from corrections by matches how a robot's odometry errs; keeps apart what other reasons may have."""
+"""Learns a robot's odometry errors from corrections by matches, leaving out those with other causes."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ LEARNS_AFTER = 1.0  # m after a contradiction before corrections are used for le
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """A match moved the pose from ``before``, with ``prior`` covariance, to ``best``; odometry had made a ``step``.
+    """Correction by a match from ``before``, with ``prior`` covariance, to ``best``, after odometry's ``step``.
 
-    ``moved`` is the same step, made in ``seconds``; None if it says nothing of odometry's constant errors.
+    ``moved``: the same step, made in ``seconds``; None if unusable for odometry's constant errors.
     """
 
     before: Pose
@@ -33,7 +33,7 @@ class Correction:
 
 
 class OdometryLearner:
-    """``noise``: how far odometry may be wrong; ``bias``: what it gets wrong all the time."""
+    """Learner; ``noise``: random errors of odometry; ``bias``: its constant errors."""
 
     def __init__(self, described: OdometryNoise) -> None:
         self.noise, self.bias = LearntNoise(described), LearntBias()
@@ -45,26 +45,26 @@ class OdometryLearner:
         return self.noise.kept | self.bias.kept
 
     def restore(self, kept: Mapping[str, object]) -> None:
-        """Go on from what was ``kept`` before."""
+        """Continue from ``kept`` values."""
         self.noise.restore(kept)
         self.bias.restore(kept)
 
     def spread(
         self, covariance: NDArray[np.float64], way: float, turn: float, moved: Pose | None, seconds: float
     ) -> NDArray[np.float64]:
-        """``covariance`` (x, y, yaw) after ``way`` m and ``turn`` rad; ``moved`` in ``seconds``, if known."""
+        """Return ``covariance`` (x, y, yaw) after ``way`` m and ``turn`` rad; ``moved`` in ``seconds``, if known."""
         return self.bias.spread(self.noise.spread(covariance, way, turn), moved or Pose(), seconds)
 
     def contradict(self, driven: float) -> None:
-        """The wheels contradicted a match at ``driven`` m: for a while, corrections say less of odometry."""
+        """Note that the wheels contradicted a match at ``driven`` m, which suspends learning for a while."""
         self._learns_from = driven + LEARNS_AFTER
 
     def learns(self, driven: float) -> bool:
-        """Return whether corrections fully measure odometry (again) after ``driven`` m."""
+        """Return whether corrections are used for learning (again) after ``driven`` m."""
         return driven >= self._learns_from
 
     def learn(self, correction: Correction, driven: float, still: Callable[[], bool]) -> None:
-        """Learn from a correction at ``driven`` m; the noise only if all around is ``still``."""
+        """Learn from a correction at ``driven`` m; the noise rises only if everything around is ``still``."""
         before, here, after, prior = (
             correction.before,
             correction.best.pose,

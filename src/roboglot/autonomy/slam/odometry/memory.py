@@ -1,4 +1,4 @@
-"""Keeps what was learnt of a robot's odometry in its settings, so that it need not be learnt anew after a restart."""
+"""Stores the learnt values of a robot's odometry in its settings, for the next start."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PERIOD, WAY = 30.0, 10.0  # s between two checks; m driven that are worth saving
 
 
 class OdometryMemory:
-    """Memory of learnt odometry from ``start`` to ``close``, for a robot that has settings."""
+    """Memory of learnt odometry until ``close``, for a robot with settings."""
 
     def __init__(self, robot: Robot, slam: Slam) -> None:
         self._robot, self._slam = robot, slam
@@ -28,7 +28,7 @@ class OdometryMemory:
             slam.odometry.restore(kept)
 
     async def close(self) -> None:
-        """Write what was learnt last."""
+        """Write the newest values."""
         self._timer.cancel()
         if self._writing is not None:
             await asyncio.gather(self._writing, return_exceptions=True)

@@ -1,4 +1,4 @@
-"""Noise of odometry: a description of the wheels, and how much worse they turn out to be while driving."""
+"""Noise of odometry: the described one, times factors that are learnt while driving."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ LEARNT_WAY_MIN = 0.03  # m driven from which a correction indicates the wheels' 
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """Uncertainty of a correction besides a bias: variances of way (m^2) and yaw (rad^2)."""
+    """Uncertainty of a correction, without a bias: variances of way (m2) and yaw (rad2)."""
 
     way: float
     yaw: float
 
 
 class LearntNoise:
-    """The described noise times what corrections by free matches showed so far; never less than described.
+    """The described noise times factors (at least 1) learnt from corrections by matches.
 
-    Wheels that are not known yet are trusted less.
+    Unknown wheels begin with a larger factor.
     """
 
     def __init__(self, described: OdometryNoise) -> None:
@@ -45,7 +45,7 @@ class LearntNoise:
         self._described, self._before = (0.0, 0.0), np.zeros((3, 3))
 
     def spread(self, covariance: NDArray[np.float64], way: float, turn: float) -> NDArray[np.float64]:
-        """``covariance`` (x, y, yaw) after odometry moved by ``way`` m and ``turn`` rad."""
+        """Return ``covariance`` (x, y, yaw) after odometry moved by ``way`` m and ``turn`` rad."""
         along, around = self._described = self.described.variances(way, turn)
         self._before, wider = covariance, covariance.copy()
         wider[0, 0] += along * self.way_factor
@@ -62,10 +62,10 @@ class LearntNoise:
         *,
         rising: Callable[[], bool] = lambda: True,
     ) -> None:
-        """A match moved the pose by ``correction`` (m, m, rad) from ``prior`` to ``posterior`` (covariances).
+        """Learn from a match's ``correction`` (m, m, rad) from ``prior`` to ``posterior`` (covariances).
 
-        The robot drove in ``direction`` (rad, in map): errors across it come from turning, and say nothing of the way.
-        Only if ``rising``, which is asked when it matters, may the way be trusted less than before.
+        ``direction``: of the motion (rad, map); errors across it come from turning, not from the way. The way's factor
+        rises only if ``rising()``, which is called only if needed.
         """
         c, s = math.cos(direction), math.sin(direction)
         before, (way, around) = self._before, self._described
@@ -81,7 +81,7 @@ class LearntNoise:
 
     @property
     def newest(self) -> Doubt:
-        """Variances that were spread last."""
+        """Variances of the last ``spread``."""
         return Doubt(self._described[0] * self.way_factor, self._described[1] * self.yaw_factor)
 
     @property
@@ -90,24 +90,24 @@ class LearntNoise:
         return {"way_factor": self.way_factor, "yaw_factor": self.yaw_factor}
 
     def restore(self, kept: Mapping[str, object]) -> None:
-        """Go on from ``kept``; what is no sensible number is left out."""
+        """Continue from ``kept`` values; others than finite numbers are ignored."""
         for name in self.kept:
             if (value := _number(kept.get(name))) is not None:
                 setattr(self, name, min(max(value, 1.0), FACTOR_MAX**2))
 
     @property
     def factors(self) -> tuple[float, float]:
-        """Factors of the standard deviations of way and yaw: 1 is as described."""
+        """Factors of the standard deviations of way and yaw; 1: as described."""
         return math.sqrt(self.way_factor), math.sqrt(self.yaw_factor)
 
 
 def _along(matrix: NDArray[np.float64], c: float, s: float) -> float:
-    """The variance in the direction whose cosine and sine these are."""
+    """Return the variance in the direction with cosine ``c`` and sine ``s``."""
     return float(c * c * matrix[0, 0] + 2.0 * c * s * matrix[0, 1] + s * s * matrix[1, 1])
 
 
 def _learnt(factor: float, correction: float, prior: float, posterior: float, before: float, described: float) -> float:
-    """``factor`` after a correction in one direction; variances of it, and the step's as described."""
+    """Return ``factor`` after a correction in one direction, with variances in it and the step's described one."""
     share = 1.0 - posterior / prior
     if share < LEARNT_MIN:  # the scan does not constrain this direction
         return factor
@@ -121,9 +121,9 @@ def _followed(factor: float, ratio: float) -> float:
 
 
 class LearntBias:
-    """Systematic errors of odometry: wheels of another size, a gyro that drifts.
+    """Systematic errors of odometry: a wrong wheel size, a drifting gyro.
 
-    Learnt fast at first, when little is known of it, as a Kalman filter does; slowly ever after.
+    Learnt fast at first, like a Kalman filter, and slowly later.
     """
 
     def __init__(self) -> None:
@@ -138,17 +138,17 @@ class LearntBias:
 
     @property
     def scale_doubt(self) -> float:
-        """Standard deviation of what is not learnt yet of the scale, as a share of the way."""
+        """Standard deviation of the scale that is not learnt yet, as a share of the way."""
         return math.sqrt(max(self._unknown["scale_x"], self._unknown["scale_y"]))
 
     def restore(self, kept: Mapping[str, object]) -> None:
-        """Go on from ``kept``; what is no sensible number is left out."""
+        """Continue from ``kept`` values; others than finite numbers are ignored."""
         for name in self.kept:
             if (value := _number(kept.get(name))) is not None:
                 setattr(self, name, _bounded(value, TURN_BIAS_MAX if name == "turn" else SCALE_BIAS_MAX))
 
     def spread(self, covariance: NDArray[np.float64], moved: Pose, seconds: float) -> NDArray[np.float64]:
-        """``covariance`` (x, y, yaw) after odometry ``moved`` in so many seconds, for what is not learnt yet."""
+        """Return ``covariance`` (x, y, yaw) widened by the bias not learnt yet, after ``moved`` in ``seconds``."""
         wider = covariance.copy()
         along = self._unknown["scale_x"] * moved.x**2 + self._unknown["scale_y"] * moved.y**2
         wider[0, 0] += along
@@ -162,7 +162,7 @@ class LearntBias:
         return Pose(back.x, back.y, self.turn * seconds)
 
     def learn(self, moved: Pose, seconds: float, correction: Pose, seen: tuple[float, float], doubt: Doubt) -> None:
-        """A match corrected by ``correction`` (base_link); ``seen``: share along x and y that the scan decided."""
+        """Learn from a match's ``correction`` (base_link); ``seen``: shares along x and y that come from the scan."""
         if abs(correction.yaw) < LEARNT_TURN_MAX:
             self.turn = _bounded(self.turn + self._share("turn", correction.yaw, seconds, doubt.yaw), TURN_BIAS_MAX)
         if math.hypot(correction.x, correction.y) > LEARNT_WAY_MAX:
@@ -176,7 +176,7 @@ class LearntBias:
             self.scale_y = _bounded(self.scale_y + learnt, SCALE_BIAS_MAX)
 
     def _share(self, name: str, correction: float, step: float, doubt: float) -> float:
-        """Return the part of a correction after a step (s or m) that is learnt; it is better known from now on."""
+        """Return the learnt part of a correction after a step (s or m), and reduce its uncertainty."""
         gain = self._unknown[name] / (self._unknown[name] + doubt / step**2)
         self._unknown[name] *= 1.0 - gain
         return max(gain, BIAS_GAIN) * correction / step
