@@ -37,9 +37,11 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Call, Failed, Finished, Limits, Output
 from roboglot.programs.engine.run import Run
 from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.functions.results import refusal
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call as call_function
-from roboglot.programs.rehearsing import Act, Hit, Played, Scene, Spot, Step, Tried
+from roboglot.programs.library.modules import HEADER_LINES
+from roboglot.programs.rehearsing import Act, Hit, Played, Refusal, Scene, Spot, Step, Tried
 from roboglot.storage.database import Database
 
 log = logging.getLogger(__name__)
@@ -49,6 +51,7 @@ LOOK = 0.1  # s of robot time between two points of the path
 QUEUE_MAX = 16  # rehearsals waiting for their turn
 LIMITS = Limits(cpu=20, wall=120.0)
 HITS_MAX = 20
+REFUSED_MAX = 20
 R = TypeVar("R")
 Notice = Callable[[dict[str, object]], None]
 
@@ -231,12 +234,20 @@ class _Play:
             return
         self._note_lights()
         try:
-            run.calls.reply(event.id, answering.result())
+            run.calls.reply(event.id, value := answering.result())
+            self._note_refusal(event, value)
         except TaskEnded:
             self._over = True
             await run.kill()
         except (RobotError, TypeError, ValueError, ArithmeticError, NotImplementedError) as error:
             run.calls.fail(event.id, type(error).__name__, str(error))
+
+    def _note_refusal(self, call: Call, value: object) -> None:
+        if call.name.endswith("state"):  # the program asks how it went
+            return
+        if len(self.played.refused) < REFUSED_MAX and (words := refusal(value)):
+            line = call.line - HEADER_LINES if call.unit else call.line
+            self.played.refused.append(Refusal(call.name, line, call.unit, words))
 
     async def _pass(self, seconds: float) -> None:
         """Let robot time pass, no faster than asked for, and note where the robot is."""

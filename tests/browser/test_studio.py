@@ -299,6 +299,8 @@ async def test_key_pressed_without_link_counts_after_reconnection(studio: Open, 
     broken.set()
     await links[-1].close()
     await until(page, "document.querySelector('.banner.bad')")
+    await shows(page, "document.querySelector('.phase').textContent", "State unknown")
+    await until(page, "!document.querySelector('.lit')")
     await page.keyboard.press("F8")
     await page.wait_for_selector("text=It is done as soon as the connection is back.")
     broken.clear()

@@ -156,12 +156,23 @@ async def test_what_is_wrong_is_said_while_typing(shown: Shown) -> None:
         assert (problem["line"], "Did you mean 'turn'" in problem["en"], "turn" in problem["zh"]) == (1, True, True)
 
 
+UNFIT = "print(1)\nfound = cyberdog.led.play(LedConstraint.target_head, LedConstraint.system_effect_mini_one_by_one)\n"
+UNFIT += "if found.state.code:\n    print('it failed')\n"
+
+
 async def test_program_is_tried_in_mission_and_world_copy(shown: Shown) -> None:
     async with page(shown) as studio:
         await studio.say(type="try", id=1, lesson="02_turn_around", body="cyberdog.motion.turn(180, 2)\n")
         assert (await studio.kind("tried"))["grade"]["stars"] == 3
         await studio.say(type="try", id=2, lesson="", body="print(1 / 0)\n")
         assert "ZeroDivisionError" in (await studio.kind("tried"))["error"]
+        await studio.say(type="try", id=4, lesson="", body=UNFIT)
+        tried = await studio.kind("tried")
+        assert (tried["error"], [(one["function"], one["line"]) for one in tried["refused"]]) == (
+            "",
+            [("cyberdog.led.play", 2)],
+        )
+        assert tried["refused"][0]["words"]
         await studio.say(type="try", id=3, lesson="../../secret", body="x = 1\n")
         assert "there is no mission" in (await studio.kind("refused"))["why"]
 

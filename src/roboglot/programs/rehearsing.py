@@ -44,18 +44,29 @@ class Spot:
     yaw: float
 
 
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A call that was answered with a failure: its line in ``module`` or in the program, and the robot's words."""
+
+    function: str
+    line: int
+    module: str
+    words: str
+
+
 @dataclass(slots=True)
 class Played:
     """Record of a program.
 
     ``error`` is empty if the program finished; ``late``: it was ended because it took too long.
     ``outlines``: walls and furniture on the robot's floor. ``colours``: zone and red, green, blue of every state of
-    the lights. ``said``: texts and names of sounds.
+    the lights. ``said``: texts and names of sounds. ``refused``: the first calls that were answered with a failure.
     """
 
     printed: str = ""
     said: list[str] = field(default_factory=list)
     calls: list[tuple[str, tuple[object, ...]]] = field(default_factory=list)
+    refused: list[Refusal] = field(default_factory=list)
     blocks: list[str] = field(default_factory=list)
     colours: set[tuple[str, int, int, int]] = field(default_factory=set)
     path: list[Spot] = field(default_factory=list)

@@ -80,12 +80,13 @@ class Check(msgspec.Struct, tag="check", tag_field="type"):
 
 
 class Fetch(msgspec.Struct, tag="fetch", tag_field="type"):
-    """A stored program, or module, with its text and, if wished, its log."""
+    """A stored program, or module, with its text and its log, where they are wished, and where it is."""
 
     id: int
     program: Id
     module: bool = False
     log: bool = True
+    text: bool = True
 
 
 class _Named(msgspec.Struct):
@@ -287,7 +288,9 @@ class Session:
 
     async def _fetch(self, programs: Programs, wish: Fetch) -> None:
         service = programs.service
-        found = await (service.library.get(wish.program) if wish.module else service.get(wish.program))
+        found = None
+        if wish.text:
+            found = await (service.library.get(wish.program) if wish.module else service.get(wish.program))
         entries = await service.log(wish.program) if wish.log and not wish.module else []
         where = await service.whereabouts(wish.program)
         self.tell(
@@ -297,6 +300,7 @@ class Session:
                 "program": found,
                 "log": [_entry(wish.program, entry) for entry in entries],
                 "where": where,
+                "began": service.began.get(wish.program),  # its newest run; null: before the server did
             }
         )
 

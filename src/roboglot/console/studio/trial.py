@@ -6,6 +6,7 @@ One page tries one program at a time. What happens there is sent as it happens, 
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 from collections.abc import Callable
 from typing import Annotated
 
@@ -108,6 +109,7 @@ class Trial:
             answer |= {"printed": played.printed, "error": played.error, "line": played.line, "seconds": played.seconds}
             answer |= {"why": explain(played.error)} if played.error else {}
             answer |= {"late": played.late, "touched": _touched(played)}
+            answer |= {"refused": [dataclasses.asdict(one) for one in played.refused]}
         if lesson is not None:
             found = no_program(problems or []) if played is None else grade(lesson, wish.body, played)
             answer |= {"grade": msgspec.to_builtins(found)}

@@ -32,6 +32,16 @@ def state(code: StateCode = StateCode.SUCCESS, describe: str = "success") -> Rec
     return Record("State", {"code": int(code), "describe": describe})
 
 
+def refusal(value: object) -> str:
+    """Return the words of a failed State, alone or in a function's answer; "" for none."""
+    found = value if isinstance(value, Record) else None
+    if found is not None and found.type != "State":
+        found = found.fields.get("state")
+    if not isinstance(found, Record) or found.fields.get("code", 0) == StateCode.SUCCESS:
+        return ""
+    return str(found.fields.get("describe") or f"code {found.fields['code']}")
+
+
 def in_short(value: object, depth: int = 3) -> str:
     """Return a function's result as readable text of at most ``SHORT_MAX`` characters, with long lists cut."""
     match value:

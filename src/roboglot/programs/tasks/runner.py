@@ -74,6 +74,7 @@ class Runner:
     """Starter and supervisor of runs.
 
     ``runs``: running and suspended tasks by id; ``stops``: breakpoints of later starts by the task's id.
+    ``began``: ``TaskRun.started`` of the newest run of each task.
     ``ended`` is called with each ended task and its new state.
     """
 
@@ -90,6 +91,7 @@ class Runner:
     ) -> None:
         self.runs: dict[str, TaskRun] = {}
         self.stops: dict[str, Stops] = {}
+        self.began: dict[str, float] = {}
         self.reports = Audience[[TaskReport]]()
         self.log_entries = Audience[[str, LogEntry]]()
         self.pace, self.log_pace = Pace(), Pace()
@@ -212,6 +214,7 @@ class Runner:
             await run.kill()  # no client could know of it
             raise
         self.runs[task.id] = living
+        self.began[task.id] = living.started
         return living
 
     async def end(self, id: str, why: str) -> TaskState:

@@ -50,7 +50,8 @@ class ProgramService:
 
     ``reports`` publishes changes of tasks, ``log_entries`` new lines of their logs, ``insights`` results of functions
     and values of variables. Programs wait for the front ends in ``pace`` after each block, for the readers in
-    ``log_pace`` after each line. ``zone`` is the time zone of conditions and of ``time.localtime``.
+    ``log_pace`` after each line. ``began``: start of a task's newest run since the server's, in seconds since 1970,
+    0 for one that a crash interrupted. ``zone`` is the time zone of conditions and of ``time.localtime``.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class ProgramService:
             ended=self._timetable.wait_again,
         )
         self.reports, self.log_entries, self.pace = self._runner.reports, self._runner.log_entries, self._runner.pace
+        self.began = self._runner.began
         self.insights, self.log_pace = self._runner.insights, self._runner.log_pace
         self._runs = self._runner.runs
         self._fires = Background()
@@ -282,6 +284,7 @@ class ProgramService:
             await self._check_table(TaskOperation.DELETE, id)
             await self._store.remove(id)
             self._runner.stops.pop(id, None)
+            self._runner.began.pop(id, None)
 
     async def end_of(self, owner: str, why: str) -> None:
         """End all runs of ``owner``."""

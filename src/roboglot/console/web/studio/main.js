@@ -1,7 +1,7 @@
 // The frame of the studio: header, what runs the program, blocks or text, panels beside them.
 import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import { computed, effect, signal } from "@preact/signals";
+import { computed, effect, signal, untracked } from "@preact/signals";
 import { Button, Icon, PATHS, html, kept, language, loadWords, notice, say, t, theme } from "../base.js";
 import { choose, command, connect as connectRobot, current, hello, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
@@ -54,7 +54,7 @@ function Header() {
 
 /** Where a program is held, in words: read aloud at each step. */
 function held() {
-  if (runner.phase.value !== "paused" || runner.module.value) return "";
+  if (runner.phase.value !== "paused" || runner.module.value || runner.unknown.value) return "";
   if (program.value.kind === "text") return runner.line.value ? ` · ${t("studio.line", { n: runner.line.value })}` : "";
   const block = runner.lit.value && editor.workspace?.getBlockById(runner.lit.value);
   return block ? ` · ${block.toString(60)}` : "";
@@ -63,7 +63,7 @@ function held() {
 function Bar() {
   const others = runner.others.value.length;
   const phase = runner.phase.value, busy = phase === "running" || phase === "starting";
-  const word = phase === "idle" ? (runner.failure.value ? t("studio.phase.failed") : t("studio.phase.idle")) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}`;
+  const word = runner.unknown.value ? t("studio.phase.unknown") : phase === "idle" ? (runner.failure.value ? t("studio.phase.failed") : t("studio.phase.idle")) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}${runner.older.value ? ` · ${t("studio.phase.older")}` : ""}`;
   return html`<div class="controls" role="toolbar" aria-label=${t("studio.controls")}>
     <${Button} kind="main" icon="play" label=${t(phase === "paused" ? "studio.go" : "studio.run")} title="F5" disabled=${busy || online.value !== "open"} onClick=${() => runner.run()} />
     <${Button} icon="pause" label=${t("studio.pause")} title="F6" disabled=${phase !== "running"} onClick=${() => runner.pause()} />
@@ -71,7 +71,7 @@ function Bar() {
     <${Button} compact icon="over" label=${t("studio.over")} title=${`${t("studio.over")} (F10)`} disabled=${phase !== "paused"} onClick=${() => runner.step("over")} /><${Button} compact icon="out" label=${t("studio.out")} title=${`${t("studio.out")} (Shift+F8)`} disabled=${phase !== "paused"} onClick=${() => runner.step("out")} />
     <${Button} icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
     ${program.value.kind === "blocks" && html`<${Button} compact icon="dot" label=${t("studio.break.on")} title="F9" onClick=${() => editor.toggleBreak()} />`}
-    <span class=${`phase ${phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite" title=${word + held()}>${word}${held()}</span>
+    <span class=${`phase ${runner.unknown.value ? "unknown" : phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite" title=${`${word}${held()}${runner.older.value ? `. ${t("studio.older")}` : ""}`}>${word}${held()}</span>
     <span class="unseen" role="status" aria-live="polite">${others > 0 && t("studio.others", { n: others })}</span>
     <span class="grow"></span>
     ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; hits.value = editor.search(e.target.value); }} onKeyDown=${(e) => { if (/^(Enter|ArrowDown)$/.test(e.key) && sought.value && hits.value) { e.preventDefault(); e.stopPropagation(); editor.toToolbox(true); } }} /></label>
@@ -149,6 +149,7 @@ effect(() => { if (current.value && online.value === "open") open(program.peek()
 const robot = computed(() => opened.value?.robot ?? "");
 effect(() => { if (robot.value) list().then(() => editor.modules.value.length && editor.remake()).then(handOver).catch(() => undefined); });
 effect(() => { void language.value; runner.show(); });
+effect(() => { if (runner.older.value) untracked(() => say(t("studio.older"))); });
 let ran = false;
 effect(() => { // what was changed meanwhile; at an end that is not its own the robot has yet to hear of it
   const runs = runner.phase.value !== "idle";

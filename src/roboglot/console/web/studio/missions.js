@@ -1,7 +1,7 @@
 // Missions: which there are, what one asks, the program tried in its world, stars and reasons; and simulate first.
 import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { Button, Icon, html, kept, language, say, t } from "../base.js";
+import { Button, Icon, html, kept, language, robotWord, say, t } from "../base.js";
 import { palette } from "../chart.js";
 import { stateOf, table } from "./blocks.js";
 import * as editor from "./editor.js";
@@ -92,9 +92,29 @@ function paint(canvas, scene, path) {
   pen.save(); pen.translate(px, py); pen.rotate(-yaw); pen.fillStyle = c.robot; pen.beginPath(); pen.moveTo(14, 0); pen.lineTo(-10, 9); pen.lineTo(-10, -9); pen.fill(); pen.restore();
 }
 
+/** What the simulation shows, worst first. */
+function told(found) {
+  const { error, touched, late, refused, seconds } = found;
+  if (error) return t("studio.try.failed");
+  if (touched !== null && touched !== undefined) return t("studio.try.touched", { s: touched.toFixed(0) });
+  if (late) return t("studio.try.late", { s: (seconds ?? 0).toFixed(0) });
+  return refused?.length ? t("studio.try.refused") : t("studio.try.fine", { s: (seconds ?? 0).toFixed(0) });
+}
+
+/** Calls that the robot answered with a failure. */
+function Refused({ calls }) {
+  return calls?.length ? html`<ul>${calls.map((c) => html`<li>${c.function.replace("cyberdog.", "")} (${c.module ? `${c.module}, ` : ""}${t("studio.line", { n: lineShown(c) })}): ${robotWord(c.words)}</li>`)}</ul>` : null;
+}
+
+/** Its number as the page counts lines: those of the marks of blocks are not shown. */
+function lineShown({ line, module }) {
+  if (module || program.value.kind !== "blocks") return line;
+  return line - editor.code.value.split("\n").slice(0, line).filter((row) => row.includes("cyberdog.task.block('")).length;
+}
+
 function Verdict({ found }) {
   if (!found) return null;
-  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null ? "" : "fine"}`} role="status"><b>${found.error ? t("studio.try.failed") : found.touched !== null && found.touched !== undefined ? t("studio.try.touched", { s: found.touched.toFixed(0) }) : t("studio.try.fine", { s: (found.seconds ?? 0).toFixed(0) })}</b>${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${found.error}</small>`}</div>`;
+  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null || found.late || found.refused?.length ? "" : "fine"}`} role="status"><b>${told(found)}</b><${Refused} calls=${found.refused} />${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${found.error}</small>`}</div>`;
   const { stars: count, rows } = found.grade;
   return html`<div class=${`failure ${count ? "fine" : ""}`} role="status"><b>${count ? t("studio.passed") : t("studio.not.passed")} <${Stars} count=${count} /></b>
     <ul>${rows.filter((r) => !r.passed).map((r) => html`<li>${r.star ? "☆ " : "✗ "}${said(r)}</li>`)}</ul></div>`;

@@ -8,7 +8,7 @@ import { blocksOfLines } from "./blocks.js";
 import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
 import { body, continueAsText, program } from "./program.js";
-import { failure, lit, phase, printed, problems, readings, textBreaks, variables } from "./runner.js";
+import { failure, line, lit, phase, printed, problems, readings, textBreaks, variables } from "./runner.js";
 import { Simulate } from "./missions.js";
 import { makeText } from "./text.js";
 
@@ -72,7 +72,7 @@ export function TextEditor() {
   }, [program.value.id]);
   useEffect(() => { made.current?.set(body.value); }, [body.value]);
   useEffect(() => { made.current?.refresh(); });
-  void problems.value; void textBreaks.value; void lit.value; void phase.value;
+  void problems.value; void textBreaks.value; void lit.value; void line.value; void phase.value;
   return html`<div class="text" ref=${place}></div>`;
 }
 

@@ -1,5 +1,5 @@
 // Running a program on the robot: run, pause, step, stop; which block is lit, what was printed, read, and went wrong.
-import { computed, signal } from "@preact/signals";
+import { computed, effect, signal, untracked } from "@preact/signals";
 import { language, say, t, translated } from "../base.js";
 import { blocksOfLines } from "./blocks.js";
 import * as bubbles from "./bubbles.js";
@@ -18,10 +18,13 @@ export const variables = signal(/** @type {Record<string, string>} */ ({}));
 export const readings = signal(/** @type {any[]} */ ([]));
 export const problems = signal(/** @type {any[]} */ ([])); // of the checker
 export const failure = signal(/** @type {any} */ (null)); // of the last run
+export const unknown = computed(() => phase.value !== "idle" && (online.value !== "open" || !opened.value)); // of a run: what it does, now
+const under = signal(/** @type {string | null} */ (null)); // the text that runs, null where another page began it
+export const older = computed(() => phase.value !== "idle" && under.value !== null && under.value !== python()); // it was changed since
 export const textBreaks = signal(/** @type {number[]} */ ([]));
 export const others = signal(/** @type {string[]} */ ([])); // other programs that run on this robot
 export const lights = { count: 0, late: 0 }; // for the benchmark
-let began = 0, next = 1, frameDue = false;
+let began = 0, runs = 0, next = 1, frameDue = false;
 const NOTE_AFTER = 300; // ms: a class that starts at once moves the page's banner once
 let noted = /** @type {Map<string, boolean>} */ (new Map());
 
@@ -63,8 +66,10 @@ async function runNow(step) {
   if (phase.value !== "idle") return undefined;
   if (!python().trim()) { say(t("studio.empty")); return undefined; }
   phase.value = "starting";
+  under.value = python();
   learn(python());
   began = performance.now();
+  runs += 1;
   printed.value = []; readings.value = []; variables.value = {}; failure.value = null; bubbles.clear();
   try {
     const [known, early] = await Promise.all([isStored(), debug(stops(step)).catch(() => null)]);
@@ -138,20 +143,34 @@ export async function catchUp() {
   const running = opened.value?.running ?? [];
   noted = new Map();
   others.value = running.filter((id) => !mine(id));
-  if (running.includes(program.value.id)) await rejoin(); else settle("idle");
+  if (!running.includes(program.value.id)) settle("idle");
+  await rejoin();
 }
 
 const HELD = /** @type {Record<string, "running" | "paused">} */ ({ run: "running", suspend: "paused" });
 /** What was missed of the program while the page was away. */
 async function rejoin() {
   await learn(python());
-  const { log, where } = await ask({ type: "fetch", program: program.value.id });
-  if (!HELD[where.state]) { settle("idle"); return; } // it ended meanwhile
-  printed.value = log.filter((/** @type {any} */ e) => e.stamp >= where.began).slice(-LINES_MAX).map(entry);
+  const { id } = program.value, began = runs, { log, where, program: stored, began: last } = await ask({ type: "fetch", program: id });
+  if (!mine(id) || began !== runs) return; // another was opened or it was started meanwhile
+  const lines = log.filter((/** @type {any} */ e) => last !== null && e.stamp >= last).slice(-LINES_MAX);
+  if (last !== null) printed.value = lines.map(entry);
+  if (!HELD[where.state]) { settle("idle"); if (last !== null) ended(lines, stored?.body ?? ""); return; }
+  under.value = stored?.body ?? null;
+  failure.value = null;
   variables.value = where.variables;
   bubbles.held(where.variables);
   phase.value = HELD[where.state];
   place(where.block, where.line, where.module);
+}
+
+/** How the last run ended. @param {any[]} lines @param {string} text of the program then */
+function ended(lines, text) {
+  const found = lines.filter((e) => e.level === "error").pop();
+  if (!found) { failure.value = null; show(); return; }
+  const owner = found.line && !found.module && program.value.kind === "blocks" ? blocksOfLines(text)[found.line - 1] : "";
+  failure.value = { ...found, block: owner ?? "" };
+  show();
 }
 
 /** Another program was opened: what was shown is the other's. */
@@ -184,6 +203,22 @@ async function look() {
 }
 
 const entry = (/** @type {any} */ e) => ({ text: e.en ? `${words(e)}\n${e.text}` : e.text, level: e.level, key: next++ });
+
+effect(() => { if (unknown.value) untracked(() => place("", 0, "")); }); // it may be anywhere by now
+const LOOK_EVERY = 100; // ms between two looks at the line of a text: no block says it
+let looking = 0;
+effect(() => {
+  clearInterval(looking);
+  if (program.value.kind === "text" && phase.value === "running" && !unknown.value) looking = window.setInterval(follow, LOOK_EVERY);
+});
+let following = false;
+async function follow() {
+  if (following || document.hidden) return;
+  following = true;
+  const { id } = program.value, found = await ask({ type: "fetch", program: id, log: false, text: false }).catch(() => null);
+  following = false;
+  if (found && mine(id) && phase.value === "running" && found.where.state === "run") { line.value = found.where.module ? 0 : found.where.line; module.value = found.where.module; }
+}
 
 listen((message) => {
   switch (message.type) {
@@ -233,6 +268,6 @@ function report({ feedback, block }) {
   }
   if (/Task loop feedback/.test(feedback.describe)) {
     if (/is suspend/.test(feedback.describe)) { if (phase.value === "idle") rejoin().catch(() => undefined); else { phase.value = "paused"; look(); } } else if (/is run$/.test(feedback.describe)) phase.value = "running"; else settle("idle");
-  } else if (feedback.operate === "start") phase.value = feedback.state ? "idle" : "running";
+  } else if (feedback.operate === "start") { if (phase.value === "idle") { runs += 1; under.value = null; } phase.value = feedback.state ? "idle" : "running"; }
   else if (feedback.operate === "stop") settle("idle");
 }

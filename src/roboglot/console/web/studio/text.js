@@ -2,7 +2,7 @@
 import { language } from "../base.js";
 import { table, words } from "./blocks.js";
 import { body, changed } from "./program.js";
-import { line, problems, textBreaks } from "./runner.js";
+import { line, phase, problems, textBreaks } from "./runner.js";
 
 /** Make the editor in `element`. @param {HTMLElement} element @returns {Promise<{destroy: () => void, set: (text: string) => void, refresh: () => void}>} */
 export async function makeText(element) {
@@ -54,10 +54,17 @@ export async function makeText(element) {
       ],
     }),
   });
+  let looked = 0;
+  /** A line at which it is held comes into view, once. */
+  const shown = () => {
+    const at = phase.value === "paused" ? line.value : 0, comes = at !== looked && at > 0 && at <= view.state.doc.lines;
+    looked = at;
+    return comes ? [EditorView.scrollIntoView(view.state.doc.line(at).from, { y: "nearest", yMargin: 40 })] : [];
+  };
   return {
     destroy: () => view.destroy(),
     set: (text) => { if (text === view.state.doc.toString()) return; setting = true; view.dispatch({ changes: { from: 0, to: view.state.doc.length, insert: text } }); setting = false; },
-    refresh: () => { view.dispatch({ effects: show.of(line.value) }); cm.setDiagnostics && view.dispatch({}); },
+    refresh: () => { view.dispatch({ effects: [show.of(line.value), ...shown()] }); cm.setDiagnostics && view.dispatch({}); },
   };
 }
 

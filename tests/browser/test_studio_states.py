@@ -1,0 +1,64 @@
+"""The state of a run in Chromium: the page says what it knows, and no more."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.browser.served import shows, until
+from tests.browser.test_studio import FOREVER, READY, Open, Page, loaded, phase, prints, studio
+
+__all__ = ["studio"]  # the fixture
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+WORD = "document.querySelector('.phase').textContent"
+
+
+async def opens_text(page: Page, text: str) -> None:
+    given = {"kind": "text", "body": text}
+    await page.evaluate("given => import('/studio/program.js').then(p => { p.show(given); p.changed(); })", given)
+    await page.wait_for_selector(".cm-content")
+
+
+async def test_line_of_a_running_text_is_lit(studio: Open) -> None:
+    page = await studio()
+    await opens_text(page, "import time\nprint('hi')\ntime.sleep(1000)\n")  # of robot time, which stands still
+    await page.keyboard.press("F5")
+    await until(page, "document.querySelector('.cm-line.here')?.textContent === 'time.sleep(1000)'")
+    await page.keyboard.press("Shift+F5")
+    await until(page, "!document.querySelector('.cm-line.here')")
+    assert page.errors == []
+
+
+async def test_page_says_that_an_older_version_runs(studio: Open) -> None:
+    page = await loaded(await studio(), FOREVER)
+    await page.keyboard.press("F5")
+    await shows(page, WORD, "Running")
+    await until(page, "studio.editor.workspace.getBlockById('count')")
+    seconds = "studio.editor.workspace.getBlockById('count').getInputTargetBlock('SECONDS').setFieldValue(%d, 'NUM')"
+    await page.evaluate(seconds % 4)
+    await shows(page, WORD, "Running · old version")
+    await page.reload()
+    await until(page, READY.replace("enabled", "disabled"))
+    await shows(page, WORD, "Running · old version")
+    await page.evaluate(seconds % 3)
+    await shows(page, WORD, "Running")
+    await page.keyboard.press("Shift+F5")
+    await phase(page, "idle")
+    assert page.errors == []
+
+
+async def test_reload_after_the_end_shows_output_and_error(studio: Open) -> None:
+    page = await studio()
+    await opens_text(page, "print('hi')\nprint(1 / 0)\n")
+    await page.click("#tab-output")
+    await page.keyboard.press("F5")
+    failed = "document.querySelector('.panel .failure')?.textContent ?? ''"
+    await until(page, f"({failed}).includes('divided by zero')")
+    await phase(page, "idle")
+    await page.reload()
+    await until(page, f"window.studio && ({failed}).includes('divided by zero')")
+    await prints(page, "hi")
+    await shows(page, WORD, "Ended with an error")
+    await page.evaluate("import('/studio/program.js').then(p => p.fresh())")
+    await shows(page, WORD, "Ready")
+    await prints(page)
+    assert page.errors == []
