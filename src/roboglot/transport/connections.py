@@ -1,4 +1,4 @@
-"""Limits on the connections of a port, in all and from one host."""
+"""Limits on the connections of a port, in total and per host."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 
 
 class Connections:
-    """Connections of one port: ``most`` at once, and no host has more than half of them."""
+    """Connections of one port: at most ``most`` at once, and half of these from one host."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -18,18 +18,18 @@ class Connections:
         return self._hosts.total()
 
     def of(self, host: str) -> int:
-        """Return how many of them are this host's."""
+        """Return the number of connections of this host."""
         return self._hosts[host]
 
     def enter(self, host: str, share: int) -> bool:
-        """Count one more in, if ``host`` has fewer than ``share`` and there is room."""
+        """Count a new connection if ``host`` has fewer than ``share`` and the port has room; return True if so."""
         if self._hosts[host] >= min(share, max(1, self._most // 2)) or self.count >= self._most:
             return False
         self._hosts[host] += 1
         return True
 
     def leave(self, host: str) -> None:
-        """One is gone."""
+        """Count a closed connection of ``host``."""
         self._hosts[host] -= 1
         if self._hosts[host] <= 0:
             del self._hosts[host]

@@ -1,7 +1,7 @@
-"""Work that is begun at once, and becomes a task only when it has to wait: most requests never do.
+"""Coroutines that start at once and become tasks only when they have to wait, which most requests never do.
 
-A task that does not wait costs two turns of the event loop. Until it waits, work has no current task: it may not begin
-with ``asyncio.timeout``. Knows no clock.
+A task that does not wait costs two turns of the event loop. Before its first wait, a coroutine has no current task, so
+it may not begin with ``asyncio.timeout``. Knows no clock.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from types import TracebackType
 
 
 def begin(work: Coroutine[object, object, None], name: str) -> asyncio.Task[None] | None:
-    """Run ``work`` until it waits for something; return the task that goes on with it, None if it has ended.
+    """Run ``work`` until its first wait; return the task that continues it, None if it has ended.
 
-    Raises what it raises before that. It has a context of its own, as in a task.
+    Raises errors of ``work`` before that wait. ``work`` has its own context, as in a task.
     """
     context = copy_context()
     try:
@@ -26,13 +26,13 @@ def begin(work: Coroutine[object, object, None], name: str) -> asyncio.Task[None
 
 
 class _Rest(Coroutine[object, object, None]):
-    """The rest of some work, for a task; one that is cancelled at once cancels the work where it waits."""
+    """The rest of a coroutine, for its task; cancelling the task cancels the coroutine at its first wait."""
 
     __slots__ = ("_awaited", "_fresh", "_work")
 
     def __init__(self, work: Coroutine[object, object, None], awaited: object) -> None:
         self._work, self._awaited = work, awaited
-        self._fresh = True  # whether the task has still to learn what the work waits for
+        self._fresh = True  # True until the task has got the first awaited object
 
     def send(self, value: object) -> object:
         if not self._fresh:

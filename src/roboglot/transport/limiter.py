@@ -1,4 +1,4 @@
-"""Rate limits of clients: buckets that fill with time. Bounded, however many clients there are."""
+"""Rate limits of clients: buckets that fill with time. Memory is bounded for any number of clients."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ BUCKETS_MAX = 4096  # clients tracked at the same time; full buckets are dropped
 
 
 class Limiter:
-    """Lets ``rate`` pass a second for each key, and ``burst`` at once after a pause."""
+    """Token buckets by key: ``rate`` tokens a second, at most ``burst`` at once after a pause."""
 
     def __init__(self, rate: float, burst: float, now: Callable[[], float]) -> None:
         self._rate, self._burst, self._now = rate, burst, now
         self._buckets: dict[str, tuple[float, float]] = {}  # the remaining amount, and its time
 
     def take(self, key: str) -> bool:
-        """Take one; whether there was one."""
+        """Take one token; return False if there is none."""
         now = self._now()
         bucket = self._buckets.get(key)
         left = self._left(key, now) if bucket is None else bucket[0] + (now - bucket[1]) * self._rate
@@ -28,7 +28,7 @@ class Limiter:
         return taken
 
     def spend(self, key: str, amount: float) -> float:
-        """Take ``amount`` in any case; returns seconds until the debt is paid, 0 where there is none."""
+        """Take ``amount`` in any case; return the seconds until the debt is paid, 0 without debt."""
         now = self._now()
         left = self._left(key, now) - amount
         self._buckets[key] = (left, now)
@@ -49,7 +49,7 @@ class Limiter:
         return left if left < self._burst else self._burst
 
     def _forget(self, now: float) -> None:
-        """Forget those whose bucket is full again; if there are none, the first that came."""
+        """Drop all full buckets; if there are none, the oldest one."""
         for key, (left, at) in list(self._buckets.items()):
             if left + (now - at) * self._rate >= self._burst:
                 del self._buckets[key]
@@ -58,6 +58,6 @@ class Limiter:
 
 
 async def pay(debt: float) -> None:
-    """Wait, outside of robots' time, until a client may send more: ``debt`` s, as ``Limiter.spend`` says."""
+    """Wait for ``debt`` s (from ``Limiter.spend``) of the machine's time, at most ``PAUSE_MAX``."""
     if debt > 0.0:
         await asyncio.sleep(min(debt, PAUSE_MAX))

@@ -1,4 +1,4 @@
-"""A protocol whose client may send and be sent so many bytes a second: beyond that it is read from later."""
+"""Limits the bytes a second to and from a client: beyond the limit, reading from the client pauses."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ class Metered(asyncio.Protocol):
     """
 
     def __init__(self, inner: asyncio.Protocol, spend: Spend, ended: Callable[[], None]) -> None:
-        """``ended`` is called when the connection is lost."""
+        """Meter ``inner``; ``ended`` is called when the connection is lost."""
         self.inner = inner
         self._spend, self._ended = spend, ended
         self._valve: Valve | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Hand the inner protocol a transport that counts."""
+        """Give the inner protocol a counting transport."""
         self._valve = Valve(cast(asyncio.Transport, transport), self, self._spend)
         self.inner.connection_made(cast(asyncio.BaseTransport, self._valve))
 
     def data_received(self, data: bytes) -> None:
-        """Count, and pass on."""
+        """Count the bytes and pass them on."""
         assert self._valve is not None
         self._valve.uncounted += len(data)
         if self._valve.uncounted >= STEP:
@@ -57,18 +57,18 @@ class Metered(asyncio.Protocol):
 
 
 class Valve:
-    """The transport as the inner protocol sees it; reading goes on only when neither side holds it up."""
+    """Transport of the inner protocol; reading continues only if neither the protocol nor the meter pauses it."""
 
     def __init__(self, transport: asyncio.Transport, meter: Metered, spend: Spend) -> None:
         self._transport, self._meter, self._spend = transport, meter, spend
         self.is_closing = transport.is_closing  # bound once: called for every message
         self._paused = False  # by the inner protocol
         self.uncounted = 0
-        """Bytes; they are counted from STEP on by the one that adds to them."""
+        """Bytes since the last ``count``, which the callers make from STEP bytes on."""
         self._waiting: asyncio.TimerHandle | None = None
 
     def count(self) -> None:
-        """Read later if it is too much."""
+        """Count the bytes; pause reading if they exceed the limit."""
         size, self.uncounted = self.uncounted, 0
         wait = self._spend(size)
         if wait > PAUSE_MIN and self._waiting is None and not self._transport.is_closing():
@@ -76,7 +76,7 @@ class Valve:
             self._waiting = asyncio.get_running_loop().call_later(wait, self._open)
 
     def end(self) -> None:
-        """The connection is gone."""
+        """Cancel the pause of a lost connection."""
         if self._waiting is not None:
             self._waiting.cancel()
             self._waiting = None
@@ -93,20 +93,20 @@ class Valve:
         self.write(b"".join(pieces))
 
     def pause_reading(self) -> None:
-        """Hold reading up for the inner protocol."""
+        """Pause reading for the inner protocol."""
         if not self._paused:
             self._paused = True
             self._transport.pause_reading()
 
     def resume_reading(self) -> None:
-        """Go on unless it is too much."""
+        """Resume reading unless the meter pauses it."""
         if self._paused:
             self._paused = False
             if self._waiting is None:
                 self._transport.resume_reading()
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
-        """Have another inner protocol."""
+        """Replace the inner protocol."""
         self._meter.inner = cast(asyncio.Protocol, protocol)
 
     def get_protocol(self) -> asyncio.BaseProtocol:

@@ -1,7 +1,7 @@
-"""Two protocols of one process joined as if by TCP, without the kernel: what one writes the other has received.
+"""Connects two protocols of one process as if by TCP, without the kernel: written bytes are received at once.
 
-A tunnel's stream reaches a door by it; a connection over loopback would cost both ends a turn of the loop, and four
-system calls a round trip.
+A tunnel's stream reaches a door this way; a connection over loopback would cost each end a turn of the loop, and four
+system calls per round trip.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Address = tuple[str, int]
 
 
 def join(caller: asyncio.Protocol, callee: asyncio.Protocol, called_from: Address, called_at: Address) -> None:
-    """Connect both; the callee hears of it first, and what it says at once waits for the caller."""
+    """Connect both protocols, the callee first; bytes that it writes at once wait for the caller."""
     near, far = PipeEnd(caller, called_from, called_at), PipeEnd(callee, called_at, called_from)
     near.begin(far)
     far.begin(near)
@@ -30,26 +30,26 @@ def join(caller: asyncio.Protocol, callee: asyncio.Protocol, called_from: Addres
 
 
 class PipeEnd(asyncio.Transport):
-    """The transport of one of the two protocols. ``get_extra_info("hung_up")``: the other has ended, read or not."""
+    """Transport of one of the two protocols. ``get_extra_info("hung_up")``: True once the other end has ended."""
 
     def __init__(self, protocol: asyncio.BaseProtocol, own: Address, peer: Address) -> None:
         super().__init__({"sockname": own, "peername": peer})
         self.set_protocol(protocol)
-        self._context = copy_context()  # each call gets a copy: no client's name is left for the next
+        self._context = copy_context()  # each call gets a copy, so that no client's name stays for the next
         self._loop = asyncio.get_running_loop()
         self._other: PipeEnd
-        self._inbox = bytearray()  # written by the other end and not received here yet
+        self._inbox = bytearray()  # written by the other end, not yet received here
         self._reading = self._taking = False
         self._high, self._low = HIGH, HIGH // 4
-        self._crowded = False  # this end was asked to pause
+        self._crowded = False  # this end's protocol was asked to pause
         self._closing = self._lost = self._ended = self._heard_end = False
 
     def begin(self, other: PipeEnd) -> None:
-        """``other`` is the far end."""
+        """Set the far end."""
         self._other = other
 
     def open(self) -> None:
-        """Have the protocol take over."""
+        """Connect the protocol and start reading."""
         self._call(self._protocol.connection_made, self)
         if not self._closing:
             self.resume_reading()
@@ -57,7 +57,7 @@ class PipeEnd(asyncio.Transport):
     # -- asyncio.WriteTransport ----------------------------------------------------------------------------------------
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
-        """The other end has it at once, unless it rests."""
+        """Pass bytes to the other end, at once unless it has paused reading."""
         if not data or self._closing or self._ended:
             return
         if self._other.lost:
@@ -72,11 +72,11 @@ class PipeEnd(asyncio.Transport):
             self._other.receive_end()
 
     def can_write_eof(self) -> bool:
-        """Return True, as TCP does."""
+        """Return True, as for TCP."""
         return True
 
     def close(self) -> None:
-        """End; what was written is still received."""
+        """Close this end; bytes already written are still received."""
         if not self._closing:
             self._closing = True
             self.write_eof()
@@ -84,79 +84,79 @@ class PipeEnd(asyncio.Transport):
                 self._end_soon()
 
     def abort(self) -> None:
-        """End at once, at both ends."""
+        """Close both ends at once."""
         self._closing = self._ended = True
         self._end_soon()
         self._other.hang_up()
 
     def is_closing(self) -> bool:
-        """True once either end has hung up."""
+        """Return True once either end has hung up."""
         return self._closing
 
     def get_write_buffer_size(self) -> int:
-        """Bytes that the other end has not received."""
+        """Return the number of bytes that the other end has not received."""
         return self._other.waiting
 
     def get_write_buffer_limits(self) -> tuple[int, int]:
-        """Low and high (bytes)."""
+        """Return the low and the high limit, bytes."""
         return self._low, self._high
 
     def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:
-        """Set when the writer is asked to pause, and when to go on, in bytes."""
+        """Set the limits above which the writer pauses and below which it resumes, bytes."""
         self._high = high if high is not None else (4 * low if low is not None else HIGH)
         self._low = low if low is not None else self._high // 4
 
     # -- asyncio.ReadTransport -----------------------------------------------------------------------------------------
 
     def is_reading(self) -> bool:
-        """True unless it rests."""
+        """Return True unless reading is paused."""
         return self._reading
 
     def pause_reading(self) -> None:
-        """Keep incoming bytes here."""
+        """Pause reading; incoming bytes wait here."""
         self._reading = False
 
     def resume_reading(self) -> None:
-        """Receive what waits, and go on."""
+        """Receive the waiting bytes and resume reading."""
         if not self._reading and not self._lost:
             self._reading = True
             if self._inbox or self._other.ended:
                 self._loop.call_soon(self._drain)
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
-        """Have another one."""
-        self._protocol = cast(asyncio.Protocol, protocol)  # that of a stream
+        """Replace the protocol."""
+        self._protocol = cast(asyncio.Protocol, protocol)  # a stream's protocol
 
     def get_protocol(self) -> asyncio.BaseProtocol:
-        """Return whose end this is."""
+        """Return the protocol."""
         return self._protocol
 
     def get_extra_info(self, name: str, default: object = None) -> object:
-        """Return the default: there is no socket."""
+        """Return ``hung_up``, the addresses, or the default, as there is no socket."""
         return self._other.ended if name == "hung_up" else super().get_extra_info(name, default)
 
     # -- called by the other end ---------------------------------------------------------------------------------------
 
     @property
     def waiting(self) -> int:
-        """Bytes that wait to be received here."""
+        """Number of bytes that wait to be received here."""
         return len(self._inbox)
 
     @property
     def ended(self) -> bool:
-        """True when nothing more comes from here."""
+        """True when this end writes no more."""
         return self._ended
 
     @property
     def lost(self) -> bool:
-        """True when nothing is received here any more."""
+        """True when this end receives no more."""
         return self._lost
 
     def receive(self, data: bytes | bytearray | memoryview) -> None:
-        """Take what the other end wrote."""
+        """Take bytes that the other end wrote."""
         free = self._reading and not self._taking
         if free and not self._inbox and len(data) <= PIECE:
-            self._taking = True  # answers may make the other end write; those bytes wait
+            self._taking = True  # bytes that the other end writes meanwhile wait
             self._call(self._protocol.data_received, bytes(data))
             self._taking = False
             if self._inbox and self._reading:
@@ -168,17 +168,17 @@ class PipeEnd(asyncio.Transport):
             self._drain()
 
     def receive_end(self) -> None:
-        """The other end writes no more."""
+        """Note that the other end writes no more."""
         if self._reading and not self._lost:
             self._loop.call_soon(self._drain)
 
     def hang_up(self) -> None:
-        """The other end was aborted."""
+        """End this end, as the other one was aborted."""
         self._closing = self._ended = True
         self._end_soon()
 
     def make_room(self, waiting: int) -> None:
-        """Ask the protocol to pause, or to go on, by what waits at the other end."""
+        """Ask the protocol to pause or resume writing, depending on the bytes that wait at the other end."""
         if not self._crowded and waiting > self._high:
             self._crowded = True
             self._call(self._protocol.pause_writing)
@@ -187,7 +187,7 @@ class PipeEnd(asyncio.Transport):
             self._call(self._protocol.resume_writing)
 
     def drained(self) -> None:
-        """The other end has received everything."""
+        """Note that the other end has received everything."""
         if self._closing:
             self._end_soon()
 
@@ -212,7 +212,7 @@ class PipeEnd(asyncio.Transport):
                 self.close()
 
     def _call(self, method: Callable[..., object], *values: object) -> object:
-        """Call the protocol; its errors end the connection, as everywhere in asyncio, and no one else's work."""
+        """Call the protocol; its errors end only this connection, as everywhere in asyncio."""
         try:
             return self._context.copy().run(method, *values)
         except Exception:

@@ -1,4 +1,4 @@
-"""Log lines that a client can cause at will: one of a kind in PERIOD seconds, so that no log is flooded."""
+"""Limited log lines for events that clients can cause at will: one of a kind in PERIOD seconds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ KINDS_MAX = 1024
 
 
 class Seldom:
-    """Log through ``log``; what was said about the same key a moment ago is said with --verbose only."""
+    """Logs through ``log``; repetitions of a key within PERIOD become debug lines."""
 
     def __init__(self, log: logging.Logger) -> None:
         self._log = log
@@ -25,7 +25,7 @@ class Seldom:
         self._say(logging.ERROR, key, message, values, traceback=True)
 
     def info(self, key: str, message: str, *values: object) -> None:
-        """Say it, once in PERIOD for each ``key``."""
+        """Log an information, once in PERIOD for each ``key``."""
         self._say(logging.INFO, key, message, values)
 
     def _say(self, level: int, key: str, message: str, values: tuple[object, ...], *, traceback: bool = False) -> None:

@@ -32,7 +32,7 @@ Factory = Callable[[], asyncio.Protocol]
 
 @dataclass(frozen=True, slots=True)
 class Tls:
-    """Encryption of a port. ``plain``: it also takes connections that are not encrypted."""
+    """Encryption of a port. ``plain``: also accept connections without encryption."""
 
     context: ssl.SSLContext
     plain: bool = True
@@ -49,7 +49,7 @@ def server_context(certificate: Path, key: Path, oldest: ssl.TLSVersion = ssl.TL
 
 
 class TlsEnd(asyncio.Protocol):
-    """One end of one connection: what both have in common, once the handshake has begun."""
+    """One end of a connection: common part of both ends, from the handshake on."""
 
     def __init__(self, factory: Factory) -> None:
         self._factory = factory
@@ -66,21 +66,21 @@ class TlsEnd(asyncio.Protocol):
         self._patience: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Wait for the first byte."""
+        """Limit the time for the handshake."""
         self._transport = cast(asyncio.Transport, transport)
         self._gone = self._transport.is_closing  # bound once: called for every message
         self._host = (transport.get_extra_info("peername") or ("",))[0]
         self._patience = asyncio.get_running_loop().call_later(HANDSHAKE_SECONDS_MAX, self._transport.abort)
 
     def data_received(self, data: bytes) -> None:
-        """Decrypt, once hands are shaken."""
+        """Continue the handshake, or decrypt after it."""
         self._incoming.write(data)
         if self.inner is None and not self._shake_hands(len(data)):
             return
         self._read()
 
     def eof_received(self) -> bool | None:
-        """The other end sends no more."""
+        """Pass on the end of the other side's data, and close."""
         if self.inner is None:
             return False
         self.inner.eof_received()
@@ -109,7 +109,7 @@ class TlsEnd(asyncio.Protocol):
             self._transport.write(self._outgoing.read())
 
     def say_goodbye(self) -> None:
-        """Signal the end to the other end."""
+        """Send TLS's notice of the end."""
         if self._tunnel is not None and not self._transport.is_closing():
             with contextlib.suppress(ssl.SSLError):
                 self._tunnel.unwrap()
@@ -117,7 +117,7 @@ class TlsEnd(asyncio.Protocol):
 
     @property
     def tunnel(self) -> ssl.SSLObject | None:
-        """The encryption; None: there is none yet."""
+        """Encryption of the connection; None before the handshake."""
         return self._tunnel
 
     def _encrypt(self, context: ssl.SSLContext, *, server_side: bool, name: str | None = None) -> None:
@@ -169,7 +169,7 @@ class TlsEnd(asyncio.Protocol):
             self._reply()
 
     def _reply(self) -> None:
-        """Send what TLS itself answers; a peer that asks again and again, and perhaps reads nothing, is cut off."""
+        """Send TLS's own replies; disconnect a peer that causes too many of them."""
         self._replied += self._outgoing.pending
         if self._replied > REPLIES_MAX:
             seldom.warning(self._host, "%s cut off: too many new keys or handshakes in a connection", self._host)
@@ -192,19 +192,19 @@ class TlsEnd(asyncio.Protocol):
 
 
 class TlsPort(TlsEnd):
-    """A connection that came. ``admit`` is asked with the client's host before a handshake."""
+    """An incoming connection. ``admit`` decides by the client's host, before the handshake."""
 
     def __init__(self, factory: Factory, tls: Tls, admit: Callable[[str], bool] = lambda _host: True) -> None:
         super().__init__(factory)
         self._tls, self._admit = tls, admit
 
     def data_received(self, data: bytes) -> None:
-        """Find out what it is; then decrypt."""
+        """Tell TLS from plain by the first byte; then decrypt."""
         if self._tunnel is not None or self._begin(data):
             super().data_received(data)
 
     def _begin(self, data: bytes) -> bool:
-        """Return whether it is TLS and may be; plain connections go to their protocol."""
+        """Return whether TLS begins; pass plain connections to their protocol."""
         if data[0] != HELLO:
             self._calm_down()
             if not self._tls.plain:
@@ -225,9 +225,9 @@ class TlsPort(TlsEnd):
 
 
 class TlsCall(TlsEnd):
-    """A connection that is made from here; ``over`` is done when hands are shaken, or with ConnectionError.
+    """An outgoing connection; ``over`` is done after the handshake, or fails with ConnectionError.
 
-    ``name``: whose certificate the other end must show, where ``context`` asks for a name.
+    ``name``: expected name in the other end's certificate, if ``context`` checks names.
     """
 
     def __init__(self, factory: Factory, context: ssl.SSLContext, name: str = "") -> None:
@@ -255,7 +255,7 @@ class TlsCall(TlsEnd):
 
 
 class _Encrypted:
-    """The transport as the inner protocol sees it."""
+    """Transport of the inner protocol."""
 
     def __init__(self, end: TlsEnd, transport: asyncio.Transport) -> None:
         self._end, self._transport = end, transport

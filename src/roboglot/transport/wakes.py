@@ -1,8 +1,8 @@
-"""Wake-ups of the event loop by gRPC, read as fast as they come. Knows nothing of calls.
+"""Fast reading of gRPC's wake-ups in the event loop. Knows no calls.
 
-A thread of gRPC's writes one byte into a socket for each of its events. gRPC's reader in the loop takes all events, but
-only one byte. A busy loop with many calls falls behind with those, until the socket is full and that thread blocks:
-from then on there is one event a turn of the loop, and each call waits for hundreds of others.
+A thread of gRPC writes one byte into a socket for each event. gRPC's reader in the loop takes all events, but reads
+only one byte. With many calls, a busy loop falls behind until the socket is full and the thread blocks: then there is
+only one event per turn of the loop, and each call waits for hundreds of others.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-INT = 4  # bytes of the count that the kernel gives
+INT = 4  # bytes of the kernel's count
 _reading = threading.Lock()  # the loops of all threads read one socket
 
 
 @contextmanager
 def prompt_wakes() -> Iterator[None]:
-    """Make servers and channels of ``grpc.aio`` within: the first in a loop has it read gRPC's socket."""
+    """Patch the reader of gRPC's socket; create a loop's first server or channel of ``grpc.aio`` inside."""
     loop = asyncio.get_running_loop()
     add_reader = loop.add_reader
 
@@ -38,10 +38,10 @@ def prompt_wakes() -> Iterator[None]:
 
 
 def _take(wakes: socket.socket, wake: Callable[[], object]) -> None:
-    """Read all bytes but the one that gRPC reads itself, then have it take the events, those of other loops, too.
+    """Read all bytes but the one that gRPC reads itself, then let gRPC take all events, also those of other loops.
 
-    Two threads at once could read that one as well: then neither would take the events. A loop that comes too early is
-    called again while there are bytes.
+    One thread at a time: two could together read that last byte, too, and neither would take the events. A loop that
+    finds the lock taken is called again while there are bytes.
     """
     if not _reading.acquire(blocking=False):
         return

@@ -1,4 +1,4 @@
-"""Addresses of this machine that WebRTC offers to the peer."""
+"""This machine's addresses, as offered to the peer by WebRTC."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ LOOPBACK = {4: "127.0.0.1", 6: "::1"}
 
 
 def offer_loopback() -> None:
-    """Have aioice offer the loopback addresses when this machine has no others; it leaves them out.
+    """Make aioice offer the loopback addresses if this machine has no others; normally it omits them.
 
-    For both ends on one machine without a network: a laptop on an aeroplane, a container, a network namespace. Called
-    before a connection is made; calling it again changes nothing.
+    For both ends on one machine without a network: a laptop on an aeroplane, a container, a network namespace. Call it
+    before the first connection; idempotent.
     """
     from aioice import ice
 

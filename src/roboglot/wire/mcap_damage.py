@@ -1,4 +1,4 @@
-"""Errors of reading an MCAP file that is damaged or cut off: its program was killed, or still writes."""
+"""Errors of reading an MCAP file that is damaged or truncated: its writer was killed, or still writes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import struct
 import zstandard
 from mcap.exceptions import McapError
 
-RECORD_MAX = 1 << 30  # bytes per record that are read
-# The first is the format's own; the others come of bytes that are not what they should be.
+RECORD_MAX = 1 << 30  # most bytes of a record that are read
+# The first is the format's own; the others come from damaged bytes.
 DAMAGE = (
     McapError,
     struct.error,

@@ -1,4 +1,4 @@
-"""Requests of all chapters: one request, decoded answers, errors as exceptions with the vendor's number and words."""
+"""Requests of all chapters: decoded answers, and errors as exceptions with the vendor's number and words."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class CyberDogRefused(RefusedByRobot):
 
 
 class NoAnswer(ClientError):
-    """The robot ended the request without a word: it does not know the code, or lacks its service."""
+    """The robot ended the request without an answer: it does not know the code, or lacks its service."""
 
 
 class _InBand(msgspec.Struct):
@@ -36,14 +36,14 @@ class _InBand(msgspec.Struct):
 
 
 class Calls:
-    """Asks over one link."""
+    """Requests over one link."""
 
     def __init__(self, link: DogLink) -> None:
         self.link = link
 
     @property
     def clock(self) -> Clock:
-        """The client's."""
+        """Clock of the client."""
         return self.link.clock
 
     async def answers(self, code: Code, params: object = None) -> AsyncGenerator[str, None]:
@@ -52,11 +52,11 @@ class Calls:
             if '"error_code"' in text:
                 number = decode(text, _InBand, code).error_code
                 raise CyberDogRefused(code.name, number, IN_BAND.get(number, "unknown"))
-            if name == code or name == 0 or code is Code.UPDATE_PROGRESS:  # its answers carry another number
+            if name == code or name == 0 or code is Code.UPDATE_PROGRESS:  # whose answers have another code
                 yield text
 
     async def text(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> str:
-        """The one answer. Raises NoAnswer, TimedOut, and as ``answers`` does."""
+        """Return the first answer. Raises NoAnswer, TimedOut after ``within`` s, and like ``answers``."""
 
         async def first() -> str:
             async for text in self.answers(code, params):
@@ -69,23 +69,23 @@ class Calls:
             raise TimedOut(f"{code.name}: no answer within {within:g} s") from None
 
     async def ask(self, code: Code, kind: type[T], params: object = None, *, within: float = TIMEOUT) -> T:
-        """The one answer, decoded. Raises BadAnswer, and as ``text`` does."""
+        """Return the first answer, decoded. Raises BadAnswer, and like ``text``."""
         return decode(await self.text(code, params, within=within), kind, code)
 
     async def parts(self, code: Code, kind: type[T], params: object = None) -> AsyncGenerator[T, None]:
-        """Yield all answers as they arrive, decoded. Raises BadAnswer, and as ``answers`` does."""
+        """Yield all answers as they arrive, decoded. Raises BadAnswer, and like ``answers``."""
         async with aclosing(self.answers(code, params)) as answers:
             async for text in answers:
                 yield decode(text, kind, code)
 
     async def do(self, code: Code, params: object = None, *, within: float = TIMEOUT) -> None:
-        """Ask for answers that only say whether it was done: ``success``, ``result`` or nothing at all."""
+        """Send a request with an answer of ``success``, ``result`` or nothing. Raises CyberDogRefused."""
         text = await self.text(code, params, within=within)
         check(code, decode(text, dict, code) if text else {})
 
 
 def check(code: Code, answer: Mapping[str, Any], words: type[IntEnum] | None = None) -> None:
-    """Raise CyberDogRefused unless ``answer`` means yes; ``words``: what its numbers are called."""
+    """Raise CyberDogRefused unless ``answer`` means success; ``words``: names of the answer's numbers."""
     for key in ("success", "result", "response", "unlock_result"):
         value = answer.get(key)
         if value is None or value is True or (value == 0 and value is not False):
@@ -102,7 +102,7 @@ def _text(params: object) -> str:
 
 
 def decode(text: str, kind: type[T], code: Code) -> T:
-    """An answer to ``code``. Raises BadAnswer."""
+    """Return a decoded answer to ``code``. Raises BadAnswer."""
     try:
         return msgspec.json.decode(text, type=kind, strict=False)
     except msgspec.MsgspecError as error:

@@ -1,14 +1,14 @@
-"""The CyberDog 2 from its app's end: requests, tasks to wait for, pushes, files, pictures; TLS both ways.
+"""The CyberDog 2 protocol from the app's end: requests, awaitable tasks, pushes, files, pictures; TLS both ways.
 
 Usable on its own::
 
     async with CyberDogClient("192.168.1.10", Certificates.load(Path("phone"))) as dog:
-        await dog.found()                            # its heartbeats come
+        await dog.found()                            # waits for heartbeats
         await (await dog.relocalise())
         await (await dog.navigate(1.5, 0.2))
         with dog.watch(Pose) as poses: ...
 
-Speaks the vendor's units and frames, and knows nothing of drivers.
+Uses the vendor's units and frames; knows no driver.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from roboglot.wire.cyberdog.text import NotJson, read_params
 
 log = logging.getLogger(__name__)
 V = TypeVar("V", bound=Value)
-UNREAD_MAX = 256  # pushes queued for a slow reader, who then gets only the newest
+UNREAD_MAX = 256  # pushes queued for a slow reader, which then gets only the newest
 FOUND_MAX = 20.0  # s to wait for the robot to call back
 
 
@@ -101,7 +101,7 @@ class CyberDogClient(
         await self.link.close()
 
     async def found(self, within: float = FOUND_MAX) -> Heartbeat:
-        """Call the robot and wait until it calls back. Raises TimedOut; ClientError without a server of ours."""
+        """Call the robot and wait until it calls back. Raises TimedOut, or ClientError without an ``app_port``."""
         if self.link.app_port is None:
             raise ClientError("this client has no server that the robot could call")
         await self.status()
@@ -109,7 +109,7 @@ class CyberDogClient(
 
     @property
     def heartbeat(self) -> Heartbeat | None:
-        """The newest; None before the first."""
+        """Newest heartbeat; None before the first."""
         return self.link.heartbeat
 
     @property
@@ -118,7 +118,7 @@ class CyberDogClient(
         return self.link.connected
 
     def watch(self, kind: type[V]) -> Viewer[V]:
-        """Return future pushes of that kind: an async iterator to be closed, best by ``with``."""
+        """Return a viewer of future pushes of that kind: an async iterator to be closed, best by ``with``."""
         code = next(code for code, value in PUSHED.items() if value is kind)
         return self._feeds[code].subscribe()
 

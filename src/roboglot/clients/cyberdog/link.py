@@ -1,6 +1,6 @@
-"""Both directions of the connection: calls to the robot, and the server that it calls back. Knows no message by name.
+"""Both directions of the connection: calls to the robot, and the server for its calls. Knows no message by name.
 
-A call on a dead connection fails at once; the connection itself is made anew in the background, with growing pauses.
+A call on a dead connection fails at once; the connection is restored in the background, with growing pauses.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ IN_BAND = re.compile(r'"error_code"\s*:\s*([1-9]\d*)')
 
 @dataclass(frozen=True, slots=True)
 class Certificates:
-    """PEM texts: the CA of both, and what the app proves itself with."""
+    """PEM texts: the common CA, and the app's certificate and key."""
 
     ca: bytes
     certificate: bytes
@@ -43,7 +43,7 @@ class Certificates:
 
     @classmethod
     def load(cls, folder: Path) -> Certificates:
-        """Load ca-cert.pem, client-cert.pem and client-key.pem, as ``roboglot certs`` writes them. Raises OSError."""
+        """Load ca-cert.pem, client-cert.pem and client-key.pem, written by ``roboglot certs``. Raises OSError."""
         return cls(*((folder / f"{name}.pem").read_bytes() for name in ("ca-cert", "client-cert", "client-key")))
 
 
@@ -89,7 +89,7 @@ def _heartbeat(ticks: pb.Ticks, at: float) -> Heartbeat:
 
 
 class DogLink:
-    """``certificates`` None: without TLS. ``app_port`` None: no server for the robot, so no heartbeats and pushes."""
+    """Link to one robot. ``certificates`` None: no TLS. ``app_port`` None: no server, so no heartbeats and pushes."""
 
     def __init__(
         self,
@@ -117,7 +117,7 @@ class DogLink:
         return self.heartbeat is not None and self.clock.time() - self.heartbeat.at < LOST_AFTER
 
     async def open(self) -> None:
-        """Serve the app's side; the robot is dialled by the first call. Raises LinkLost when the port is taken."""
+        """Start the app's server; the first call dials the robot. Raises LinkLost if the port is taken."""
         name = f"[{self._host}]" if ":" in self._host else self._host
         options = [*client_options(ROBOT_NAME), ("grpc.max_reconnect_backoff_ms", REDIAL_MAX)]
         where, proof = f"{name}:{self._port}", self._certificates
@@ -150,7 +150,7 @@ class DogLink:
         await self._server.start()
 
     async def close(self) -> None:
-        """Hang up in both directions. Cancelling the wait stops nothing; it may be called again."""
+        """Hang up in both directions. May be cancelled, which does not stop it, and called again."""
         server, self._server = self._server, None
         if server:
             self._stopping = asyncio.ensure_future(server.stop(None))
@@ -166,7 +166,7 @@ class DogLink:
         return self._stub
 
     async def send(self, code: int, text: str) -> AsyncGenerator[tuple[int, str], None]:
-        """The answers to one request: (code, text) until the robot ends it. Raises LinkLost."""
+        """Yield the answers to one request as (code, text) until the robot ends it. Raises LinkLost."""
         call = self._robot().sendMsg(pb.SendRequest(nameCode=code, params=text))
         line = self.line if self.line is not None and self.line.watched else None
         began = 0.0 if line is None else line.request(str(int(code)), text)
@@ -185,7 +185,7 @@ class DogLink:
             call.cancel()
 
     async def fetch(self, code: int, text: str) -> AsyncGenerator[pb.FileChunk, None]:
-        """The chunks of a file. Raises LinkLost."""
+        """Yield the chunks of a file. Raises LinkLost."""
         call = self._robot().getFile(pb.SendRequest(nameCode=code, params=text))
         line = self.line if self.line is not None and self.line.watched else None
         began = 0.0 if line is None else line.request(str(int(code)), text)
@@ -202,7 +202,7 @@ class DogLink:
             call.cancel()
 
     async def found(self, within: float) -> Heartbeat:
-        """Wait until the robot's heartbeats come. Raises TimedOut."""
+        """Wait for a heartbeat of the robot and return it. Raises TimedOut after ``within`` s."""
         deadline = self.clock.time() + within
         while self.heartbeat is None or not self.connected:
             if self.clock.time() >= deadline:

@@ -13,13 +13,13 @@ from roboglot.clients.errors import ClientError, LinkLost, TimedOut
 from roboglot.wire.cyberdog.codes import Accepted, Code, TaskResult, TaskType
 
 LOST_MAX = 20.0  # s without a stream before waiting fails
-REJOIN_PERIOD = 0.5  # s between two attempts to rejoin it
+REJOIN_PERIOD = 0.5  # s between two attempts to rejoin the task
 STOP_MAX = 65.0  # s: the robot itself gives up after 60
 ACCEPT_MAX = 10.0  # s
 
 
 class TaskFailed(ClientError):
-    """The task failed; ``feedback`` is the last code of the robot and gives the reason."""
+    """The task failed; ``feedback``: the robot's last code, which gives the reason."""
 
     def __init__(self, kind: TaskType, result: int, feedback: int) -> None:
         super().__init__(f"{kind.name.lower().replace('_', ' ')} ended with {result} after feedback {feedback}")
@@ -37,9 +37,9 @@ class _Message(msgspec.Struct):
 
 
 class RunningTask:
-    """``await task`` ends when it succeeded, and raises TaskFailed, TaskStopped or LinkLost otherwise.
+    """A running task; awaiting it returns once it has succeeded. Raises TaskFailed, TaskStopped or LinkLost otherwise.
 
-    A stream that breaks is joined again; the task goes on meanwhile.
+    A broken stream is joined again; the task continues meanwhile.
     """
 
     def __init__(self, calls: Calls, kind: TaskType, on_feedback: Callable[[int], object] | None) -> None:
@@ -59,7 +59,7 @@ class RunningTask:
         return self._reading is not None and self._reading.done()
 
     async def begin(self, code: Code, params: dict[str, object]) -> None:
-        """Start or join it. Raises CyberDogRefused if the robot does not accept, TimedOut, LinkLost."""
+        """Start or join the task. Raises CyberDogRefused if the robot does not accept it, TimedOut, LinkLost."""
         self._reading = asyncio.get_running_loop().create_task(self._read(code, params), name=f"task {self.kind.name}")
         self._reading.add_done_callback(_noticed)
         try:
@@ -69,7 +69,7 @@ class RunningTask:
             raise TimedOut(f"{code.name}: not accepted within {ACCEPT_MAX:g} s") from None
 
     async def succeeded(self) -> None:
-        """Wait for its end."""
+        """Wait for success. Raises TaskFailed, TaskStopped, LinkLost."""
         assert self._reading is not None
         await asyncio.shield(self._reading)
         if self.result == TaskResult.SUCCESS:
@@ -78,11 +78,11 @@ class RunningTask:
         raise kind(self.kind, -1 if self.result is None else self.result, self.feedback)
 
     async def cancel(self, **more: object) -> None:
-        """Stop it, and wait until what moved stands. Raises CyberDogRefused."""
+        """Stop the task and wait until the robot stands. Raises CyberDogRefused, TimedOut."""
         await self._calls.do(Code.STOP_TASK, {"type": int(self.kind), **more}, within=STOP_MAX)
 
     def leave(self) -> None:
-        """Read no further; the task continues."""
+        """Stop following the task, which continues."""
         if self._reading:
             self._reading.cancel()
 
@@ -99,7 +99,7 @@ class RunningTask:
             await self._rejoin()
 
     async def _rejoin(self) -> None:
-        """Follow the task until it ends or the robot has dropped it."""
+        """Follow the task until it ends, or the robot has nothing to join. Raises LinkLost after ``LOST_MAX`` s."""
         lost = self._calls.clock.time()
         while self.result is None:
             try:
@@ -136,6 +136,6 @@ class RunningTask:
 
 
 def _noticed(reading: asyncio.Task[None]) -> None:
-    """Mark the error as retrieved: ``succeeded`` raises it for its callers."""
+    """Mark the error as retrieved, as ``succeeded`` raises it."""
     if not reading.cancelled():
         reading.exception()

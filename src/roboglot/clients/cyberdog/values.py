@@ -1,4 +1,4 @@
-"""Values of the robot, in its own names and units (m, rad, percent, mV, Celsius). Unknown fields are ignored."""
+"""Values of the robot, with its names and units (m, rad, percent, mV, Celsius). Unknown fields are ignored."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from roboglot.wire.cyberdog.codes import Code
 
 
 class Value(msgspec.Struct):
-    """One message."""
+    """Base of all messages."""
 
 
 class Pose(Value):
-    """6005: m in map, the heading as a quaternion."""
+    """6005: pose in the map frame, m, with the heading as a quaternion."""
 
     px: float
     py: float
@@ -44,13 +44,13 @@ class XY(Value):
 
 
 class PlannedPath(Value):
-    """6006: empty when there is none any more."""
+    """6006: planned path; empty when it is over."""
 
     path_point: list[XY]
 
 
 class LaserPoints(Value):
-    """6011."""
+    """6011: points of the laser in the map frame, m."""
 
     laser_point: list[XY]
 
@@ -64,7 +64,7 @@ class Label(Value):
 
 
 class LabelledMap(Value):
-    """6003; ``success``: 0, or why there is none."""
+    """6003: a map with its labels; ``success``: 0, or the code of the reason why there is none."""
 
     mapName: str  # noqa: N815
     success: int
@@ -74,7 +74,7 @@ class LabelledMap(Value):
 
 
 class ServoResponse(Value):
-    """1003: what became of a frame."""
+    """1003: result of a servo frame."""
 
     motion_id: int
     result: bool
@@ -108,14 +108,14 @@ class Tracking(Value):
 
 
 class FaceEntered(Value):
-    """7003."""
+    """7003: result of entering a face."""
 
     result: int
     username: str = ""
 
 
 class FaceRecognised(Value):
-    """7004: 0, or 5907 without a face. ``age`` in years."""
+    """7004: recognised face; ``result``: 0, or 5907 without a face. ``age`` in years."""
 
     username: str
     result: int
@@ -125,37 +125,37 @@ class FaceRecognised(Value):
 
 
 class VoiceTrained(Value):
-    """3013."""
+    """3013: result of training a voice."""
 
     code: int
     voiceprint_id: str = ""
 
 
 class VoiceprintsWanted(Value):
-    """3014: the robot asks for ``send_voiceprints``."""
+    """3014: request for ``send_voiceprints``."""
 
 
 class FilesLeft(Value):
-    """4003: what was not fetched whole."""
+    """4003: files that were not fetched completely."""
 
     file_name: list[str]
 
 
 class DiskLow(Value):
-    """4005: bytes left."""
+    """4005: free bytes on the disk."""
 
     remain_size: int
 
 
 class UpdateStatus(Value):
-    """5001."""
+    """5001: state of an update."""
 
     status: str
     code: int = 0
 
 
 class UpdateProgress(Value):
-    """5005: percent, or -1 and -2 for what failed."""
+    """5005: percent, or -1 and -2 for failures."""
 
     download_progress: int
     upgrade_progress: int
@@ -167,26 +167,26 @@ class UpdateReboots(Value):
 
 
 class UpdateResult(Value):
-    """5008."""
+    """5008: result of an update."""
 
     success: bool
     code: int = 0
 
 
 class BluetoothLost(Value):
-    """8003: lost, or back."""
+    """8003: a bluetooth connection was lost, or is back."""
 
     disconnected: bool
 
 
 class BluetoothUpdateOffered(Value):
-    """8008: "old new"."""
+    """8008: versions of an offered update, "old new"."""
 
     data: str
 
 
 class BluetoothUpdateProgress(Value):
-    """8010: ``progress`` 0..1, ``status`` 1 well, 2 failed."""
+    """8010: ``progress`` 0..1; ``status``: 1 well, 2 failed."""
 
     status: int
     progress: float
@@ -220,7 +220,7 @@ class Member(Value):
 
 
 class ProgramFrame(Value):
-    """2001: a frame of visual programming as it came."""
+    """2001: a frame of visual programming, unchanged."""
 
     feedback: dict[str, Any] = {}
     block: dict[str, object] | None = None

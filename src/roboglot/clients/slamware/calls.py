@@ -1,8 +1,7 @@
-"""A typed method for each operation: its signature says what goes into the path, the query, the body, and what comes.
+"""Typed methods for operations: a signature determines path, query and body of the request, and type of the answer.
 
-Parameters named in the contract key stand in the path; ``body`` is sent as JSON, or bare if it is bytes; the others
-make the query, without those that are None. What robots answer beyond the manual is passed over, what they leave
-out is an error (BadAnswer).
+Parameters named in the contract key go into the path; ``body`` is sent as JSON, or unchanged if it is bytes; all others
+that are not None form the query. Fields of an answer beyond the manual are ignored, missing ones raise BadAnswer.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ class Chapter:
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """A signature as HTTP; made at the first call."""
+    """HTTP form of a signature; made at the first call."""
 
     method: str
     path: str
@@ -61,7 +60,7 @@ class _Plan:
 
 
 def call(key: str) -> Callable[[Callable[P, Awaitable[T]]], Callable[P, Coroutine[Any, Any, T]]]:
-    """Make the decorated method, whose body is never run, ask for the operation ``key`` ("GET /api/…") of the contract.
+    """Turn a method (its body is never run) into a call of the contract's operation ``key`` ("GET /api/…").
 
     Raises SlamwareRefused for any status but 2xx, LinkLost, TimedOut, BadAnswer.
     """
@@ -113,7 +112,7 @@ async def _ask(chapter: Chapter, key: str, plan: _Plan, values: Mapping[str, Any
 
 
 async def _noted(line: Line, key: str, payload: bytes, asking: Awaitable[Answer]) -> Answer:
-    """Return the answer, and note it with what was asked."""
+    """Return the answer; record request and answer."""
     began = line.request(key, payload)
     try:
         answer = await asking
@@ -138,7 +137,7 @@ def _encode(body: object) -> tuple[bytes, str]:
 
 
 def without_none(value: Any) -> Any:
-    """``value`` without the fields that say nothing: robots differ in what they make of null."""
+    """Return ``value`` without fields that are None, as robots differ in their handling of null."""
     match value:
         case dict():
             return {k: without_none(v) for k, v in value.items() if v is not None}
@@ -149,7 +148,7 @@ def without_none(value: Any) -> Any:
 
 
 def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
-    """Return the decoder from an answer to a value of ``kind``, which raises BadAnswer."""
+    """Return a decoder of answers to values of type ``kind``; it raises BadAnswer."""
     if kind in (None, NoneType):
         return lambda _: None
     if kind is str:
@@ -169,7 +168,7 @@ def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
 
 
 def _text(body: bytes) -> str:
-    """Text comes bare or as a JSON string, as the robot's build has it."""
+    """Return a text that is bare or a JSON string, depending on the robot's build."""
     try:
         return msgspec.json.decode(body, type=str)
     except (msgspec.MsgspecError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""The Slamware REST API from the client's end: all its operations, and actions that can be waited for.
+"""The Slamware REST API from the client's end: all its operations, and awaitable actions.
 
 Usable on its own::
 
@@ -6,7 +6,7 @@ Usable on its own::
         await (await robot.begin("MoveToAction", MoveToOptions(Location(1.0, 0.5))))
         explored = await robot.get_explore_map()   # .cells is a numpy array
 
-Speaks the vendor's units and frames, and knows nothing of drivers.
+Uses the vendor's units and frames; knows no driver.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class SlamwareClient(
     Boxes,
     Tasks,
 ):
-    """One robot. Connects when first asked something, and again whenever the connection was lost.
+    """One robot. Connects at the first request, and again after a lost connection.
 
     Every method raises SlamwareRefused (status and words), LinkLost, TimedOut or BadAnswer.
     """
@@ -79,11 +79,11 @@ class SlamwareClient(
         self.close()
 
     def close(self) -> None:
-        """Disconnect. Actions of the robot go on."""
+        """Disconnect. Actions of the robot continue."""
         self._link.close()
 
     def note_in(self, line: Line) -> None:
-        """Record requests and answers there."""
+        """Record requests and answers in ``line``."""
         self._link.line = line
 
     async def begin(
@@ -92,16 +92,17 @@ class SlamwareClient(
         options: msgspec.Struct | None = None,
         on_progress: Callable[[ActionInfo], object] | None = None,
     ) -> RunningAction:
-        """Have the robot begin an action in place of what it does: ``name`` is "MoveToAction" or its like.
+        """Start an action in place of the current one; ``name``: "MoveToAction" or the like.
 
-        ``options`` are the wire's of that name (MoveToOptions …). ``on_progress`` hears of it while it is waited for.
+        ``options``: the struct of ``wire`` for that action (MoveToOptions …). ``on_progress`` gets the action's reports
+        while it is awaited.
         """
         fields: dict[str, object] = without_none(msgspec.to_builtins(options)) if options is not None else {}
         begun = await self.create_action(ActionRequest(await self._full(name), fields))
         return RunningAction(self, self.clock, begun, on_progress)
 
     async def _full(self, name: str) -> str:
-        """The name as this robot's firmware has it."""
+        """Return the action's name in this robot's firmware."""
         if "." in name:
             return name
         if self._prefix is None:

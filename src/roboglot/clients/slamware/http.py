@@ -1,7 +1,7 @@
 """HTTP/1.1 to one robot over a few kept connections. Knows no API.
 
-Its own, because a driver asks thirty times a second: half a millisecond a question, and nothing is ever sent twice but
-questions that change nothing.
+No library, because a driver makes thirty requests a second: a request takes half a millisecond here, and only GET
+requests, which change nothing, are ever sent twice.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ CONNECT_SECONDS_MAX = 3.0
 
 @dataclass(slots=True)
 class Answer:
-    """``reason`` is the text of the status line: Slamware robots put their explanation there."""
+    """Answer to a request. ``reason``: text of the status line, where Slamware robots put their explanation."""
 
     status: int = 0
     reason: str = ""
@@ -59,7 +59,7 @@ class _Connection(asyncio.Protocol):
             self._fail(BadAnswer(f"not HTTP: {error.__context__ or error}"))
 
     async def ask(self, head: bytes, body: bytes) -> Answer:
-        """Send a request and wait for the answer; cancelling the wait closes the connection."""
+        """Send a request and return the answer; cancelling the wait closes the connection."""
         assert self.transport is not None
         self._parser, self._answer, self._head_bytes = httptools.HttpResponseParser(self), Answer(), 0
         self._waiting = asyncio.get_running_loop().create_future()
@@ -117,7 +117,7 @@ class _Connection(asyncio.Protocol):
 
 
 class HttpLink:
-    """At most ``CONNECTIONS_MAX`` connections to one host; times are the clock's."""
+    """At most ``CONNECTIONS_MAX`` connections to one host; timeouts are in the clock's time."""
 
     def __init__(self, host: str, port: int, clock: Clock) -> None:
         self.host, self.port = host, port
@@ -130,7 +130,7 @@ class HttpLink:
     async def ask(self, method: str, path: str, body: bytes, content_type: str, timeout: float) -> Answer:
         """Send a request and return its answer. Raises LinkLost, TimedOut, BadAnswer.
 
-        A GET on a connection that turns out to be dead is asked once more on a new one; nothing else is ever repeated.
+        A GET on a kept connection that was dead is sent once more on a new one; no other request is repeated.
         """
         try:
             return await self._clock.wait_for(self._ask(method, path, body, content_type), timeout)
@@ -185,7 +185,7 @@ class HttpLink:
         return connection
 
     def close(self) -> None:
-        """Hang up everything; questions under way end with LinkLost."""
+        """Close all connections; pending requests raise LinkLost."""
         for connection in tuple(self._all):
             connection.abort()
         self._idle.clear()

@@ -31,7 +31,7 @@ class ActionAborted(ActionFailed):
 
 
 class RunningAction:
-    """``await action`` ends when it has succeeded, and raises ActionFailed or ActionAborted otherwise."""
+    """A running action; awaiting it returns once it has succeeded. Raises ActionFailed or ActionAborted otherwise."""
 
     def __init__(
         self, motion: Motion, clock: Clock, begun: ActionInfo, on_progress: Callable[[ActionInfo], object] | None
@@ -46,7 +46,7 @@ class RunningAction:
         return self.succeeded().__await__()
 
     async def succeeded(self) -> None:
-        """Wait for its end. Raises ActionFailed, ActionAborted, and LinkLost after 5 s without an answer."""
+        """Wait for success. Raises ActionFailed, ActionAborted, and LinkLost after 5 s without an answer."""
         state = await self.done()
         if state.result is Result.ABORTED:
             raise ActionAborted(self.name, state)
@@ -54,7 +54,7 @@ class RunningAction:
             raise ActionFailed(self.name, state)
 
     async def done(self) -> ActionState:
-        """Wait for its end, whatever the result."""
+        """Wait for the end; return the final state. Raises LinkLost after 5 s without an answer."""
         heard = self._clock.time()
         while True:
             try:
@@ -67,7 +67,7 @@ class RunningAction:
             await self._clock.sleep(PERIOD)
 
     async def look(self) -> ActionState:
-        """Poll the state once."""
+        """Poll and return the state once."""
         try:
             reply = await self._motion.get_action_result(self.id)
         except SlamwareRefused as refused:
@@ -81,7 +81,7 @@ class RunningAction:
         return self.state
 
     async def cancel(self) -> bool:
-        """Stop it if it is still the current action, the only one that robots can stop; return True if it was."""
+        """Stop the action if it is still the current one, as robots stop no other; return True if it was."""
         try:
             current = await self._motion.get_current_action()
         except SlamwareRefused:

@@ -1,6 +1,6 @@
-"""Answers read more leniently than the door writes them: what a field robot may leave out has a default.
+"""Answers with defaults for fields that real robots may leave out, unlike our door.
 
-All other values of the API are in ``roboglot.wire.slamware``, for both ends.
+All other values of the API are in ``roboglot.wire.slamware``, shared by both ends.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ class Scan(msgspec.Struct):
     laser_points: list[LaserPoint]
 
     def arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Angles (rad, from straight ahead, counter-clockwise) and distances (m; inf: nothing came back)."""
+        """Return angles (rad, counter-clockwise from straight ahead) and distances (m; inf: no echo)."""
         angles = np.fromiter((p.angle for p in self.laser_points), np.float64, len(self.laser_points))
         there = (p.distance if p.valid else np.inf for p in self.laser_points)
         return angles, np.fromiter(there, np.float64, len(self.laser_points))
 
 
 class NetworkStatus(msgspec.Struct):
-    """``quality`` in percent."""
+    """State of the network; ``quality`` in percent."""
 
     mode: str = ""
     ssid: str = ""
@@ -46,13 +46,13 @@ class NetworkStatus(msgspec.Struct):
 
 
 class NetworkStatusAnswer(msgspec.Struct):
-    """The API wraps it."""
+    """The API's wrapper of NetworkStatus."""
 
     networkstatus: NetworkStatus
 
 
 class RawImu(msgspec.Struct):
-    """Raw acceleration, turning rates, compass; in counts from ``get_imu_raw_adc_data``."""
+    """Raw acceleration, turning rates and compass; from ``get_imu_raw_adc_data`` in counts."""
 
     acc_x: float = 0
     acc_y: float = 0
@@ -67,7 +67,7 @@ class RawImu(msgspec.Struct):
 
 
 class JackStatus(msgspec.Struct):
-    """``stage``: 2 down, 3 moving, 5 up, 4 in between."""
+    """State of a jack; ``stage``: 2 down, 3 moving, 4 in between, 5 up."""
 
     stage: int
     actual_pos: int = 0
@@ -76,7 +76,7 @@ class JackStatus(msgspec.Struct):
 
 
 class Outcome(msgspec.Struct):
-    """True if it has begun, else the reason."""
+    """Result of a command: True if it has begun, otherwise the reason."""
 
     result: bool = True
     reason: str = ""
@@ -84,7 +84,7 @@ class Outcome(msgspec.Struct):
 
 
 class UpdateProgress(msgspec.Struct):
-    """The step and its share in percent; ``status``: 0 success, 1 error, 2 nothing begun, 3 under way."""
+    """Current step and its progress in percent; ``status``: 0 success, 1 error, 2 not begun, 3 in progress."""
 
     current_step: int = 0
     current_step_name: str = ""
@@ -95,14 +95,14 @@ class UpdateProgress(msgspec.Struct):
 
 
 class InstalledApp(msgspec.Struct):
-    """An app."""
+    """An installed app."""
 
     name: str
     version: str = ""
 
 
 class ElevatorInfo(msgspec.Struct):
-    """An elevator, and where to wait for it."""
+    """An elevator, and the poses for waiting in front of it."""
 
     elevator_id: str
     door_type: str = ""
@@ -111,7 +111,7 @@ class ElevatorInfo(msgspec.Struct):
 
 
 class ActionReport(msgspec.Struct):
-    """An action under way, or what is left of one that ended: then it has neither name nor stage."""
+    """A running action, or an ended one, which has neither name nor stage."""
 
     action_id: int
     state: ActionState

@@ -1,4 +1,4 @@
-"""The robot's way to its cloud: one POST per frame, over HTTP or HTTPS. Knows no program."""
+"""The robot's link to its cloud: one POST per frame, over HTTP or HTTPS. Knows no program."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ CHUNK = 65_536  # bytes
 
 
 class CloudLink:
-    """``url`` is the cloud's, without "/programs"; ``token`` an account's; ``robot`` is one of the account's robots.
+    """Link to a cloud. ``url``: without "/programs"; ``token``: an account's; ``robot``: one of the account's robots.
 
-    Waits in the machine's time unless another ``clock`` is given. Raises ValueError for what is no address.
+    Timeouts are in the machine's time unless another ``clock`` is given. Raises ValueError for an invalid address.
     """
 
     def __init__(self, url: str, token: str, robot: str, clock: Clock | None = None) -> None:
@@ -37,7 +37,7 @@ class CloudLink:
         )
 
     async def post(self, frame: str) -> CloudAnswer:
-        """Raises LinkLost, TimedOut, BadAnswer."""
+        """Send a frame and return the answer. Raises LinkLost, TimedOut, BadAnswer."""
         try:
             answer = await self._clock.wait_for(self._exchange(frame.encode("utf-8", "replace")), TIMEOUT)
         except TimeoutError:
@@ -53,7 +53,7 @@ class CloudLink:
             raise BadAnswer(str(error)) from None
 
     async def _exchange(self, body: bytes) -> bytes:
-        """Read the whole answer, to the end of the connection."""
+        """Send ``body`` and return the whole answer, up to the end of the connection."""
         reader, writer = await asyncio.open_connection(self._host, self._port, ssl=self._security)
         try:
             writer.write(f"{self._head}{len(body)}\r\n\r\n".encode() + body)

@@ -1,6 +1,6 @@
 """Texts to and from a robot over a WebSocket: frames of block programs at ``/programs``, their log at ``/log``.
 
-Knows no frame: the meaning of the texts is the caller's business.
+Knows no frame; the callers interpret the texts.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ BROKEN = frozenset({1002, 1007, 1009})  # close codes for a robot that violates 
 
 
 class TextLink:
-    """Made by ``open``; iterate over it for the robot's texts, until the robot goes away."""
+    """Link made by ``open``; iterate over it for the robot's texts, until the robot closes it."""
 
     def __init__(self, connection: ClientConnection) -> None:
         self._connection = connection

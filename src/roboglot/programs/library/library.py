@@ -125,7 +125,7 @@ class ModuleLibrary:
             del self._known[id]
 
     async def sources(self, ids: Iterable[str]) -> dict[str, str]:
-        """The functions of these modules and of all that they call, by name. Raises ProgramError if one is wrong."""
+        """Return the functions of these modules and all that they call. Raises CannotExecute for one in error."""
         sources: dict[str, str] = {}
         for id in sorted(self._reach(ids)):
             module = await self._store.get(id)

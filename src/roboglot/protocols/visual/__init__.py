@@ -1,6 +1,6 @@
 """The visual programming protocol: frames in, feedback, progress and responses out (chapter 0 of the manual).
 
-The CyberDog door carries its frames (codes 2002 and 2001), and so does a WebSocket of its own.
+The CyberDog door (codes 2002 and 2001) and this door's own WebSocket carry the frames.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The answers to one request, in the manual's words (0.2.1.2)."""
+"""Answers to one request, in the manual's words (0.2.1.2)."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ DOOR = "visual"
 
 
 class Outlet(Protocol):
-    """Receiver of answers: every front end."""
+    """Receiver of answers, which passes them to every front end."""
 
     def answer(self, text: str) -> None:
-        """One frame."""
+        """Send one frame."""
 
     def answer_list(self, kind: str, id: str, items: Sequence[Mapping[str, object]]) -> None:
-        """A list, in frames that each front end can take."""
+        """Send a list, in frames of a length that each front end can take."""
 
 
 class Answers:
-    """Formats and sends what concerns ``request``; ``target`` is the first of the request where none is given.
+    """Formats and sends the answers to ``request``. ``target`` None: the request's first target.
 
-    ``note`` hears once of a request that is accepted, before anybody else.
+    ``note`` is called once when the request is accepted, before the answer is sent.
     """
 
     def __init__(
@@ -40,23 +40,23 @@ class Answers:
     ) -> None:
         self._request = request
         self._tap = tap
-        self._began = began  # when it was reported to followers
+        self._began = began  # time at which the request was reported to followers
         self._outlet = outlet
         self._note = note
 
     async def accept(self, target: str | None = None) -> None:
-        """Done, or legal and about to be done."""
+        """Send that the request was done, or is legal and will be done."""
         note, self._note = self._note, None
         if note is not None:
             await note(self._request)
         self._feedback(target, FeedbackState.OK, f"{self._request.operate} {self._request.kind}")
 
     def refuse(self, state: FeedbackState, describe: str, target: str | None = None) -> None:
-        """Send why the request was not done."""
+        """Send the reason why the request was not done."""
         self._feedback(target, state, describe)
 
     def list(self, items: Sequence[Mapping[str, object]]) -> None:
-        """The answer to an inquiry."""
+        """Send the answer to an inquiry."""
         request = self._request
         if self._tap is not None and self._tap.watched:
             texts = responses(kind=request.kind, id=request.id, items=items)

@@ -9,11 +9,11 @@ from roboglot.config import Port, zone_of
 
 @dataclass(frozen=True, slots=True)
 class VisualConfig:
-    """Block programs. ``port`` of the WebSocket, if there is to be one. ``origins`` and ``hosts`` are as in [slamware].
+    """Block programs. ``port`` is the WebSocket's, if ``websocket``. ``origins`` and ``hosts`` are as in [slamware].
 
-    ``time_zone`` is the one that conditions and programs' clocks are meant in, by its IANA name. ``cloud`` is the
-    address of a cloud that keeps records and favourites; empty: none. ``cloud_token`` is an account's there.
-    ``without_filter`` runs programs also where the kernel cannot filter their system calls: trusted ones only.
+    ``time_zone``: IANA name of the time zone of conditions and of programs' local time. ``cloud``: address of a cloud
+    that keeps records and favourites; empty: none. ``cloud_token``: token of an account there. ``without_filter``: run
+    programs even if the kernel cannot filter their system calls; for trusted programs only.
     """
 
     websocket: bool = True

@@ -1,4 +1,4 @@
-"""First argument of every handler of a frame."""
+"""First argument of all handlers of frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roboglot.wire.visual.requests import Request
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """One request, the programs of the robot that it is about, and how it is answered."""
+    """One request, the programs of its robot, and the sender of its answers."""
 
     service: ProgramService
     request: Request

@@ -1,4 +1,4 @@
-"""Dispatch of a frame to its answers: reads, finds the handler, reports errors. Never raises; knows no carrier."""
+"""Dispatch of frames: parses a frame, calls its handler, reports errors. Never raises; knows no carrier."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from roboglot.wire.visual.requests import BadFrame, FrameSubject, Request, parse
 log = logging.getLogger(__name__)
 
 PENDING_MAX = 64  # frames in progress
-# These only wait for the start of the same task; in lockstep, where time waits, for everything before them.
+# These wait only for the start of the same task; in lockstep, where time waits, for all earlier frames.
 URGENT = frozenset({"suspend", "recover", "shutdown"})
 
 
 class Dispatch:
-    """Answers all front ends' frames about one robot, in order."""
+    """Answers the frames of all front ends to one robot, in order."""
 
     def __init__(self, service: ProgramService, front_ends: FrontEnds, cloud: CloudMirror | None) -> None:
         self._service = service
@@ -48,7 +48,7 @@ class Dispatch:
         await asyncio.gather(*self._pending)
 
     async def receive(self, text: str) -> None:
-        """Answer one frame from a front end (code 2002); returns when that is done."""
+        """Answer one frame from a front end (code 2002); return when it is answered."""
         tap, began = self._service.robot.tap, None
         try:
             request = parse_request(text)
@@ -80,7 +80,7 @@ class Dispatch:
         if self._service.robot.stand_in is not None:
             await self._ask_stand_in(self._service.robot.stand_in, request, text, answers, began)
             return
-        # A separate task: whatever was begun is completed even if the client disconnects.
+        # A separate task, so that an operation is completed even if the client disconnects.
         starting = {id for pending in self._pending.values() if pending.operate == "run" for id in pending.targets}
         urgent = request.operate in URGENT and not self._service.robot.clock.repeats
         in_order = not urgent or not starting.isdisjoint(request.targets)
@@ -92,7 +92,7 @@ class Dispatch:
     async def _ask_stand_in(
         self, stand_in: StandIn, request: Request, text: str, answers: Answers, began: float | None
     ) -> None:
-        """Have another answer in the robot's place."""
+        """Let the stand-in answer in the robot's place."""
         tap, key = self._service.robot.tap, key_of(request)
         try:
             reads = request.operate == "inquiry"
@@ -127,7 +127,7 @@ class Dispatch:
         await operation.handler(Context(self._service, request, answers))
 
     async def _fetch(self, cloud: CloudMirror, kind: FrameSubject) -> None:
-        """Save what the account has and the robot lacks; modules before the tasks that call them."""
+        """Save the account's programs that the robot lacks; modules before the tasks that call them."""
         service = self._service
         if kind in (FrameSubject.TASK, FrameSubject.MODULE):
             known = [module.id for module in await service.library.modules()]

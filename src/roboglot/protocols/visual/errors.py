@@ -1,4 +1,4 @@
-"""The protocol's numbers for errors (0.2.1.2.2.1 of the manual): domain errors in, ``feedback.state`` out."""
+"""The protocol's error codes (0.2.1.2.2.1 of the manual): domain errors in, ``feedback.state`` out."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ STATES: Mapping[type[Exception], FeedbackState] = {
 
 
 def state_of(error: Exception | None) -> FeedbackState:
-    """Return the number of an error; OK for None, OTHER for an error that the manual does not list."""
+    """Return the code of an error; OK for None, OTHER for an error that the manual does not list."""
     return FeedbackState.OK if error is None else STATES.get(type(error), FeedbackState.OTHER)
 
 
 def state_of_report(report: TaskReport) -> int:
-    """Return the number of a report: on blocks that of the last ability call (StateCode), else a FeedbackState."""
+    """Return the code of a report: for blocks the last ability call's StateCode, otherwise a FeedbackState."""
     return int(state_of(report.error) if report.block is None else report.block_status)

@@ -20,7 +20,7 @@ async def _always_room() -> None:
 
 
 class Plain:
-    """A front end whose frames may have any length, and which sends answers and news alike."""
+    """A front end that takes frames of any length, and sends answers and reports in the same way."""
 
     longest = 0
 
@@ -29,12 +29,12 @@ class Plain:
         self._room = room
 
     async def room(self) -> None:
-        """Wait until it has caught up."""
+        """Wait until the front end has caught up."""
         await self._room()
 
 
 class FrontEnds:
-    """Hands frames to all of them, as late as the network makes it."""
+    """Sends frames to all front ends, after the simulated delay of the network."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -73,7 +73,7 @@ class FrontEnds:
         self._each(give)
 
     async def room(self) -> None:
-        """Wait until each of them has caught up."""
+        """Wait until every front end has caught up."""
         for front_end in tuple(self._all):
             await front_end.room()
 

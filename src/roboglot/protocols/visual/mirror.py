@@ -1,6 +1,6 @@
-"""The robot's side of the cloud (0.2.1.3): operations of front ends go up, favourites that the robot lacks come down.
+"""Exchange with the cloud (0.2.1.3): uploads operations of front ends, downloads favourites that the robot lacks.
 
-Knows frames and the cloud's link; while the cloud is away, frames wait in the outbox and delay nothing.
+Knows frames and the cloud's link; while the cloud is unreachable, frames wait in the outbox and delay nothing.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from roboglot.wire.visual.requests import BadFrame, Request, parse_request
 log = logging.getLogger(__name__)
 
 RETRY_FIRST, RETRY_MAX = 1.0, 60.0  # s
-PASSES_MAX = 10  # over an answer whose programs depend on each other
+PASSES_MAX = 10  # attempts to save programs that depend on each other
 AGAIN = frozenset({CloudCode.TIMED_OUT, CloudCode.BROKEN, CloudCode.UNAUTHORISED, CloudCode.REFUSED})
-"""Codes after which the same frame may be taken later; the others never take it."""
+"""Codes after which a frame is sent again; after any other code the cloud would never accept it."""
 
 
 Save = Callable[[Request], Awaitable[bool]]
 
 
 class CloudMirror:
-    """``start`` begins to send, ``close`` ends it; what is not sent by then is sent after the next start."""
+    """Mirror of one robot. ``start`` begins sending, ``close`` ends it; unsent frames are sent after the next start."""
 
     def __init__(self, link: CloudLink, outbox: Outbox, clock: Clock, failures: type[Exception]) -> None:
         self._link = link
@@ -64,14 +64,14 @@ class CloudMirror:
         await self.send(json.dumps(fields, ensure_ascii=False))
 
     async def send(self, frame: str) -> None:
-        """Queue a frame for the cloud, such as how a task ended."""
+        """Queue a frame for the cloud, such as the end of a task."""
         await self._outbox.put(frame)
         self._wake.set()
 
     async def fetch(self, kind: str, known: Sequence[str], save: Save) -> None:
-        """Save what the account's favourites have more than the robot. Never overwrites, never runs anything.
+        """Save the account's favourites that the robot lacks. Never overwrites or runs a program.
 
-        ``save`` returns whether it was done. Failures are logged: the robot's own list is answered in any case.
+        ``save`` returns True if it was done. Failures are only logged, so that the robot's own list can be sent.
         """
         if self._clock.time() < self._away_until:
             return

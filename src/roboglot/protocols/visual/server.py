@@ -1,6 +1,6 @@
-"""The robot's end of the frames: bounded, answered in order, and never with an exception.
+"""The robot's end of the frames: bounded, answered in order, and without exceptions.
 
-Knows the program service and one robot; carriers of the frames are none of its business.
+Knows the program service and one robot, but not the carriers of the frames.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 class VisualDoor:
-    """A ``FrameRelay`` over a program service; with an ``address``, also a WebSocket of the same frames there."""
+    """A ``FrameRelay`` of a program service; with an ``address``, also a WebSocket with the same frames."""
 
     name = "visual"
 
@@ -97,19 +97,19 @@ class VisualDoor:
         return [Endpoint("block programs", f"{address}/programs", f"roboglot program list --robot {address}")]
 
     def subscribe(self, send: Callable[[str], None]) -> Callable[[], None]:
-        """Call ``send`` with every frame for front ends (code 2001), in order; returns what ends it."""
+        """Call ``send`` with every frame for front ends (code 2001), in order; return a function that ends it."""
         return self._front_ends.add(Plain(send))
 
     def attach(self, front_end: FrontEnd) -> Callable[[], None]:
-        """Hand every frame to this one; returns what ends it. Raises RuntimeError: there are too many."""
+        """Send every frame to this front end; return a function that ends it. Raises RuntimeError for too many."""
         return self._front_ends.add(front_end)
 
     async def receive(self, text: str) -> None:
-        """Answer one frame from a front end (code 2002); returns when that is done."""
+        """Answer one frame from a front end (code 2002); return when it is answered."""
         await self._dispatch.receive(text)
 
     def _play(self, operation: str, message: bytes) -> None:
-        """Send all front ends, or readers of the log, what a stand-in pushes."""
+        """Send a stand-in's push to all front ends, or to the readers of the log."""
         if operation == LOG:
             self._side_paths.print(message.decode("utf-8", "replace"))
             return
@@ -118,7 +118,7 @@ class VisualDoor:
         self._front_ends.publish(message.decode("utf-8", "replace"))
 
     def _channels(self) -> dict[str, Channel]:
-        """Return the WebSocket's paths; all but the first are ours."""
+        """Return the WebSocket's channels by path; all but ``/programs`` are our own."""
 
         def follow_frames(send: Send, room: Room) -> Callable[[], None]:
             return self._front_ends.add(Plain(send, room))
@@ -131,14 +131,14 @@ class VisualDoor:
         return {path: noted(channel, outside, self.name, path) for path, channel in found.items()}
 
     def _end_programs_of(self, who: str) -> None:
-        """End the programs of clients that lost a right: they might depend on it."""
+        """End the programs of a client that lost rights, as they might depend on them."""
         ending = self._service.end_of(who, f"{who} lost rights on this robot")
         task = asyncio.create_task(ending, name=f"end programs of {who}")
         self._recording.add(task)
         task.add_done_callback(self._recording.discard)
 
     def _report(self, report: TaskReport) -> None:
-        """Send what happens to a task without a request; such frames carry a time stamp as their id."""
+        """Send a report of a task; its frame has a time stamp as its id, as it answers no request."""
         text = feedback(
             kind=FrameSubject.TASK,
             id=f"task_{int(self._service.robot.clock.epoch() * 1e6)}",

@@ -1,6 +1,6 @@
 """Paths of the WebSocket beside ``/programs``, all our own: logs, positions, resources, debugging.
 
-Their texts are noted with the path as the operation, so that a recorded robot answers here, too.
+Recordings name a text's path as its operation, so that a recorded robot can answer on these paths, too.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class SidePaths:
         self._leave = self._service.log_entries.join(self._logged)
 
     def close(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self._leave()
         self._readers.clear()
 
     def channels(self) -> dict[str, Channel]:
-        """Return them by path."""
+        """Return the channels by path."""
 
         def follow_nothing(_send: Send, _room: Room) -> Callable[[], None]:
             return lambda: None
@@ -66,7 +66,7 @@ class SidePaths:
     def _noted(
         self, path: str, answer: Callable[[str, Send], Awaitable[None]]
     ) -> Callable[[str, Send], Awaitable[None]]:
-        """Report it to the robot's followers, and let a stand-in answer if there is one."""
+        """Return ``answer`` with reports to the robot's followers, or a stand-in's answers if there is one."""
 
         async def receive(text: str, send: Send) -> None:
             tap, stand_in = self._service.robot.tap, self._service.robot.stand_in
@@ -102,7 +102,7 @@ class SidePaths:
         return leave
 
     async def _send_log(self, text: str, send: Send) -> None:
-        """Answer on ``/log``: the stored log of the task it names, then the number of lines."""
+        """Answer on ``/log``: the stored log of the task with id ``text``, then the number of entries."""
         task = text[:ID_MAX]
         entries = await self._service.log(task)
         for entry in entries:
@@ -110,7 +110,7 @@ class SidePaths:
         send(json.dumps({"target_id": task, "entries": len(entries)}, ensure_ascii=False))
 
     async def _send_position(self, text: str, send: Send) -> None:
-        """Answer on ``/where``: the current position of the task it names."""
+        """Answer on ``/where``: the current position of the task with id ``text``."""
         task = text[:ID_MAX]
         where = dataclasses.asdict(await self._service.whereabouts(task))
         send(json.dumps({"target_id": task} | where, ensure_ascii=False))
@@ -125,6 +125,6 @@ class SidePaths:
 
 
 def log_line(task: str, entry: LogEntry) -> str:
-    """Return one entry of a task's log as ``/log`` sends it."""
+    """Return one entry of a task's log in the form of ``/log``."""
     fields = {"target_id": task, "at": entry.at, "level": entry.level, "text": entry.text}
     return json.dumps(fields, ensure_ascii=False)

@@ -1,4 +1,4 @@
-"""Tables of this door: frames by what they ask for, and the manual's three tables of states. Chapters fill it."""
+"""Tables of this door: frames by operation, filled by the chapters, and the manual's three tables of states."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ ANSWERS = ("feedback", "block", "response")  # 0.2.1.2; roboglot.wire.visual.rep
 
 
 def implemented() -> set[str]:
-    """Keys of the contract: frames by what they ask for, cells with what they say."""
+    """Return the implemented keys of the contract: frames by operation, and cells of the tables with their contents."""
     return {*_frames(), *_task_cells(), *_module_cells(), *_mode_cells()}
 
 
 def partly() -> dict[str, str]:
-    """Return nothing: no row is there in part."""
+    """Return nothing, as no row is implemented in part."""
     return {}
 
 

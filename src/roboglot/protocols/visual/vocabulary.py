@@ -1,4 +1,4 @@
-"""The frames' words for programs: fields of a frame and rows of a list (0.2.1.1 and 0.2.1.2 of the manual)."""
+"""Translation of programs to fields of a frame and rows of a list (0.2.1.1 and 0.2.1.2 of the manual)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from roboglot.wire.visual.requests import FrameSubject, Request
 
 
 def key_of(request: Request) -> str:
-    """The contract's key of a frame's wish."""
+    """Return the contract's key of a request."""
     operates = request.kind in (FrameSubject.TASK, FrameSubject.MODULE)
     return f"{request.kind} {request.operate if operates else request.mode}"
 
 
 def program(request: Request) -> StoredProgram:
-    """Return what a frame wants saved."""
+    """Return the program that a frame asks to save."""
     return StoredProgram(
         id=request.targets[0],
         describe=request.describe,
@@ -26,7 +26,7 @@ def program(request: Request) -> StoredProgram:
 
 
 def item(listed: ListedProgram) -> dict[str, object]:
-    """One row of a list (0.2.1.2.2.3 and .4); "operate" is the manual's name for the state."""
+    """Return one row of a list (0.2.1.2.2.3 and .4); "operate" is the manual's name for the state."""
     return {
         "id": listed.id,
         "describe": listed.describe,

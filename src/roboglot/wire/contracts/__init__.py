@@ -1,4 +1,4 @@
-"""Contracts: one JSON file per protocol that lists all of its operations, against which coverage is measured.
+"""Contracts: one JSON file per protocol with all of its operations, the reference for coverage.
 
 A row is ``{"key", "chapter", "name"}``: the wire name under which a handler registers, the vendor's chapter, and the
 vendor's own identifier.

@@ -28,7 +28,7 @@ _KEEPALIVE: Options = [
 
 
 def server_options() -> Options:
-    """Return options of the robot's server; a second server on the same port is an error, not a sharer."""
+    """Return options of the robot's server, which does not share its port with a second server."""
     return [
         *_LIMITS,
         *_KEEPALIVE,

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Code(IntEnum):
-    """``nameCode`` of a message: what it is about."""
+    """``nameCode``: kind of a message."""
 
     DEVICE_INFO = 1001
     SERVO = 1002
@@ -94,11 +94,11 @@ class Code(IntEnum):
     DISCONNECT_APP = 55001
 
 
-# Codes of robots in the field that are missing from the published text.
+# Codes of real robots that are missing from the published text.
 UNPUBLISHED = frozenset({1100, 1101, 2001, 2002, 5002, 5010, 5011, 6012, 6013, 10006, 10007, 11001, 11002})
-# Codes in the text that no robot in the field knows.
+# Codes of the text that no real robot knows.
 TEXT_ONLY = frozenset({1015, 1023, 4005, 5008})
-# Operations whose stream a real robot ends silently when their service is not running; others say UNAVAILABLE.
+# Operations whose stream a real robot ends silently without their service; others answer UNAVAILABLE.
 SILENT_WITHOUT_SERVICE = frozenset(
     {1001, *range(1020, 1025), 3001, 3002, 3011, 3012, 3014, 5001, 5002, 5003, 5004, 5006, 7001, 7002, 9030, 9031}
 )
@@ -249,7 +249,7 @@ class Feedback(IntEnum):
 
 
 class SkinMode(IntEnum):
-    """``mode`` of 11002; ``wave_cycle_time`` is in ms, and for FOOTFALLS 0 for light legs on the floor, else dark."""
+    """``mode`` of 11002. ``wave_cycle_time``: ms; for FOOTFALLS, legs on the floor are light at 0, otherwise dark."""
 
     DARK = 0
     LIGHT = 1

@@ -1,4 +1,4 @@
-"""The JSON inside the messages, read as tolerantly as clients in the field need it. Knows no message by name."""
+"""The JSON inside the messages, parsed as leniently as real clients need. Knows no message by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import msgspec
 
 from roboglot.misfits import misfit
 
-# Accepted when the strict reader fails: raw line ends inside a string, as one app sends its SDP.
+# Used when the strict reader fails: raw line ends inside strings, as in one app's SDP.
 _lenient = json.JSONDecoder(strict=False, parse_constant=lambda name: _refuse(name))
 
 NOTHING = "{}"  # usual params of requests without fields
@@ -19,11 +19,11 @@ Int32 = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)]
 
 
 class NotJson(ValueError):
-    """A ``params`` that is no JSON text."""
+    """``params`` are not JSON."""
 
 
 def read_params(text: str) -> Mapping[str, object]:
-    """The fields of a request; JSON that is no object has none. Raises NotJson."""
+    """Return the fields of a request; none for JSON other than an object. Raises NotJson."""
     if text == NOTHING:
         return {}
     value = read_json(text)
@@ -34,7 +34,7 @@ def read_params(text: str) -> Mapping[str, object]:
 
 
 def read_json(text: str) -> object:
-    """The value in ``text``, whose strings may have line ends as they are. Raises NotJson."""
+    """Return the value in ``text``, whose strings may have raw line ends. Raises NotJson."""
     try:
         value: object = msgspec.json.decode(text)
     except (ValueError, RecursionError) as error:
@@ -56,7 +56,7 @@ def _refuse(name: str) -> NoReturn:
 
 
 def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mapping[str, object]:
-    """Return those of ``values`` whose type fits ``fields``; the others count as left out, as robots have it."""
+    """Return those of ``values`` with the type of their field; others count as missing, as on real robots."""
     return {
         field.name: values[field.name]
         for field in _fields(fields)
@@ -83,7 +83,7 @@ def _fits(value: object, kind: object) -> bool:
 
 
 def _misfit(name: str, value: object, kind: object) -> str:
-    """Return why ``value`` of the field ``name`` is not of that ``kind``; empty if it is."""
+    """Return the reason why ``value`` of the field ``name`` is not of type ``kind``; empty if it is."""
     try:
         # Some languages write whole numbers in JSON with a decimal point: 303.0 counts as 303.
         msgspec.convert(value, kind, strict=not isinstance(value, float))
@@ -93,5 +93,5 @@ def _misfit(name: str, value: object, kind: object) -> str:
 
 
 def write(value: object) -> str:
-    """An answer or a push: text goes out as it is, all else as JSON."""
+    """Return the text of an answer or push: strings unchanged, other values as JSON."""
     return value if isinstance(value, str) else msgspec.json.encode(value).decode()

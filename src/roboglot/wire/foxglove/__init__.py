@@ -1,1 +1,1 @@
-"""The Foxglove WebSocket protocol's messages, for both ends. Knows no robot and no socket."""
+"""Messages of the Foxglove WebSocket protocol, for both ends. Knows no robot and no socket."""

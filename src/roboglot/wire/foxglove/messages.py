@@ -35,7 +35,7 @@ class Level(IntEnum):
 
 
 class ServerOpcode(IntEnum):
-    """The first byte of what the server sends."""
+    """First byte of the server's binary messages."""
 
     MESSAGE_DATA = 1
     TIME = 2
@@ -45,7 +45,7 @@ class ServerOpcode(IntEnum):
 
 
 class ClientOpcode(IntEnum):
-    """The first byte of what a client sends."""
+    """First byte of a client's binary messages."""
 
     MESSAGE_DATA = 1
     SERVICE_CALL_REQUEST = 2
@@ -62,7 +62,7 @@ class PlayStatus(IntEnum):
 
 
 class Malformed(ValueError):
-    """A message is none of the protocol's; the text says why."""
+    """A message does not conform to the protocol; the text says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Playback:
-    """State of a player: ``time`` in ns since 1970, the ``request`` that it answers, and ``sought`` after a seek."""
+    """State of a player: ``time`` in ns since 1970, id of the answered ``request``, and ``sought`` after a seek."""
 
     status: int
     time: int
@@ -85,7 +85,7 @@ class Playback:
 
 
 def read_request(message: str | bytes) -> Request:
-    """Read what a client sent. Raises Malformed."""
+    """Parse a message of a client. Raises Malformed."""
     return _read_text(message) if isinstance(message, str) else _read_bytes(message)
 
 
@@ -125,7 +125,7 @@ def _read_call(data: bytes) -> Request:
 
 
 def _read_playback(data: bytes) -> Request:
-    """``seek``: ns, or None; early versions of the message have no request id."""
+    """Return a playback request; ``seek``: ns since 1970 or None. Early versions have no request id."""
     padded = data if len(data) >= _PLAYBACK.size else data + bytes(4)
     _, command, speed, sought, seek, length = _PLAYBACK.unpack_from(padded)
     request, _ = _text(padded, _PLAYBACK.size, length, REQUEST_ID_MAX)
@@ -144,7 +144,7 @@ def _text(data: bytes, start: int, length: int, most: int) -> tuple[str, int]:
 
 
 def message(op: str, **values: object) -> str:
-    """Return a JSON message; what is None is left out."""
+    """Return a JSON message, without values that are None."""
     return msgspec.json.encode({"op": op} | {key: item for key, item in values.items() if item is not None}).decode()
 
 
@@ -159,7 +159,7 @@ def time_message(at: int) -> bytes:
 
 
 def playback_state(state: Playback) -> bytes:
-    """Return how the server plays."""
+    """Return the message of a player's state."""
     name = state.request.encode()
     return (
         _STATE.pack(ServerOpcode.PLAYBACK_STATE, state.status, state.time, state.speed, state.sought, len(name)) + name
@@ -167,11 +167,11 @@ def playback_state(state: Playback) -> bytes:
 
 
 def split_time(at: int) -> dict[str, int]:
-    """Return ns since 1970 as JSON messages have it."""
+    """Return ns since 1970 in the form of JSON messages."""
     return {"sec": at // 1_000_000_000, "nsec": at % 1_000_000_000}
 
 
 def asset_failure(request: int, why: str) -> bytes:
-    """Return that a file cannot be had."""
+    """Return the message of a failed request for a file."""
     text = why.encode()
     return _ASSET.pack(ServerOpcode.FETCH_ASSET_RESPONSE, request, 1, len(text)) + text

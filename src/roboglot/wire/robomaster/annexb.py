@@ -9,27 +9,27 @@ from dataclasses import dataclass
 ACCESS_UNIT_MAX = 4 << 20  # bytes; anything longer is not video
 _START = re.compile(rb"\x00\x00\x01")
 _SLICE, _KEY_SLICE = 1, 5
-_HEADS = frozenset({6, 7, 8, 9})  # SEI, SPS, PPS, delimiter: they come before a picture's first slice
+_HEADS = frozenset({6, 7, 8, 9})  # SEI, SPS, PPS, delimiter: before a picture's first slice
 
 
 @dataclass(frozen=True, slots=True)
 class AccessUnit:
-    """The bytes of one picture with what a decoder needs before them; ``keyframe``: a decoder can begin here."""
+    """Bytes of one picture, with the parameter sets before it; ``keyframe``: a decoder can start here."""
 
     data: bytes
     keyframe: bool
 
 
 class AccessUnitSplitter:
-    """Feed it what was read; a unit comes when the next one begins, so one picture late."""
+    """Splits a stream that is fed in pieces; a unit is complete when the next one begins, so one picture late."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
-        self._looked = 0  # start codes before it have been examined
+        self._looked = 0  # offset before which start codes have been examined
         self._has_slice = self._keyframe = False
 
     def feed(self, data: bytes) -> Iterator[AccessUnit]:
-        """Every unit that ``data`` completes. Raises ValueError beyond ACCESS_UNIT_MAX."""
+        """Yield every unit that ``data`` completes. Raises ValueError beyond ACCESS_UNIT_MAX."""
         self._buffer += data
         at = self._looked
         while (found := _START.search(self._buffer, at)) and found.end() + 1 < len(self._buffer):

@@ -1,7 +1,7 @@
 """Parses one command text into words, parameters and sequence number.
 
-``chassis move x 0.5 wait_for_complete true seq 3`` is made of the command's words, parameters by key in any order, and
-the number to be repeated in the reply, which must come last. Knows no list of commands: the caller brings names.
+``chassis move x 0.5 wait_for_complete true seq 3`` has the command's words, parameters by key in any order, and last
+the number that the reply repeats. Knows no list of commands: the caller provides names.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ Value = int | float | bool | str
 
 
 class Malformed(ValueError):
-    """The text is no command; ``reply`` is the protocol's own answer to that."""
+    """The text is not a command; ``reply``: the protocol's answer to that."""
 
     def __init__(self, reply: Reply, why: str) -> None:
         super().__init__(why)
         self.reply = reply
 
     def why(self) -> str:
-        """Description of the error."""
+        """Return a description of the error."""
         return str(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A text taken apart: its words without a closing ``?`` and without the sequence number."""
+    """A parsed text: its words without a closing ``?`` and without the sequence number."""
 
     words: tuple[str, ...]
     query: bool = False
@@ -44,20 +44,20 @@ class Command:
 
     @property
     def keys(self) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """The wire names that this may be, the longest first, each with the words left for parameters."""
+        """Possible wire names, the longest first, each with the remaining words for parameters."""
         for length in (2, 1):
             if length <= len(self.words):
                 name = " ".join(self.words[:length])
                 yield f"{name} {QUERY}" if self.query else name, self.words[length:]
 
     def __str__(self) -> str:
-        """The text that ``parse`` reads back, without its ``;``."""
+        """Return a text for ``parse``, without its ``;``."""
         seq = () if self.seq is None else ("seq", str(self.seq))
         return " ".join((*self.words, *((QUERY,) if self.query else ()), *seq))
 
 
 def parse(text: str) -> Command:
-    """Take ``text`` (one command without its ``;``) apart; Malformed if it is none or has a bad sequence number."""
+    """Parse ``text`` (one command without its ``;``). Raises Malformed, also for a bad sequence number."""
     if "\n" in text or "\r" in text:
         raise Malformed(Reply.PARSE_ERROR, "there is a line break in it: is a `;` missing?")
     words = text.split()
@@ -75,7 +75,7 @@ def parse(text: str) -> Command:
 
 
 def _sequence_number(words: Sequence[str]) -> int:
-    """The first of ``words``; the robot ignores what follows."""
+    """Return the number in the first of ``words``; the robot ignores the others. Raises Malformed."""
     if not words:
         raise Malformed(Reply.NO_SEQ, "seq without a number")
     number = value_of(words[0])
@@ -85,7 +85,7 @@ def _sequence_number(words: Sequence[str]) -> int:
 
 
 def value_of(word: str) -> Value:
-    """A parameter's word as what it looks like: whole number (``2.0`` too), 0x…, true/false, float, else the word."""
+    """Return a parameter's word as int (``2.0`` and 0x…, too), bool or float by its form, otherwise unchanged."""
     if word in _WORDS:
         return _WORDS[word]
     if _HEX.fullmatch(word):
@@ -99,11 +99,11 @@ def value_of(word: str) -> Value:
 
 
 def parameters_of(words: Sequence[str], names: Sequence[str], bare: Sequence[str] = ()) -> dict[str, Value]:
-    """The values in ``words`` for an operation with parameters ``names``, of which ``bare`` need no name.
+    """Return the values in ``words`` for an operation with parameters ``names``, of which ``bare`` need no name.
 
-    A name takes the word after it, unless that is a name itself or there is none; then its value is an empty word. The
-    last of two counts. What is left goes to the bare ones, the last words if there are too many of them (so the number
-    counts in ``leve 1``); all else is ignored, as the robot does.
+    A name takes the next word; its value is an empty word if that is a name itself or missing. Of repeated names the
+    last one counts. Remaining words go to the bare parameters, the last words if there are too many (so the number
+    counts in ``leve 1``); all others are ignored, as on real robots.
     """
     values: dict[str, Value] = {}
     left: list[str] = []

@@ -1,4 +1,4 @@
-"""Cuts a byte stream into command texts at ``;``. Bounded; knows nothing about what the texts mean."""
+"""Cuts a byte stream into command texts at ``;``. Bounded; does not know the texts' meaning."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class LineSplitter:
 
     @property
     def pending(self) -> int:
-        """Bytes kept until the next ``;``; never above LINE_MAX."""
+        """Number of bytes kept until the next ``;``, at most LINE_MAX."""
         return len(self._tail)
 
     def feed(self, data: bytes) -> Iterator[str | None]:
-        """Every text that ``data`` completes, trimmed of white space; empty ones are left out.
+        """Yield every text that ``data`` completes, without surrounding white space; skip empty texts.
 
-        None stands for a text longer than LINE_MAX, of which nothing was kept. Bytes that aren't UTF-8 come as U+FFFD.
+        None stands for a text longer than LINE_MAX, which was dropped. Bytes that aren't UTF-8 become U+FFFD.
         """
         *complete, tail = data.split(END)
         for part in complete:

@@ -1,6 +1,6 @@
 """Answers of the robot, word for word, in the forms of its firmware builds.
 
-A profile is one row of a table: how numbers look and what ends a text. ``SPEC`` is the published text with the two
+A profile is one row of a table: format of numbers and ends of texts. ``SPEC`` follows the published text, with two
 exceptions that every known client needs: three decimals, and no ``;`` after the broadcast address.
 """
 
@@ -12,7 +12,7 @@ from enum import StrEnum
 
 
 class Reply(StrEnum):
-    """The fixed answers, without what ends them."""
+    """Fixed answers, without their ends."""
 
     OK = "ok"
     FAIL = "fail"
@@ -29,10 +29,10 @@ Number = int | float
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
-    """Wire format of one build: what ends a fixed answer, an answer made of values, a push or event, the broadcast.
+    """Wire format of one build: ends of fixed answers, of answers with values, of pushes and events, of the broadcast.
 
-    ``as_robots``: units, orders and ranges as real robots have them where the manual says otherwise; all that is due
-    of a module then shares one datagram.
+    ``as_robots``: units, orders and ranges of real robots instead of the manual's; all due pushes of a module then
+    share one datagram.
     """
 
     name: str
@@ -46,42 +46,42 @@ class Profile:
     separator: str  # between attributes in one datagram
 
     def result(self, text: str, seq: int | None = None) -> bytes:
-        """A fixed answer, or any other single text."""
+        """Return a fixed answer, or any other single text."""
         return _joined(text, seq, self.result_end)
 
     def values(self, values: Sequence[Number | str], seq: int | None = None) -> bytes:
-        """The answer to a query: one value plainly, several with floats cut to the profile's decimals."""
+        """Return the answer to a query: one value unchanged, several with floats rounded to the profile's decimals."""
         text = str(values[0]) if len(values) == 1 else self._numbers(values)
         return _joined(text, seq, self.values_end)
 
     def push(self, module: str, *attributes: tuple[str, Sequence[Number]], separator: str | None = None) -> bytes:
-        """One datagram: ``chassis push attitude 0.100 1.000 3.000;``, or several attributes under one heading."""
+        """Return one datagram, such as ``chassis push attitude 0.100 1.000 3.000;``, with one or more attributes."""
         between = self.separator if separator is None else separator
         texts = [f"{name} {self._numbers(values)}" for name, values in attributes]
         return _joined(f"{module} push {between.join(texts)}", None, self.push_end)
 
     def event(self, text: str) -> bytes:
-        """One event: ``armor event hit 1 0;``."""
+        """Return one event, such as ``armor event hit 1 0;``."""
         return _joined(text, None, self.push_end)
 
     def game(self, numbers: Sequence[int]) -> bytes:
-        """Keys and mouse: ``game msg push [0, 6, 1, 0, 0, 255, 1, 87];`` in every build."""
+        """Return keys and mouse, such as ``game msg push [0, 6, 1, 0, 0, 255, 1, 87];``, the same in every build."""
         return f"game msg push {list(numbers)};".encode()
 
     def broadcast(self, address: str) -> bytes:
-        """``robot ip 192.168.1.102``: the robot's address, for clients that search for it."""
+        """Return the robot's address for clients that search for it, such as ``robot ip 192.168.1.102``."""
         return _joined(f"robot ip {address}", None, self.broadcast_end)
 
     def _numbers(self, values: Sequence[Number | str]) -> str:
         return " ".join(self._fixed(value) if isinstance(value, float) else str(value) for value in values)
 
     def _fixed(self, number: float) -> str:
-        """Three decimals and never ``-0.000``."""
+        """Return a number with the profile's decimals, and never ``-0.000``."""
         return f"{round(number, self.decimals) + 0.0:.{self.decimals}f}"
 
 
 def _joined(text: str, seq: int | None, end: str) -> bytes:
-    """After a number comes a blank before the ``;``: clients split at blanks and convert the number with int()."""
+    """Return a text with ``seq`` and a blank before the ``;``, as clients split at blanks and call int()."""
     if seq is None:
         return f"{text}{end}".encode()
     return f"{text} seq {seq}{' ' if end.startswith(';') else ''}{end}".encode()

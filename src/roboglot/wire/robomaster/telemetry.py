@@ -1,7 +1,7 @@
 """Unsolicited messages of the robot as values: pushes, events and the broadcast, in the forms of all known builds.
 
-Units, signs and numbers are the EP's own: m, degrees, x forward, y right, yaw clockwise, pitch up. ``hear`` reads a
-datagram or the texts of the event port; what it cannot read it passes over. Knows no sockets.
+Units, signs and numbers are the EP's own: m, degrees, x forward, y right, yaw clockwise, pitch up. ``hear`` parses a
+datagram or the texts of the event port, and ignores unreadable texts. Knows no sockets.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from ipaddress import IPv4Address
 
-TEXT_MAX = 8192  # bytes read of a datagram
+TEXT_MAX = 8192  # most bytes of a datagram that are read
 TARGETS_MAX = 128
 POINTS_PER_LINE = 10
 KEYS_AND_MOUSE = 0  # cmd_id of a game's messages; the others carry a match's score
@@ -20,7 +20,7 @@ RAW_MAX = 1023  # full scale of the adapters' converters
 
 @dataclass(frozen=True, slots=True)
 class ChassisPosition:
-    """m, since power-on."""
+    """Position since power-on, m."""
 
     x: float
     y: float
@@ -37,7 +37,7 @@ class ChassisAttitude:
 
 @dataclass(frozen=True, slots=True)
 class ChassisStatus:
-    """Eleven flags, in the manual's order."""
+    """State of the chassis: eleven flags, in the manual's order."""
 
     static: bool
     uphill: bool
@@ -62,7 +62,7 @@ class GimbalAttitude:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Something seen: its middle and size as parts of the picture; ``info`` is the gesture's or marker's number."""
+    """A recognised object: its centre and size as parts of the picture; ``info``: number of the gesture or marker."""
 
     x: float
     y: float
@@ -73,7 +73,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class LinePoint:
-    """x and y as parts of the picture, the tangent in degrees, the curvature 0 to 10."""
+    """Point of a line: x and y as parts of the picture, tangent in degrees, curvature 0 to 10."""
 
     x: float
     y: float
@@ -83,7 +83,7 @@ class LinePoint:
 
 @dataclass(frozen=True, slots=True)
 class TargetsSeen:
-    """All targets of a ``kind`` in one picture: person, gesture, marker or robot, in the words of any build."""
+    """All targets of one ``kind`` in a picture: person, gesture, marker or robot."""
 
     kind: str
     targets: tuple[Target, ...]
@@ -91,14 +91,14 @@ class TargetsSeen:
 
 @dataclass(frozen=True, slots=True)
 class LinesSeen:
-    """Each line has ten points, the nearest first."""
+    """Lines in a picture, each of ten points, the nearest first."""
 
     lines: tuple[tuple[LinePoint, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class ArmorHit:
-    """Plate 1 to 6 (rear, front, left, right, gimbal left, gimbal right); 0 bead, 1 collision, 2 hand."""
+    """Hit on plate 1 to 6 (rear, front, left, right, gimbal left, gimbal right); type 0 bead, 1 collision, 2 hand."""
 
     index: int
     type: int
@@ -113,7 +113,7 @@ class Applause:
 
 @dataclass(frozen=True, slots=True)
 class AdapterLevel:
-    """The level, 0 or 1, that an input of a sensor adapter changed to."""
+    """New level, 0 or 1, of an input of a sensor adapter."""
 
     id: int
     port: int
@@ -122,7 +122,7 @@ class AdapterLevel:
 
 @dataclass(frozen=True, slots=True)
 class GameInput:
-    """``data`` follows cmd_id and its length; for cmd_id 0: buttons, mouse x, mouse y, seq, count of keys, keys."""
+    """Input of the pilot; ``data`` for cmd_id 0: buttons, mouse x, mouse y, seq, number of keys, keys."""
 
     cmd_id: int
     data: tuple[int, ...]
@@ -152,7 +152,7 @@ _BROADCAST = re.compile(r"robot ip ([0-9.]{7,15}) ?;?")
 
 
 def hear(data: bytes) -> Iterator[Telemetry]:
-    """Parse a datagram of the push port, or whole texts of the event port."""
+    """Yield the messages in a datagram of the push port, or in whole texts of the event port."""
     module = ""
     for text in data[:TEXT_MAX].decode(errors="replace").split(";"):
         words = text.split()
@@ -163,7 +163,7 @@ def hear(data: bytes) -> Iterator[Telemetry]:
                 continue
             if module == "AI":
                 yield from _seen(words)
-            elif (module, words[0]) in _ATTRIBUTES:  # robots name the module once and continue after a `;`
+            elif (module, words[0]) in _ATTRIBUTES:  # real robots name the module once and continue after a `;`
                 yield _ATTRIBUTES[module, words[0]](words[1:])
             else:
                 yield from _event(" ".join(text.split()))
@@ -172,7 +172,7 @@ def hear(data: bytes) -> Iterator[Telemetry]:
 
 
 def broadcast_of(data: bytes) -> str | None:
-    """The address in ``robot ip A.B.C.D``, with or without ``;``; None if it is something else."""
+    """Return the address in ``robot ip A.B.C.D``, with or without ``;``; None for any other text."""
     if found := _BROADCAST.fullmatch(data[:TEXT_MAX].decode(errors="replace").strip()):
         try:
             return str(IPv4Address(found[1]))
@@ -182,7 +182,7 @@ def broadcast_of(data: bytes) -> str | None:
 
 
 def status_of(words: Sequence[str]) -> ChassisStatus:
-    """Eleven words of 0 or 1; ValueError if they are not."""
+    """Return the status in eleven words of 0 or 1. Raises ValueError."""
     if len(words) != len(fields(ChassisStatus)) or not set(words) <= {"0", "1"}:
         raise ValueError(f"no chassis status: {' '.join(words)}")
     return ChassisStatus(*(word == "1" for word in words))
@@ -204,7 +204,7 @@ def _event(text: str) -> Iterator[Telemetry]:
 
 
 def _seen(words: Sequence[str]) -> Iterator[Telemetry]:
-    """``person 1 0.5 0.5 0.3 0.7``; robots put several kinds behind each other."""
+    """Yield the objects in ``person 1 0.5 0.5 0.3 0.7``; real robots list several kinds in one text."""
     rest = list(reversed(words))
     while rest:
         kind, count = KINDS.get(rest.pop(), ""), int(rest.pop() if rest else "x")

@@ -1,4 +1,4 @@
-"""rmw_zenoh's key expressions and attachments, and how its graph is known: by liveliness tokens.
+"""rmw_zenoh's key expressions, attachments, and liveliness tokens, which make up the graph.
 
 A topic's messages have the key ``DOMAIN/TOPIC/TYPE/HASH``; each node, publisher and subscription has a token.
 """
@@ -36,15 +36,15 @@ class Node:
 
     @property
     def token(self) -> str:
-        """The key of the token that says that it is there."""
+        """Key of the node's token."""
         return f"{self._head(self.id, 'NN')}"
 
     def publisher_token(self, number: int, topic: str, type: str, type_hash: str, qos: str) -> str:
-        """The key of the token of a publisher; ``number`` is its own among the node's ends."""
+        """Return the key of a publisher's token; ``number``: unique among the node's publishers and subscriptions."""
         return f"{self._head(number, 'MP')}/{mangled(topic)}/{dds_type(type)}/{type_hash}/{qos}"
 
     def subscription_token(self, number: int, topic: str, type: str, type_hash: str, qos: str) -> str:
-        """The key of the token of a subscription."""
+        """Return the key of a subscription's token."""
         return f"{self._head(number, 'MS')}/{mangled(topic)}/{dds_type(type)}/{type_hash}/{qos}"
 
     def _head(self, number: int, kind: str) -> str:
@@ -53,7 +53,7 @@ class Node:
 
 
 def mangled(name: str) -> str:
-    """Return a name with ``%`` for ``/``, as it stands in a token."""
+    """Return a name in the form of tokens, with ``%`` for ``/``."""
     return name.replace("/", "%")
 
 

@@ -1,4 +1,4 @@
-"""Poses, points and rectangles as the Slamware API writes them. Bounded, so that no number can do harm further down."""
+"""Poses, points and rectangles of the Slamware API. Bounded, so that no number can do harm later."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Point(msgspec.Struct):
 
 
 class Location(msgspec.Struct):
-    """A place in space, m; robots on wheels ignore z. Also used for three components of anything."""
+    """A place in space, m; robots on wheels ignore z. Also used for any three components."""
 
     x: Metres
     y: Metres
@@ -57,7 +57,7 @@ class Quaternion(msgspec.Struct):
 
 
 class Rectangle(msgspec.Struct):
-    """Axis-parallel: the corner with the smallest x and y, and the extent, m."""
+    """Axis-parallel rectangle: the corner with the smallest x and y, and the extent, m."""
 
     x: float
     y: float

@@ -1,1 +1,1 @@
-"""The messages of VDA 5050 2.1 and 3.0 as bytes: what fleet control sends, read and checked. Knows no robot."""
+"""Messages of VDA 5050 2.1 and 3.0 from fleet control, parsed and checked. Knows no robot."""

@@ -1,4 +1,4 @@
-"""Orders and instant actions as fleet control sends them, with the fields of both versions, bounded and checked."""
+"""Orders and instant actions of fleet control, with the fields of both versions, bounded and checked."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ NotNegative = Annotated[float, msgspec.Meta(ge=0, le=100_000)]
 
 
 class Malformed(ValueError):
-    """The bytes are no such message; the text says where."""
+    """The bytes are not a valid message; the text says where."""
 
 
 class Parameter(msgspec.Struct, frozen=True):
-    """One value for an action."""
+    """One parameter of an action."""
 
     key: Id
     value: object
 
 
 class Action(msgspec.Struct, frozen=True, rename="camel"):
-    """Something to do at a node, on an edge or at once."""
+    """An action at a node, on an edge or at once."""
 
     action_type: Id
     action_id: Id
@@ -46,7 +46,7 @@ class Action(msgspec.Struct, frozen=True, rename="camel"):
 
     @property
     def values(self) -> dict[str, object]:
-        """The parameters by their names."""
+        """Values of the parameters by key."""
         return {parameter.key: parameter.value for parameter in self.action_parameters}
 
 
@@ -59,7 +59,7 @@ class Ellipse(msgspec.Struct, frozen=True):
 
 
 class NodePosition(msgspec.Struct, frozen=True):
-    """Position of a node in the map."""
+    """Position of a node in the map (m, rad)."""
 
     x: Metres
     y: Metres
@@ -70,7 +70,7 @@ class NodePosition(msgspec.Struct, frozen=True):
 
     @property
     def reach(self) -> float:
-        """Metres from the node that count as there; 0: as near as the robot can."""
+        """Distance from the node that counts as arrived, m; 0: as near as possible."""
         match self.deviation:
             case Ellipse(a=a, b=b):
                 return min(a, b)
@@ -92,14 +92,14 @@ class OrderPart(msgspec.Struct, frozen=True, rename="camel", kw_only=True):
 
 
 class Node(OrderPart, frozen=True, rename="camel", kw_only=True):
-    """A place to pass."""
+    """A place to pass on the way."""
 
     node_id: Id
     node_position: NodePosition | None = None
 
 
 class Edge(OrderPart, frozen=True, rename="camel", kw_only=True):
-    """The way between two nodes; fields that no robot here can use are kept to be refused."""
+    """The way between two nodes; unsupported fields are parsed so that they can be refused."""
 
     edge_id: Id
     start_node_id: Text | None = None
@@ -116,17 +116,17 @@ class Edge(OrderPart, frozen=True, rename="camel", kw_only=True):
 
     @property
     def speed(self) -> float | None:
-        """The most that is allowed, m/s; None: as fast as the robot goes."""
+        """Speed limit, m/s; None: no limit."""
         return self.maximum_speed if self.max_speed is None else self.max_speed
 
     @property
     def height(self) -> float | None:
-        """The most that the robot may be high, m."""
+        """Limit of the robot's height, m; None: no limit."""
         return self.maximum_height if self.max_height is None else self.max_height
 
 
 class OrderMessage(msgspec.Struct, frozen=True, rename="camel"):
-    """A way through nodes, or more of one that is under way."""
+    """A route of nodes and edges, or an update of the current one."""
 
     header_id: Count
     timestamp: Text
@@ -146,7 +146,7 @@ class OrderMessage(msgspec.Struct, frozen=True, rename="camel"):
 
 
 class InstantActions(msgspec.Struct, frozen=True, rename="camel"):
-    """Actions to be done at once."""
+    """Actions to execute at once."""
 
     header_id: Count
     timestamp: Text
@@ -174,7 +174,7 @@ def read(data: bytes, kind: type[M]) -> M:
 
 
 def _check_graph(order: OrderMessage) -> None:
-    """Raise Malformed unless nodes and edges take turns, numbered in step, released ones first."""
+    """Raise Malformed unless nodes and edges alternate, with consecutive numbers and the released ones first."""
     nodes, edges = order.nodes, order.edges
     if len(edges) != len(nodes) - 1:
         raise Malformed(f"{len(nodes)} nodes need {len(nodes) - 1} edges, not {len(edges)}")
@@ -203,7 +203,7 @@ def _check_edge(edge: Edge, start: Node, end: Node) -> None:
 
 
 def _check_ids(message: OrderMessage | InstantActions) -> None:
-    """Raise Malformed for an actionId that comes twice."""
+    """Raise Malformed for a repeated actionId."""
     parts: Iterable[OrderPart | InstantActions] = message.parts if isinstance(message, OrderMessage) else (message,)
     ids = [action.action_id for part in parts for action in part.actions]
     if len(ids) != len(set(ids)):

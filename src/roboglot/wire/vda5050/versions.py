@@ -39,11 +39,11 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """One version of the protocol: its number, its topics' level, and its words."""
+    """One version of the protocol: its number, its level in topics, and its words."""
 
     number: str
     level: str
-    new_words: bool  # 3.0's names of fields and values
+    new_words: bool  # use 3.0's names of fields and values
 
     def error(self, kind: ErrorKind) -> str:
         """Return the errorType."""

@@ -1,4 +1,4 @@
-"""Messages between robots and their cloud (0.2.1.3): frames one way, answers with a code the other. Pure text."""
+"""Messages between robots and their cloud (0.2.1.3): frames to the cloud, answers with a code back. Pure text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-KINDS, RECORD = ("task", "module"), "record"  # an account's programs; the history of its robots
+KINDS, RECORD = ("task", "module"), "record"  # programs of an account; history of its robots
 ITEMS_MAX = 20_000  # programs per answer
 ANSWER_MAX = 64 * 1024 * 1024  # bytes
 ROBOT_HEADER = "x-robot"  # identifies the account's robot
@@ -28,12 +28,12 @@ class CloudCode(StrEnum):
 
 
 class BadCloudAnswer(ValueError):
-    """Message that does not conform to 0.2.1.3."""
+    """The answer does not conform to 0.2.1.3."""
 
 
 @dataclass(frozen=True, slots=True)
 class CloudAnswer:
-    """``items`` are frames, or parts of frames, as they came."""
+    """Answer of the cloud; ``items``: unchecked frames, or parts of frames."""
 
     code: CloudCode
     message: str
@@ -44,7 +44,7 @@ class CloudAnswer:
 def format_answer(
     code: CloudCode, message: str, request: str, items: Sequence[Mapping[str, object]] | None = None
 ) -> bytes:
-    """The cloud's end; ``data`` is there only where something was asked for."""
+    """Return the bytes of an answer; with ``data`` only if ``items`` are given."""
     fields: dict[str, object] = {"code": str(code), "message": message, "request_id": request}
     if items is not None:
         fields["data"] = items
@@ -52,7 +52,7 @@ def format_answer(
 
 
 def parse_answer(body: bytes) -> CloudAnswer:
-    """The robot's end. Raises BadCloudAnswer."""
+    """Return an answer from its bytes. Raises BadCloudAnswer."""
     try:
         fields = json.loads(body)
         items = fields.get("data") or []
@@ -65,13 +65,13 @@ def parse_answer(body: bytes) -> CloudAnswer:
 
 
 def inquiry(kind: str, id: str, known: Sequence[str]) -> str:
-    """The robot asks for what it does not have yet; ``known``: all that it has."""
+    """Return the robot's request for programs that it lacks; ``known``: ids of those that it has."""
     empty = dict.fromkeys(("describe", "style", "mode", "condition", "body"), "")
     return json.dumps({"type": kind, "id": id, "operate": "inquiry", "target_id": list(known)} | empty)
 
 
 def save_frame(item: Mapping[str, object], kind: str) -> str:
-    """The frame with which a front end would save an item; its id is the program's (or the first of its targets)."""
+    """Return a front end's frame for saving an item; the program's id is its first target or its ``id``."""
     targets = item.get("target_id")
     id = targets[0] if isinstance(targets, list) and targets else item.get("id")
     texts = {name: item.get(name, "") for name in ("describe", "style", "mode", "condition", "body")}

@@ -1,4 +1,4 @@
-"""The interface between carriers of frame texts (a gRPC door, a WebSocket) and the program service's door."""
+"""Interface between carriers of frame texts (a gRPC door, a WebSocket) and the program service's door."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Protocol
 
 
 class FrontEnd(Protocol):
-    """Receiver of frames for front ends (code 2001); each kind in its order. The first two must be quick."""
+    """Receiver of frames for front ends (code 2001), each kind in order. ``answer`` and ``publish`` must be quick."""
 
     @property
     def longest(self) -> int:
-        """Bytes that one frame may have; 0: any number."""
+        """Most bytes of a frame; 0: no limit."""
 
     def answer(self, text: str) -> None:
         """Send an answer to a request: feedback or a response."""
@@ -20,14 +20,14 @@ class FrontEnd(Protocol):
         """Send a report of a task."""
 
     async def room(self) -> None:
-        """Wait until more can be sent; programs wait with it."""
+        """Wait until more can be sent; programs wait for this."""
 
 
 class FrameRelay(Protocol):
-    """Takes frames from front ends and hands frames back to them."""
+    """Takes frames from front ends and sends frames back to them."""
 
     async def receive(self, text: str) -> None:
         """One frame from a front end (code 2002); never raises for what is in it: the answer is a frame, too."""
 
     def attach(self, front_end: FrontEnd) -> Callable[[], None]:
-        """Hand every frame for front ends (code 2001) to this one; returns what ends it."""
+        """Send every frame for front ends (code 2001) to this one; return a function that ends it."""

@@ -1,4 +1,4 @@
-"""Robot to front end: feedback, progress and response frames (0.2.1.2). Formats; decides nothing."""
+"""Formats of frames from robot to front end: feedback, progress and response (0.2.1.2)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboglot.wire.visual.codes import FeedbackState
 
 DESCRIBE_MAX = 4000  # characters of describe in an outgoing frame
 UTF8_MAX = 4  # bytes per character
-PART = 64  # bytes of a response's part and parts, with a margin
+PART = 64  # bytes of the fields part and parts, with a margin
 
 
 def feedback(
@@ -22,7 +22,7 @@ def feedback(
     describe: str,
     block: tuple[str, str] | None = None,
 ) -> str:
-    """A feedback frame (0.2.1.2.2.1); with ``block`` = ("begin" or "end", its id) a progress frame (0.2.1.2.2.2)."""
+    """Return a feedback frame (0.2.1.2.2.1), or with ``block`` ("begin" or "end", id) a progress frame (.2.2)."""
     frame: dict[str, object] = {
         "feedback": {
             "type": kind,
@@ -40,15 +40,15 @@ def feedback(
 
 
 def responses(*, kind: str, id: str, items: Sequence[Mapping[str, object]], longest: int = 0) -> list[str]:
-    """The answer to a legal inquiry (0.2.1.2.2.3 and following); in parts if it has more than ``longest`` bytes.
+    """Return the answer to a legal inquiry (0.2.1.2.2.3 and following), in parts of at most ``longest`` bytes.
 
-    Each part has its number and that of the last one (``part``, ``parts``). An item that alone is too long is refused
-    by a feedback with state 29. ``longest`` 0: there is no limit.
+    Each part has its number and the number of parts (``part``, ``parts``). An item that is too long by itself is
+    refused by a feedback with state 29. ``longest`` 0: no limit.
     """
     encoded = [json.dumps(item, ensure_ascii=False) for item in items]
     around = len(_response(kind, id, []).encode()) + PART
     if not longest or around + sum(map(len, encoded)) * UTF8_MAX + 2 * len(encoded) <= longest:
-        return [_response(kind, id, encoded)]  # the usual case: not even measured
+        return [_response(kind, id, encoded)]  # the usual case, without measuring
     sizes = [len(text.encode("utf-8", "replace")) + 2 for text in encoded]
     parts: list[list[str]] = [[]]
     refused, room = [], longest - around

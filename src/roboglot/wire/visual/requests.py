@@ -1,6 +1,6 @@
-"""Front end to robot: one JSON object per frame (0.2.1.1), checked field by field in the manual's order.
+"""Frames from front end to robot: one JSON object each (0.2.1.1), checked field by field in the manual's order.
 
-Strict JSON, but for raw line breaks inside strings, which the manual's own examples have. Knows no state of any task.
+Strict JSON, except for raw line breaks inside strings, which the manual's own examples have. Knows no task's state.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Request:
 
 
 class BadFrame(ValueError):
-    """Error in a frame, with as much of it as the feedback needs (empty where it was unreadable)."""
+    """Error in a frame, with the fields that the feedback needs (empty if unreadable)."""
 
     def __init__(self, state: FeedbackState, message: str, fields: dict[str, object]) -> None:
         super().__init__(message)
@@ -77,7 +77,7 @@ class BadFrame(ValueError):
 
 
 def parse_request(text: str) -> Request:
-    """Check and read one frame; raises BadFrame with the code of the first bad field."""
+    """Return a checked frame. Raises BadFrame with the code of the first bad field."""
     fields = _decode(text)
     check = _Checker(fields)
     kind = check.kind()
@@ -116,7 +116,7 @@ def _no_constant(name: str) -> NoReturn:
 
 
 class _Checker:
-    """Reads fields of one frame and refuses with their codes."""
+    """Reads the fields of one frame; refuses bad ones with their codes."""
 
     __slots__ = ("_fields",)
 
@@ -127,7 +127,7 @@ class _Checker:
         raise BadFrame(state, message, self._fields)
 
     def text(self, name: str, state: FeedbackState, limit: int) -> str:
-        """A string within ``limit``; missing is empty."""
+        """Return a string of at most ``limit`` characters; empty if missing."""
         value = self._fields.get(name, "")
         if not isinstance(value, str):
             self.refuse(state, f"{name} must be a string")
