@@ -1,8 +1,8 @@
-"""TLS in front of any protocol: on a port that takes plain connections, too (the first byte decides), and to a port.
+"""TLS in front of any protocol, for clients and servers; a port may also take plain connections, by the first byte.
 
-A port's handshake is asked for before it costs anything, and ends within HANDSHAKE_SECONDS_MAX. Works over every loop's
-transports, and needs none of their own TLS, which begins before anything can be asked, and takes twice as long for a
-short message.
+A server can refuse a handshake before it costs anything; it ends within HANDSHAKE_SECONDS_MAX. Works over the
+transports of all loops, without the loops' own TLS, whose handshake cannot be refused, and which takes twice as long
+for a short message.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ class CloudMirror:
             await asyncio.gather(self._sender, return_exceptions=True)
 
     async def note(self, request: Request) -> None:
-        """A front end's operation was done: the same frame goes to the cloud, with a time stamp for an id."""
+        """Send the frame of a front end's completed operation to the cloud, with a time stamp as its id."""
         fields = {
             "type": request.kind,
             "id": self._stamp(),

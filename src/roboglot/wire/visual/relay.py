@@ -27,7 +27,7 @@ class FrameRelay(Protocol):
     """Takes frames from front ends and sends frames back to them."""
 
     async def receive(self, text: str) -> None:
-        """One frame from a front end (code 2002); never raises for what is in it: the answer is a frame, too."""
+        """Take one frame from a front end (code 2002). Never raises for its contents: errors are answered by frames."""
 
     def attach(self, front_end: FrontEnd) -> Callable[[], None]:
         """Send every frame for front ends (code 2001) to this one; return a function that ends it."""

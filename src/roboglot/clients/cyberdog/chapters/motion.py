@@ -12,9 +12,9 @@ from roboglot.clients.errors import LinkLost
 from roboglot.wire.cyberdog.chapters.motion.motion import CommandType, Motion, MotionCode
 from roboglot.wire.cyberdog.codes import Code
 
-FRAME_PERIOD = 0.1  # s; the robot stops after 0.2 without one
+FRAME_PERIOD = 0.1  # s; the robot stops after 0.2 s without a frame
 MOTION_MAX = 25.0  # s: the robot itself answers within 20
-STEP = (0.05, 0.05)  # m: of the front and the rear feet
+STEP = (0.05, 0.05)  # lift of the front and the rear feet, m
 
 
 class _Outcome(msgspec.Struct):
@@ -28,12 +28,12 @@ class _Success(msgspec.Struct):
 
 
 class MotionChapter(Calls):
-    """Velocities are m/s and rad/s: x forward, y left, yaw counter-clockwise."""
+    """Motions. Velocities are in m/s and rad/s: x forward, y left, yaw counter-clockwise."""
 
     async def perform(self, motion: int, *, seconds: float = 0.0, velocity: tuple[float, float, float] | None = None,
                       position: tuple[float, float, float] | None = None,
                       attitude: tuple[float, float, float] | None = None) -> None:  # fmt: skip
-        """1004: to its end. Raises CyberDogRefused with the motion's code (30xx) and its name."""
+        """1004: perform a motion to its end. Raises CyberDogRefused with the code (30xx) and its name."""
         params: dict[str, object] = {"motion_id": int(motion), "cmd_source": 0, "duration": round(1000 * seconds)}
         for name, values in (("vel_des", velocity), ("pos_des", position), ("rpy_des", attitude)):
             if values is not None:
@@ -45,7 +45,7 @@ class MotionChapter(Calls):
             raise CyberDogRefused(f"motion {int(motion)}", reply.code, words)
 
     async def stand(self) -> None:
-        """Get up."""
+        """Stand up."""
         await self.perform(Motion.STAND_UP)
 
     async def lie_down(self) -> None:
@@ -58,7 +58,7 @@ class MotionChapter(Calls):
 
     async def servo_frame(self, motion: int, x: float, y: float, yaw: float, *, cmd_id: int | None = None,
                           lift: tuple[float, float] = STEP) -> None:  # fmt: skip
-        """1002: one frame, good for 200 ms; ``lift`` of the feet, m; what became of it is pushed (ServoResponse)."""
+        """1002: send one frame, valid for 200 ms; ``lift`` of the feet, m. Its result is pushed (ServoResponse)."""
         frame: dict[str, object] = {
             "motion_id": int(motion),
             "cmd_type": int(CommandType.DATA),
@@ -69,25 +69,25 @@ class MotionChapter(Calls):
         await self.text(Code.SERVO, frame if cmd_id is None else {**frame, "cmd_id": cmd_id}, within=1.0)
 
     async def end_servo(self, motion: int = Motion.TROT_SLOW) -> None:
-        """1002: the last frame; the robot stands."""
+        """1002: send the last frame; the robot stops."""
         await self.text(Code.SERVO, {"motion_id": int(motion), "cmd_type": int(CommandType.END)}, within=1.0)
 
     async def align_with_stairs(self, *, up: bool) -> bool:
-        """1100: stand square before the flight ahead; False if it sees none. It goes on after the answer."""
+        """1100: align with the stairs ahead; False if it sees none. The robot is still moving after the answer."""
         reply = await self.ask(Code.ALIGN_WITH_STAIRS, _Success, {"data": up})
         return reply.success
 
     async def end_stair_alignment(self) -> None:
-        """1101: stand still, wherever it is."""
+        """1101: stop the alignment where the robot is."""
         await self.do(Code.END_STAIR_ALIGNMENT)
 
     def servo(self, motion: int = Motion.TROT_SLOW) -> Servo:
-        """``async with client.servo() as joystick: joystick.set(0.3, 0, 0)``; stands still at the end."""
+        """Drive by ``async with client.servo() as joystick: joystick.set(0.3, 0, 0)``; stops at the end."""
         return Servo(self, motion)
 
 
 class Servo:
-    """Sends frames while it is open; ends by itself when the link is lost, and says so at the next ``set``."""
+    """Sends frames while open; ends when the link is lost, which the next ``set`` raises."""
 
     def __init__(self, motion_chapter: MotionChapter, motion: int) -> None:
         self._chapter, self._motion = motion_chapter, motion
@@ -107,7 +107,7 @@ class Servo:
         await self._chapter.end_servo(self._motion)
 
     def set(self, x: float, y: float, yaw: float) -> None:
-        """Set the velocity in m/s and rad/s. Raises LinkLost when frames no longer get through."""
+        """Set the velocity in m/s and rad/s. Raises LinkLost if frames no longer get through."""
         if self._sending and self._sending.done():
             raise LinkLost("the servo's frames do not get through any more")
         self._velocity = (x, y, yaw)

@@ -1,4 +1,4 @@
-"""Visual programming over 2002 and 2001: frames down, feedback up. Independent of the programs' contents."""
+"""Visual programming by 2002 and 2001: frames to the robot, feedback from it. Independent of programs' contents."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FEEDBACK_MAX = 60.0  # s
 
 
 class Programs(Calls):
-    """A frame and the feedback that carries its id."""
+    """Frames, matched with their feedback by id."""
 
     frames: Feed[object]  # pushes of code 2001
     _numbers = itertools.count(1)
@@ -42,12 +42,12 @@ class Programs(Calls):
         return reply
 
     async def deploy(self, task: str, body: str, *, describe: str = "", style: str = "") -> None:
-        """Save ``body`` as the single task ``task``, to run on command."""
+        """Save ``body`` as the task ``task`` of mode single, to be run on command."""
         more = {"mode": "single", "condition": "now", "describe": describe, "style": style, "body": body}
         await self.operate("task", "save", task, **more)
 
     async def run_program(self, task: str) -> None:
-        """Run a deployed task; its output and progress are pushed (Frame)."""
+        """Run a deployed task; its progress is pushed (ProgramFrame)."""
         await self.operate("task", "run", task)
 
 

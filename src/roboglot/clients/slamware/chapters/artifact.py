@@ -28,11 +28,11 @@ class Artifact(Chapter):
 
     @call("POST /api/core/artifact/v1/lines/{usage}")
     async def add_lines(self, usage: LineUsage, body: list[Line]) -> bool:
-        """Add some; the ids in the body do not count."""
+        """Add lines; the ids in the body are ignored."""
 
     @call("PUT /api/core/artifact/v1/lines/{usage}")
     async def modify_lines(self, usage: LineUsage, body: list[Line]) -> bool:
-        """Change those with these ids; 404, and nothing happens, if one of them does not exist."""
+        """Change the lines with these ids; 404, without any change, if one of them does not exist."""
 
     @call("DELETE /api/core/artifact/v1/lines/{usage}")
     async def clear_lines(self, usage: LineUsage) -> bool:
@@ -48,7 +48,7 @@ class Artifact(Chapter):
 
     @call("POST /api/core/artifact/v1/rectangle-areas/{usage}")
     async def add_rectangle_area(self, usage: AreaUsage, body: AreaRequest) -> bool:
-        """Add one; what its metadata ask for must make sense."""
+        """Add an area; its metadata must be valid."""
 
     @call("DELETE /api/core/artifact/v1/rectangle-areas/{usage}")
     async def clear_rectangle_areas(self, usage: AreaUsage) -> bool:
@@ -68,7 +68,7 @@ class Artifact(Chapter):
 
     @call("POST /api/core/artifact/v1/pois")
     async def add_pois(self, body: PoseEntry) -> None:
-        """Add one, or replace the one with its id; without a pose it is where the robot is now."""
+        """Add a point or replace one with the same id; without a pose, at the robot's current pose."""
 
     @call("DELETE /api/core/artifact/v1/pois")
     async def clear_pois(self) -> bool:
@@ -92,7 +92,7 @@ class Artifact(Chapter):
 
     @call("GET /api/core/artifact/v1/laser-landmarks")
     async def get_laser_landmarks(self) -> list[PoseEntry]:
-        """Return the defined ones."""
+        """Return all landmarks."""
 
     @call("DELETE /api/core/artifact/v1/laser-landmarks")
     async def delete_laser_landmarks(self) -> bool:
@@ -100,11 +100,11 @@ class Artifact(Chapter):
 
     @call("PUT /api/core/artifact/v1/laser-landmarks")
     async def put_laser_landmarks(self, body: list[PoseEntry]) -> bool:
-        """These, and no others."""
+        """Replace all landmarks."""
 
     @call("GET /api/core/artifact/v1/laser-landmarks/:update")
     async def get_laser_landmark_update(self) -> bool:
-        """Is automatic update of laser landmarks enabled."""
+        """Return True if automatic update of laser landmarks is enabled."""
 
     @call("PUT /api/core/artifact/v1/laser-landmarks/:update")
     async def set_laser_landmark_update(self, body: Switch) -> bool:
@@ -112,4 +112,4 @@ class Artifact(Chapter):
 
     @call("POST /api/core/artifact/v1/laser-landmarks/:remove")
     async def remove_laser_landmarks(self, body: list[str | int]) -> bool:
-        """Remove some by id, all or none; 404 if one does not exist. Ids as the robot has them."""
+        """Remove landmarks by id, all or none; 404 if one does not exist."""

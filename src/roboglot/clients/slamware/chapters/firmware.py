@@ -24,7 +24,7 @@ class Firmware(Chapter):
 
     @call("PUT /api/core/firmware/v1/autoupdate/:enable")
     async def set_enable_auto_update(self, body: Switch) -> None:
-        """Let it, or not."""
+        """Switch automatic updates."""
 
     @call("POST /api/core/firmware/v1/autoupdate/:start")
     async def start_update(self) -> Outcome:
@@ -40,7 +40,7 @@ class Firmware(Chapter):
 
     @call("GET /api/core/application/v1/apps")
     async def get_apps(self) -> list[InstalledApp]:
-        """The apps that people installed."""
+        """Return the installed apps."""
 
     @call("POST /api/core/application/v1/apps")
     async def install_app(self, body: bytes) -> None:

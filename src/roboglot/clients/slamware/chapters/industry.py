@@ -22,7 +22,7 @@ class Industry(Chapter):
 
     @call("POST /api/industry/v1/tasks/templates")
     async def create_task_template(self, body: TemplateRequest) -> TaskTemplate:
-        """Keep it, in place of one with the same key; 404 for a place that is not on the map."""
+        """Store a template, in place of one with the same key; 404 for a place that is not on the map."""
 
     @call("GET /api/industry/v1/tasks/templates")
     async def get_task_templates(self) -> list[TaskTemplate]:
@@ -30,16 +30,16 @@ class Industry(Chapter):
 
     @call("DELETE /api/industry/v1/tasks/templates/{key_id}")
     async def delete_task_template(self, key_id: str) -> CommonResponse:
-        """Forget it; 404 if there is none."""
+        """Delete a template; 404 if there is none."""
 
     @call("GET /api/industry/v1/tasks")
     async def get_industry_tasks(self, type: str | None = None, status: str | None = None) -> list[IndustryTask]:
-        """List ready and running tasks, oldest first; with ``status`` all also those that ended."""
+        """List ready and running tasks, oldest first; with ``status`` "all" also ended ones."""
 
     @call("POST /api/industry/v1/tasks/events")
     async def post_task_event(self, body: TaskEvent) -> None:
-        """The client that carries out a call says how it goes; 404 for an unknown one, 403 for one that has ended."""
+        """Report the progress of a call that the client carries out; 404 for an unknown call, 403 for an ended one."""
 
     @call("POST /api/industry/v1/generate_landing_pose")
     async def generate_landing_pose(self, body: LandingRequest) -> LandingPose:
-        """Return the robot's pose and a place ahead of it from which it would come back here; beyond the manual."""
+        """Return the robot's pose and a landing point at the given distance ahead of it; beyond the manual."""

@@ -23,7 +23,7 @@ class Motion(Chapter):
 
     @call("GET /api/core/motion/v1/action-factories")
     async def get_action_factories(self) -> list[ActionFactory]:
-        """The kinds of action that this robot can do."""
+        """Return the kinds of action that this robot can do."""
 
     @call("GET /api/core/motion/v1/actions/:current")
     async def get_current_action(self) -> ActionInfo:
@@ -35,7 +35,7 @@ class Motion(Chapter):
 
     @call("POST /api/core/motion/v1/actions")
     async def create_action(self, body: ActionRequest) -> ActionInfo:
-        """Start an action in place of the one under way; 400 for what this robot cannot do or does not understand."""
+        """Start an action in place of the current one; 400 for unknown or invalid actions."""
 
     @call("GET /api/core/motion/v1/actions/{action_id}")
     async def get_action_result(self, action_id: int) -> ActionReport:
@@ -47,7 +47,7 @@ class Motion(Chapter):
 
     @call("GET /api/core/motion/v1/milestones")
     async def get_remaining_milestones(self) -> PathPoints:
-        """The goals still to reach."""
+        """Return the remaining goals."""
 
     @call("GET /api/core/motion/v1/speed")
     async def get_current_speed(self) -> Speed:
@@ -55,11 +55,11 @@ class Motion(Chapter):
 
     @call("GET /api/core/motion/v1/time")
     async def get_remaining_time(self) -> float:
-        """Seconds to the goal; 0 when the robot goes nowhere."""
+        """Return the remaining time to the goal, s; 0 without a goal."""
 
     @call("POST /api/core/motion/v1/:search_path")
     async def search_path(self, body: PathQuery) -> PathPoints:
-        """The path that the robot would take to a target, without going; empty if there is none."""
+        """Return the path that the robot would take to a target, without moving; empty if there is none."""
 
     @call("GET /api/core/motion/v1/strategies")
     async def get_motion_strategies(self) -> list[str]:
@@ -67,7 +67,7 @@ class Motion(Chapter):
 
     @call("GET /api/core/motion/v1/strategies/:current")
     async def get_current_strategy(self) -> str:
-        """The one in use."""
+        """Return the current strategy."""
 
     @call("PUT /api/core/motion/v1/strategies/:current")
     async def set_current_strategy(self, body: Strategy) -> bool:

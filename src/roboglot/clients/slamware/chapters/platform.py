@@ -14,7 +14,7 @@ class Platform(Chapter):
 
     @call("GET /api/platform/v1/timestamp")
     async def get_timestamp(self) -> str:
-        """Milliseconds since the start, as text."""
+        """Return the milliseconds since the start, as text."""
 
     @call("GET /api/platform/v1/events")
     async def get_events(self) -> list[RobotEvent]:

@@ -13,8 +13,8 @@ class Statistics(Chapter):
 
     @call("GET /api/core/statistics/v1/odometry")
     async def get_odometry(self) -> float:
-        """Metres travelled."""
+        """Return the travelled distance, m."""
 
     @call("GET /api/core/statistics/v1/runtime")
     async def get_runtime(self) -> float:
-        """Seconds of robot time."""
+        """Return the running time, s of robot time."""

@@ -268,7 +268,7 @@ async def _newest(robot: Robot, *, outdoor: bool | None = None) -> StoredMap:
 
 
 def same_origin(stored: OccupancyGrid, used: OccupancyGrid) -> bool:
-    """Return whether both maps have their walls at the same places; the origin changes with every restart."""
+    """Return whether both maps have their walls at the same places; after a restart the origin differs."""
     rows, columns = np.nonzero(stored.log_odds >= WALL)
     if not len(rows) or not used.width:
         return False

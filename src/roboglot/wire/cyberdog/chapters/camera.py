@@ -1,6 +1,6 @@
-"""Image transmission's signalling (4001): the JSON of offers, answers, candidates and ends. Knows no WebRTC.
+"""Signalling of the image transmission (4001): JSON of offers, answers, candidates and ends. Knows no WebRTC.
 
-Both directions have the same forms; a message with nothing but a ``uid`` asks the robot to end that one's pictures.
+Both directions use the same forms; a message with only a ``uid`` asks the robot to end the video of that app.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import msgspec
 
 from roboglot.wire.cyberdog.text import Int32, NotJson, read_json
 
-DEFAULT_UID = "default_uid"  # of an app that does not name itself
+DEFAULT_UID = "default_uid"  # uid of an app that gives none
 UID_MAX = 128  # characters
 SDP_MAX = 65_536  # characters
 CANDIDATE_MAX = 1024  # characters
-STRETCH_MAX = 4.0  # of a screen: ratio of its sides
+STRETCH_MAX = 4.0  # largest ratio of a screen's sides
 
 
 class Alignment(StrEnum):
@@ -37,7 +37,7 @@ class VideoError(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Screen:
-    """The app's, pixels."""
+    """Screen of the app, pixels."""
 
     width: int
     height: int
@@ -66,7 +66,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """App: end it. Robot (``done``): it has ended."""
+    """End of a video: requested by the app, or (``done``) reported by the robot."""
 
     uid: str
     done: bool = False
@@ -74,7 +74,7 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """The robot cannot: ``code`` is a VideoError where it is known."""
+    """Failure of the robot; ``code``: a VideoError if known."""
 
     uid: str
     code: int
@@ -101,11 +101,11 @@ class _Error(msgspec.Struct):
 
 
 class BadSignal(ValueError):
-    """A message that is none of these."""
+    """The message is not a valid signal."""
 
 
 def read_signal(fields: Mapping[str, object]) -> Signal:
-    """The message in ``fields``; a description may be an object, JSON in a text, or the bare SDP. Raises BadSignal."""
+    """Return the signal in ``fields``; a description may be an object, JSON text, or bare SDP. Raises BadSignal."""
     uid = fields.get("uid") or DEFAULT_UID
     if not isinstance(uid, str) or len(uid) > UID_MAX:
         raise BadSignal(f"uid is a text of up to {UID_MAX} characters")
@@ -124,7 +124,7 @@ def read_signal(fields: Mapping[str, object]) -> Signal:
 
 
 def fields_of(signal: Signal) -> dict[str, object]:
-    """Result of ``read_signal``."""
+    """Return the fields of a signal, for ``read_signal``."""
     match signal:
         case Description(uid, kind, sdp, screen):
             size = (
@@ -157,7 +157,7 @@ def _candidate(uid: str, value: object) -> Candidate:
 
 
 def _screen(fields: Mapping[str, object]) -> Screen | None:
-    """Return the candidate only if all three fields are valid, as on real robots."""
+    """Return the screen only if all three fields are valid, as on real robots."""
     height, width, alignment = (fields.get(name) for name in ("height", "width", "alignment"))
     if not (isinstance(height, int) and isinstance(width, int) and alignment in tuple(Alignment)):
         return None

@@ -1,6 +1,6 @@
-"""Chapter "status" on the wire: a heartbeat as text, for those who follow what a robot says.
+"""Chapter "status" on the wire: heartbeats as text, for recordings and other followers of a robot.
 
-Heartbeats come twice a second and mostly say the same: they are reported when they say something else, and sometimes.
+Heartbeats come twice a second, mostly unchanged: changes are reported at once, unchanged ones now and then.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
-HEARTBEAT = "heartbeat"  # the operation; the service's name for it
-LEGS = ("left front", "right front", "left rear", "right rear")  # the order of motors' values
+HEARTBEAT = "heartbeat"  # name of the operation in the service
+LEGS = ("left front", "right front", "left rear", "right rear")  # order of the motors' values
 AGAIN = 20  # heartbeats after which an unchanged one is reported again
 
 
 class Beats:
-    """Tells which of a robot's heartbeats are news."""
+    """Filter of a robot's heartbeats: passes changes, and every ``AGAIN``-th unchanged one."""
 
     def __init__(self) -> None:
         self._last = b""
         self._since = 0
 
     def news(self, ticks: pb.Ticks) -> str:
-        """Return the heartbeat as JSON with the names of its fields; empty if it says what the last ones said."""
+        """Return the heartbeat as JSON with its field names; empty if it has not changed."""
         data: bytes = ticks.SerializeToString()
         self._since += 1
         if data == self._last and self._since < AGAIN:
@@ -34,12 +34,12 @@ class Beats:
         return json.dumps(fields, ensure_ascii=False, separators=(",", ":"))
 
     def forget(self) -> None:
-        """Forget the last one: no one follows, and the next one is news."""
+        """Forget the last heartbeat, so that the next one is reported; for times without followers."""
         self._last = b""
 
 
 def ticks_of(text: str, address: str) -> pb.Ticks | None:
-    """Return a heartbeat that was reported, from another address; None where the text is none."""
+    """Return a reported heartbeat with ``address`` in place of its own; None for invalid texts."""
     try:
         ticks: pb.Ticks = ParseDict(json.loads(text), pb.Ticks(), ignore_unknown_fields=True)
     except (ParseError, ValueError, RecursionError):

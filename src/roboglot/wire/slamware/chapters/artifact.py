@@ -46,7 +46,7 @@ class PoseChange(msgspec.Struct):
 
 
 def metadata_text(metadata: Metadata) -> dict[str, str]:
-    """Metadata with every value as text, in the JSON spelling where it was none."""
+    """Return the metadata with every value as text; values that are not text become JSON."""
     if not isinstance(metadata, dict):
         return {}
     return {k: v if isinstance(v, str) else msgspec.json.encode(v).decode() for k, v in metadata.items()}
@@ -115,13 +115,13 @@ class RectangleArea(msgspec.Struct):
 
 
 class MetadataError(ValueError):
-    """A value in the metadata makes no sense; the message names it."""
+    """A value in the metadata is invalid; the message names it."""
 
 
 def control_points(metadata: dict[str, str]) -> tuple[Point, Point] | None:
-    """A curve's control points, None for a straight line. Raises MetadataError.
+    """Return a curve's control points, None for a straight line. Raises MetadataError.
 
-    They are written as ``{'x':0.1,'y':0.1}``, in one kind of quotes or the other.
+    They are written as ``{'x':0.1,'y':0.1}``, in single or double quotes.
     """
     texts = [metadata.get(key) for key in ("control_point1", "control_point2")]
     if texts == [None, None]:
@@ -134,7 +134,7 @@ def control_points(metadata: dict[str, str]) -> tuple[Point, Point] | None:
 
 
 def number(metadata: dict[str, str], key: str, most: float) -> float | None:
-    """A number between 0 and ``most`` written as text; None if it is not there. Raises MetadataError."""
+    """Return a number from 0 to ``most``, written as text; None if missing. Raises MetadataError."""
     if (text := metadata.get(key, "")) == "":
         return None
     try:
@@ -150,7 +150,7 @@ SENSOR_TYPES = ("bumper", "cliff", "sonar", "depth camera")
 
 
 def sensor_types(metadata: dict[str, str]) -> frozenset[str]:
-    """The sensors that a ``sensor_type`` like ``[0,3]`` means; other commas are in use. Raises MetadataError."""
+    """Return the sensors of a ``sensor_type`` like ``[0,3]``, with any kind of comma. Raises MetadataError."""
     text = metadata.get("sensor_type", "")
     if not re.fullmatch(r"\s*\[?[\s0-9,，、]*\]?\s*", text[:100]):
         raise MetadataError("sensor_type is a list like [0,3]")

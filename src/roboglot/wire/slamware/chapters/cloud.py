@@ -13,7 +13,7 @@ Number = Annotated[str, msgspec.Meta(pattern=r"^[\w.-]{1,64}$")]
 
 
 class RoundTarget(msgspec.Struct):
-    """A point of a round, what there is to do, and how long (s; 0: until the operation is ended)."""
+    """A point of a round, its action, and the wait (s; 0: until the operation is ended)."""
 
     target_name: Annotated[str, msgspec.Meta(min_length=1, max_length=256)]
     action: Annotated[str, msgspec.Meta(max_length=256)] = ""
@@ -21,10 +21,10 @@ class RoundTarget(msgspec.Struct):
 
 
 class CloudTask(msgspec.Struct):
-    """A delivery task as ``POST tasks`` takes it, and three kinds that only a cloud gives.
+    """A delivery task as in ``POST tasks``, or of three kinds that only a cloud creates.
 
-    STATION_TAKEOUT: the first task point is the cabinet. INDUSTRY: the round through ``task_targets``. DISINFECT: no
-    robot here can do that.
+    STATION_TAKEOUT: the first task point is the cabinet. INDUSTRY: a round through ``task_targets``. DISINFECT: not
+    supported by any robot here.
     """
 
     type: Literal[

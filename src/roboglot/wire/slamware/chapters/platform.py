@@ -1,4 +1,4 @@
-"""Chapter "platform": what the robot says happened."""
+"""Chapter "platform": events of the robot."""
 
 from __future__ import annotations
 

@@ -21,17 +21,17 @@ Progress = Callable[[float], object]
 
 @dataclass(frozen=True, slots=True)
 class CameraFile:
-    """A photo (.jpg) or a recording (.mp4), whole."""
+    """A complete photo (.jpg) or recording (.mp4)."""
 
     name: str
     data: bytes
 
 
 class Camera(Calls):
-    """``on_progress`` is called with the share (0..1) of the file that has come."""
+    """Photos and recordings. ``on_progress`` is called with the received part of the file (0..1)."""
 
     async def photo(self, on_progress: Progress | None = None) -> CameraFile:
-        """4002 by getFile: take a picture of now."""
+        """4002 by getFile: take a photo and return it."""
         return await self._file(Code.CAMERA, {"command": PHOTO}, on_progress)
 
     async def record(self) -> None:
@@ -39,11 +39,11 @@ class Camera(Calls):
         await self._camera(RECORD)
 
     async def stop_recording(self, on_progress: Progress | None = None) -> CameraFile:
-        """4002 by getFile: end the recording and take it."""
+        """4002 by getFile: end the recording and return it."""
         return await self._file(Code.CAMERA, {"command": STOP}, on_progress)
 
     async def keep_photo(self) -> None:
-        """4002 by sendMsg: a picture that stays on the robot (FilesLeft) until ``saved_file`` takes it."""
+        """4002 by sendMsg: take a photo that stays on the robot (FilesLeft) until ``saved_file`` fetches it."""
         await self._camera(PHOTO)
 
     async def keep_recording(self) -> None:
@@ -51,7 +51,7 @@ class Camera(Calls):
         await self._camera(STOP)
 
     async def saved_file(self, name: str, on_progress: Progress | None = None) -> CameraFile:
-        """4004: what was left on the robot; it is gone from there when it came whole."""
+        """4004: fetch a file left on the robot, which deletes it after a complete transfer."""
         return await self._file(Code.SAVED_FILE, {"file_name": name}, on_progress)
 
     async def _camera(self, command: int) -> None:

@@ -1,4 +1,4 @@
-"""The camera live by WebRTC (4001): decoded pictures. Imports aiortc when the first picture is wanted."""
+"""Live video of the camera by WebRTC (4001), as decoded pictures. Imports aiortc on first use."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ANSWER_MAX = 15.0  # s: the robot itself gives up after 10
 
 
 class Picture:
-    """Pictures as they arrive: ``await pictures.next()``, or ``async for``."""
+    """Incoming pictures: ``await pictures.next()``, or ``async for``."""
 
     def __init__(self, track: Any) -> None:
         self._track = track
@@ -39,7 +39,7 @@ class Picture:
         return frame
 
     async def next(self) -> VideoFrame:
-        """The next picture. Raises LinkLost when there are no more."""
+        """Return the next picture. Raises LinkLost if there are no more."""
         try:
             return await anext(self)
         except StopAsyncIteration:
@@ -52,11 +52,11 @@ class Video(Calls):
     signals: Feed[object]  # pushes of code 4001
 
     async def signal(self, signal: Signal) -> None:
-        """4001: one message of signalling; the robot's own come in ``signals``."""
+        """4001: send a message of signalling; the robot's own arrive in ``signals``."""
         await self.text(Code.VIDEO, fields_of(signal))
 
     async def negotiate(self, uid: str, offer: str, screen: Screen | None = None) -> str:
-        """The SDP that answers ``offer``. Raises CyberDogRefused, TimedOut."""
+        """Return the robot's SDP in answer to ``offer``. Raises CyberDogRefused, TimedOut."""
         with self.signals.subscribe() as signals:
             await self.signal(Description(uid, "offer", offer, screen))
             try:

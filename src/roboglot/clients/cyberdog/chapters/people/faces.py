@@ -10,11 +10,11 @@ class Faces(Calls):
     """Members' faces."""
 
     async def enter_face(self, member: str, *, host: bool = False) -> None:
-        """7001: begin; FaceEntered is pushed."""
+        """7001: begin entering a face; the result is pushed (FaceEntered)."""
         await self.do(Code.ENTER_FACE, {"command": 0, "username": member, "oriname": "", "ishost": host})
 
     async def change_faces(self, command: int, member: str, former: str = "") -> None:
-        """7001 with another command: 1 cancel, 2 confirm, 3 update, 4 delete, 5 list, as the robot numbers them."""
+        """7001 with another of the robot's commands: 1 cancel, 2 confirm, 3 update, 4 delete, 5 list."""
         await self.do(Code.ENTER_FACE, {"command": command, "username": member, "oriname": former, "ishost": False})
 
     async def recognise_faces(self, member: str = "", *, id: int = 0, seconds: int = 60) -> None:

@@ -8,7 +8,7 @@ from roboglot.clients.cyberdog.values import Region
 from roboglot.wire.cyberdog.codes import Code, TaskType
 
 CHOICE_MAX = 35.0  # s: the robot itself gives up after 30
-AUTO, BEHIND, LEFT, RIGHT = 200, 201, 202, 203  # the side of the person on which to walk
+AUTO, BEHIND, LEFT, RIGHT = 200, 201, 202, 203  # side of the person on which the robot walks
 
 
 class Following(Tasks):
@@ -29,5 +29,5 @@ class Following(Tasks):
         return await self.begin(kind, params, on_feedback)
 
     async def choose_target(self, region: Region) -> None:
-        """6008: who or what is in that part of the picture."""
+        """6008: choose the person or object in a part of the picture."""
         await self.do(Code.CHOOSE_TARGET, {"roi": region}, within=CHOICE_MAX)

@@ -17,33 +17,33 @@ class _Members(msgspec.Struct):
 
 
 class Members(Calls):
-    """The people whom the robot knows."""
+    """The robot's members."""
 
     async def add_member(self, name: str) -> None:
-        """1020."""
+        """1020: add a member."""
         await self._member(Code.ADD_MEMBER, {"member": name})
 
     async def members(self) -> Sequence[Member]:
-        """1021: all."""
+        """1021: return all members."""
         return (await self.ask(Code.FIND_MEMBERS, _Members, {"account": ""})).accounts
 
     async def member(self, name: str) -> Member:
-        """1021: one. Raises CyberDogRefused (121)."""
+        """1021: return one member. Raises CyberDogRefused (121)."""
         found = await self.ask(Code.FIND_MEMBERS, _Members, {"account": name})
         if found.code or not found.accounts:
             raise CyberDogRefused(Code.FIND_MEMBERS.name, found.code, "unknown")
         return found.accounts[0]
 
     async def remove_member(self, name: str) -> None:
-        """1022."""
+        """1022: remove a member."""
         await self._member(Code.DELETE_MEMBER, {"member": name})
 
     async def synchronise_members(self) -> Sequence[Member]:
-        """1023, of which the text has the number only; robots in the field answer nothing (NoAnswer)."""
+        """1023: synchronise members. The text has only the number; real robots answer nothing (NoAnswer)."""
         return (await self.ask(Code.SYNCHRONISE_MEMBERS, _Members)).accounts
 
     async def rename_member(self, name: str, new: str) -> None:
-        """1024."""
+        """1024: rename a member."""
         await self._member(Code.RENAME_MEMBER, {"pre_name": name, "new_name": new})
 
     async def _member(self, code: Code, params: dict[str, object]) -> None:

@@ -24,36 +24,36 @@ class Updates(Calls):
     """Updates of the robot's software."""
 
     async def update_status(self) -> UpdateStatus:
-        """5001."""
+        """5001: return the state of the update."""
         return await self.ask(Code.UPDATE_STATUS, UpdateStatus)
 
     async def download_update(self, modules: Sequence[Mapping[str, object]]) -> None:
-        """5003: as the maker's server describes them; UpdateProgress is pushed."""
+        """5003: download modules, described as by the maker's server; UpdateProgress is pushed."""
         await self.do(Code.DOWNLOAD_UPDATE, {"modules": modules})
 
     async def install_update(self, md5: str) -> None:
-        """5004: UpdateProgress, UpdateReboots and UpdateResult are pushed."""
+        """5004: install; UpdateProgress, UpdateReboots and UpdateResult are pushed."""
         await self.do(Code.INSTALL_UPDATE, {"md5": md5})
 
     async def update_progress(self) -> UpdateProgress:
-        """5005."""
+        """5005: return the progress of the update."""
         return await self.ask(Code.UPDATE_PROGRESS, UpdateProgress)
 
     async def update_time(self) -> int:
-        """5006: s; below 0: not known."""
+        """5006: return the update's time, s; below 0: unknown."""
         return (await self.ask(Code.UPDATE_TIME, _Time)).time
 
     async def update(
         self, operate: str, data: object = None, on_feedback: OnUpdate | None = None
     ) -> Mapping[str, object]:
-        """5010: "inquire", "download", "upgrade" and what else the robot knows; ``data`` of the result.
+        """5010: "inquire", "download", "upgrade" or another operation of the robot; return the result's ``data``.
 
-        Raises CyberDogRefused when it is not accepted (2), and with the result's code when it failed.
+        Raises CyberDogRefused if not accepted (2), or with the result's code after a failure.
         """
         return await self._goal(Code.START_UPDATE, {"operate": operate, "data": data}, on_feedback)
 
     async def join_update(self, on_feedback: OnUpdate | None = None) -> Mapping[str, object]:
-        """5011: the goal under way, from its latest feedback on. Raises CyberDogRefused (3) when there is none."""
+        """5011: join the running goal, from its latest feedback on. Raises CyberDogRefused (3) if there is none."""
         return await self._goal(Code.JOIN_UPDATE, {}, on_feedback)
 
     async def _goal(self, code: Code, params: dict[str, object], on_feedback: OnUpdate | None) -> Mapping[str, object]:

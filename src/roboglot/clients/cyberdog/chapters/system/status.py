@@ -15,17 +15,17 @@ TOPICS = (
 
 
 class Status(Calls):
-    """Status of the robot as it reports it."""
+    """Status of the robot."""
 
     async def information(self, *topics: str, uid: str = "") -> Mapping[str, Any]:
-        """1001: what is asked for of TOPICS (all, if none is named), in the robot's own form."""
+        """1001: return the named TOPICS (all, if none is named), in the robot's own form."""
         asked = {f"is_{topic}": True for topic in topics or TOPICS}
         return await self.ask(Code.DEVICE_INFO, dict, {**asked, "uid": uid})
 
     async def status(self) -> Mapping[str, Any]:
-        """10001: the states of the heartbeat."""
+        """10001: return the states that are also in the heartbeat."""
         return await self.ask(Code.STATUS, dict)
 
     async def disconnect_app(self) -> None:
-        """55001: the robot forgets this app until its next request."""
+        """55001: make the robot forget this app until its next request."""
         await self.text(Code.DISCONNECT_APP)

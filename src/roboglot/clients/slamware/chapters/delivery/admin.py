@@ -31,7 +31,7 @@ class Admin(Chapter):
 
     @call("PUT /api/delivery/v1/admin/password")
     async def set_password(self, body: Password | None = None) -> OperationReply:
-        """Ask for this password, or for none. It guards the screen: the API itself is open."""
+        """Set or remove the password of the screen; it does not protect the API."""
 
     @call("GET /api/delivery/v1/admin/mode")
     async def get_work_mode(self) -> WorkModeEntry:
@@ -39,7 +39,7 @@ class Admin(Chapter):
 
     @call("PUT /api/delivery/v1/admin/mode")
     async def set_work_mode(self, body: WorkModeEntry) -> OperationReply:
-        """DISPATCH: none, RECYCLE: only collecting dishes, MANUAL: any."""
+        """Set the tasks that may be created at the robot: DISPATCH none, RECYCLE collecting dishes, MANUAL all."""
 
     @call("GET /api/delivery/v1/admin/language")
     async def get_language(self) -> Language:
@@ -47,15 +47,15 @@ class Admin(Chapter):
 
     @call("PUT /api/delivery/v1/admin/language")
     async def set_language(self, body: Language) -> OperationReply:
-        """Keep it."""
+        """Set the language."""
 
     @call("GET /api/delivery/v1/admin/working_time")
     async def get_working_time(self) -> WorkingTime:
-        """UTC; no hours: always."""
+        """Return the working hours, UTC; without hours: always."""
 
     @call("PUT /api/delivery/v1/admin/working_time")
     async def set_working_time(self, body: WorkingTime) -> OperationReply:
-        """Outside these hours (UTC) the robot rests on its dock and tasks wait."""
+        """Set the hours (UTC) outside of which the robot rests on its dock and tasks wait."""
 
     @call("GET /api/delivery/v1/admin/move_options")
     async def get_move_options(self) -> MoveOptions:
@@ -63,27 +63,27 @@ class Admin(Chapter):
 
     @call("PUT /api/delivery/v1/admin/move_options")
     async def set_move_options(self, body: dict[str, object]) -> OperationReply:
-        """Change what is sent; an empty body goes back to the default. The next drive has it."""
+        """Change the given settings, from the next drive on; an empty body restores the defaults."""
 
     @call("GET /api/delivery/v1/admin/line_speed")
     async def get_line_speed(self) -> LineSpeed:
-        """m/s on the way to people and back; what was never set is as fast as the robot may drive."""
+        """Return the speeds to people and back, m/s; the robot's limit if never set."""
 
     @call("PUT /api/delivery/v1/admin/line_speed")
     async def set_line_speed(self, body: LineSpeed) -> None:
-        """The next drive has it; never faster than the robot may drive."""
+        """Set the speeds, from the next drive on; never above the robot's limit."""
 
     @call("GET /api/delivery/v1/configurations")
     async def get_configurations(self) -> Configuration:
-        """The machine; no cloud manages it, and it does not search its place anew when parked."""
+        """Return the description of the machine."""
 
     @call("GET /api/delivery/v1/settings")
     async def get_delivery_settings(self) -> WrappedSettings:
-        """Battery levels (percent) and time-outs (s)."""
+        """Return battery levels (percent) and time-outs (s)."""
 
     @call("PUT /api/delivery/v1/settings/timeout")
     async def set_timeout_settings(self, body: TimeoutChange) -> None:
-        """Return how long the robot waits for a pickup."""
+        """Set the robot's wait for a pickup, s."""
 
     @call("GET /api/delivery/v1/voice_resources")
     async def get_voice_resources(self) -> VoicePackages:

@@ -18,7 +18,7 @@ class Boxes(Chapter):
 
     @call("GET /api/delivery/v1/cargos/{cargo_id}/boxes")
     async def get_cargo_boxes(self, cargo_id: str) -> list[Box]:
-        """The boxes of one cargo; 404 if there is none."""
+        """Return the boxes of one cargo; 404 if there is none."""
 
     @call("GET /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}")
     async def get_cargo_box(self, cargo_id: str, box_id: int) -> Box:
@@ -26,11 +26,11 @@ class Boxes(Chapter):
 
     @call("PUT /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}/{op}")
     async def operate_box(self, cargo_id: str, box_id: int, op: str) -> None:
-        """Begin to open or close; the door moves in its own time, ``operation_result`` has the result."""
+        """Start opening or closing a box; ``get_operation_result`` returns the result."""
 
     @call("GET /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}/operation_result")
     async def get_operation_result(self, cargo_id: str, box_id: int) -> OperationResult:
-        """The last opening or closing of the box by any client; 404 while there was none."""
+        """Return the last opening or closing of the box by any client; 404 without one."""
 
     @call("GET /api/delivery/v1/cargos/assigned")
     async def get_assigned_cargos(self) -> list[AssignedCargo]:

@@ -21,7 +21,7 @@ class Tasks(Chapter):
 
     @call("GET /api/delivery/v1/tasks")
     async def get_tasks(self, type: str | None = None, status: str | None = None) -> list[DeliveryTask]:
-        """List ready and running tasks, oldest first; with ``status`` all also those that ended."""
+        """List ready and running tasks, oldest first; with ``status`` "all" also ended ones."""
 
     @call("POST /api/delivery/v1/tasks")
     async def create_task(self, body: TaskRequest) -> TaskCreated:
@@ -41,15 +41,15 @@ class Tasks(Chapter):
 
     @call("DELETE /api/delivery/v1/tasks/orders/{order_id}")
     async def cancel_task_by_order_id(self, order_id: str) -> None:
-        """The same by the number that creating it answered."""
+        """Cancel one task by the order id from its creation; 404 if unknown."""
 
     @call("GET /api/delivery/v1/stage")
     async def get_stage(self) -> TaskStage:
-        """A fault that keeps the robot from moving before the task before the way to rest."""
+        """Return the current stage: a fault that stops the robot, else the task, else the way to its rest."""
 
     @call("PUT /api/delivery/v1/tasks/:task_execution")
     async def set_task_execution(self, body: TaskExecution | None = None) -> TaskExecution:
-        """False: it stands still while people use its screen. True: it goes on, or to rest if there is no task."""
+        """Pause (False, while people use the screen) or resume tasks; without a task the robot goes to its rest."""
 
     @call("PUT /api/delivery/v1/tasks/:task_finish")
     async def end_task(self) -> None:
@@ -61,8 +61,8 @@ class Tasks(Chapter):
 
     @call("PUT /api/delivery/v1/tasks/:end_pickup")
     async def end_pickup(self) -> None:
-        """Finish this box: its door shuts and the next one opens. 403 without a pickup."""
+        """Close the current box and open the next one; 403 without a pickup."""
 
     @call("PUT /api/delivery/v1/tasks/:end_operation")
     async def end_operation(self) -> None:
-        """The task may leave this point; 403 unless the robot stands at one."""
+        """Let the task leave its current point; 403 unless the robot stands at one."""

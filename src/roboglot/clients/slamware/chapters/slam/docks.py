@@ -15,19 +15,19 @@ class Docks(Chapter):
 
     @call("GET /api/core/slam/v1/homedocks")
     async def get_home_docks(self) -> list[PoseEntry]:
-        """The docks on the map."""
+        """Return the docks on the map."""
 
     @call("PUT /api/core/slam/v1/homedocks")
     async def set_home_docks(self, body: list[PoseEntry]) -> bool:
-        """These, and no others; each needs a name."""
+        """Replace all docks; each needs a name."""
 
     @call("POST /api/core/slam/v1/homedocks")
     async def add_home_dock(self, body: PoseEntry) -> bool:
-        """Add one with a name, or replace the one with its id."""
+        """Add a dock with a name, or replace the one with its id."""
 
     @call("DELETE /api/core/slam/v1/homedocks")
     async def clear_home_docks(self) -> object:
-        """Remove all; answers the one that was home, as the manual has a dock here."""
+        """Remove all docks; return the home dock."""
 
     @call("POST /api/core/slam/v1/homedocks/:register")
     async def register_home_dock(self, body: Registration) -> PoseEntry:

@@ -27,7 +27,7 @@ class Localization(Chapter):
 
     @call("GET /api/core/slam/v1/localization/quality")
     async def get_localization_quality(self) -> int:
-        """Return how well the lidar fits the map, 0..100."""
+        """Return the fit of the lidar to the map, 0..100."""
 
     @call("GET /api/core/slam/v1/localization/:enable")
     async def get_map_localization(self) -> bool:
@@ -35,7 +35,7 @@ class Localization(Chapter):
 
     @call("PUT /api/core/slam/v1/localization/:enable")
     async def set_map_localization(self, body: Switch) -> bool:
-        """Let the lidar correct the pose, or follow the wheels alone."""
+        """Switch the correction of the pose by the lidar; off: by the wheels alone."""
 
     @call("POST /api/core/slam/v1/localization/status/:reset")
     async def reset_localization_status(self) -> bool:
@@ -47,7 +47,7 @@ class Localization(Chapter):
 
     @call("PUT /api/core/slam/v1/mapping/:enable")
     async def set_map_update(self, body: Switch) -> bool:
-        """Let the map grow, or leave it as it is."""
+        """Switch mapping."""
 
     @call("GET /api/core/slam/v1/loopclosure/:enable")
     async def get_loop_closure(self) -> bool:
@@ -55,7 +55,7 @@ class Localization(Chapter):
 
     @call("PUT /api/core/slam/v1/loopclosure/:enable")
     async def set_loop_closure(self, body: Switch) -> bool:
-        """Let it, or not."""
+        """Switch loop closure."""
 
     @call("GET /api/core/slam/v1/homepose")
     async def get_home_pose(self) -> Pose3D:
@@ -63,8 +63,8 @@ class Localization(Chapter):
 
     @call("PUT /api/core/slam/v1/homepose")
     async def set_home_pose(self, body: Pose3D) -> bool:
-        """The dock is there: the robot's pose when docked. Moves the dock that it goes home to."""
+        """Move the home dock: set the robot's pose when docked."""
 
     @call("GET /api/core/slam/v1/imu")
     async def get_imu(self) -> ImuData:
-        """Attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
+        """Return attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""

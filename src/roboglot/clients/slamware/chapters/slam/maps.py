@@ -17,7 +17,7 @@ class Maps(Chapter):
 
     @call("GET /api/core/slam/v1/knownarea")
     async def get_known_area(self) -> Rectangle:
-        """The extent of the map, m."""
+        """Return the extent of the map, m."""
 
     @call("GET /api/core/slam/v1/maps/explore")
     async def get_explore_map(
@@ -27,20 +27,20 @@ class Maps(Chapter):
         max_x: float | None = None,
         max_y: float | None = None,
     ) -> ExploreMap:
-        """The map as binary (see the wire's explore_map), all of it or what a window in metres cuts out of it."""
+        """Return the map (see the wire's explore_map), whole or cut to a window in m."""
 
     @call("GET /api/core/slam/v1/maps/stcm")
     async def get_composite_map(self) -> CompositeMap:
-        """The map with all that is drawn on it as a composite map; 403 while one is being loaded."""
+        """Return the map with everything drawn on it; 403 while a map is being loaded."""
 
     @call("PUT /api/core/slam/v1/maps/stcm")
     async def set_composite_map(self, body: CompositeMap) -> None:
-        """Use this map and what is drawn on it, in memory only; the robot's pose becomes the origin."""
+        """Load a map with everything drawn on it, in memory only; the robot's pose becomes the origin."""
 
     @call("DELETE /api/core/slam/v1/maps")
     async def clear_map(self) -> None:
-        """Forget the map and begin a new one here. The docks stay where they are; they get new coordinates."""
+        """Discard the map and begin a new one at the robot. Docks stay at their places, with new coordinates."""
 
     @call("PUT /api/core/slam/v1/maps/origin")
     async def move_origin_point(self, body: NewOrigin) -> None:
-        """Make this place, to the nearest 5 cm, the map's origin; all that is drawn on the map moves with it."""
+        """Move the map's origin to a place, to the nearest 5 cm; everything drawn on the map moves, too."""

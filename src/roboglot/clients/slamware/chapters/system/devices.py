@@ -17,11 +17,11 @@ class Devices(Chapter):
 
     @call("GET /api/core/system/v1/laserscan")
     async def get_laser_scan(self) -> Scan:
-        """The last turn of the lidar (rad from straight ahead, m) and the robot's pose then."""
+        """Return the last turn of the lidar (rad from straight ahead, m) and the robot's pose at that time."""
 
     @call("POST /api/core/system/v1/light/control")
     async def set_light_control(self, body: LightControl) -> None:
-        """Show this on one half of a channel from now on; 500 if the robot has no such strip."""
+        """Set the light on one half of a channel; 500 if the robot has no such strip."""
 
     @call("POST /api/core/system/v1/aeb/control")
     async def set_aeb_control(self, body: Literal["On", "Off"]) -> None:

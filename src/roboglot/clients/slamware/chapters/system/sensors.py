@@ -19,7 +19,7 @@ class Sensors(Chapter):
 
     @call("GET /api/core/sensors/v1/masks")
     async def get_disabled_sensors_mask_data(self) -> list[DisabledSensor]:
-        """The sensors that are switched off."""
+        """Return the sensors that are switched off."""
 
     @call("PUT /api/core/sensors/v1/masks")
     async def set_sensor_mask(self, body: list[SensorSwitch]) -> bool:

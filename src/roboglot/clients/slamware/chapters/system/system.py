@@ -25,27 +25,27 @@ class System(Chapter):
 
     @call("GET /api/core/system/v1/power/status")
     async def get_power_status(self) -> PowerStatus:
-        """Battery, dock and how awake the robot is."""
+        """Return the state of battery, dock and sleep."""
 
     @call("POST /api/core/system/v1/power/:shutdown")
     async def shutdown(self, body: Shutdown) -> bool:
-        """Switch off, at once or later, and perhaps on again. No requests are answered while it is off."""
+        """Switch off, at once or later, and optionally on again; no answers while off."""
 
     @call("POST /api/core/system/v1/power/:hibernate")
     async def hibernate(self) -> None:
-        """Sleep: the lidar rests and nothing moves until it is woken up."""
+        """Put the robot to sleep: lidar and motors are off until ``wakeup``."""
 
     @call("POST /api/core/system/v1/power/:wakeup")
     async def wakeup(self) -> None:
-        """Wake up, which takes some seconds."""
+        """Wake the robot up, which takes some seconds."""
 
     @call("POST /api/core/system/v1/power/:restartmodule")
     async def restart_module(self, body: Restart) -> bool:
-        """Restart. No requests are answered meanwhile."""
+        """Restart a module; no answers meanwhile."""
 
     @call("GET /api/core/system/v1/robot/info")
     async def get_robot_info(self) -> DeviceInfo:
-        """The name plate. Numbers that only the vendor hands out are made from the names, the same at every start."""
+        """Return the name plate."""
 
     @call("GET /api/core/system/v1/robot/health")
     async def get_robot_health(self) -> BaseHealthInfo:
@@ -53,15 +53,15 @@ class System(Chapter):
 
     @call("DELETE /api/core/system/v1/robot/health/{error_code}")
     async def clear_robot_health(self, error_code: int) -> None:
-        """Dismiss a record; it comes back while its cause persists. 400 for a code that is not there."""
+        """Dismiss a fault, which comes back while its cause persists; 400 for a code without a record."""
 
     @call("GET /api/core/system/v1/parameter")
     async def get_system_parameter(self, param: str) -> str:
-        """Top speeds in m/s and rad/s, as text with six decimals; when the robot registers a dock that it touches."""
+        """Return a parameter as text, such as a top speed in m/s or rad/s."""
 
     @call("PUT /api/core/system/v1/parameter")
     async def set_system_parameter(self, body: Parameter) -> bool:
-        """Speed limits, emergency stop, brake release."""
+        """Set a parameter: speed limits, emergency stop, brake release."""
 
     @call("PUT /api/core/system/v1/cube/config")
     async def set_cube_config(self, body: bytes) -> None:
@@ -69,4 +69,4 @@ class System(Chapter):
 
     @call("GET /api/core/system/v1/battery/pack")
     async def get_battery_pack(self) -> BatteryPack:
-        """Current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
+        """Return current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""

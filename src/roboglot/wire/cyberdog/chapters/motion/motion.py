@@ -1,4 +1,4 @@
-"""Motions by number, those that rules name; how a motion went. Knows no robot."""
+"""Numbers of motions with their own rules, and codes of results. Knows no robot."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Motion(IntEnum):
-    """Motions that the protocol or the robot names."""
+    """Motions with their own rules in the protocol or on the robot."""
 
     EMERGENCY_STOP = 0
     LIE_DOWN = 101
@@ -32,9 +32,9 @@ class Motion(IntEnum):
 ALLOWED_ON_LOW_BATTERY = frozenset(
     {Motion.EMERGENCY_STOP, Motion.LIE_DOWN, Motion.LIE_DOWN_PASSIVE, Motion.STAND_UP, Motion.POSE_RELATIVE}
 )
-# Most that a relative pose may ask for, by the developer guide's table of parameters: x, y, z in m, each angle in rad.
+# Limits of relative poses in the developer guide's table of parameters: x, y, z in m, each angle in rad.
 RELATIVE_SHIFT_MAX, RELATIVE_TURN_MAX = (0.4, 0.3, 0.2), 0.9
-# Motions that lead out of an emergency stop, or into it.
+# Motions that begin or end an emergency stop.
 ALLOWED_WHEN_STOPPED = frozenset({Motion.EMERGENCY_STOP, Motion.STAND_UP})
 
 
@@ -68,7 +68,7 @@ class MotionCode(IntEnum):
 
 
 class SwitchStatus(IntEnum):
-    """``status`` of 1003: how the change to the commanded motion stands."""
+    """``status`` of 1003: state of the change to the commanded motion."""
 
     NORMAL = 0
     CHANGING = 1

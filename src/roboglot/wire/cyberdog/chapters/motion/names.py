@@ -1,6 +1,6 @@
-"""The vendor's walks and figures by number, each with a plain name. Knows no robot.
+"""Plain names of the vendor's walks and figures, by number. Knows no robot.
 
-Door and driver find their model's gait or motion by these names.
+Door and driver map these names to gaits and motions of the model.
 """
 
 from __future__ import annotations

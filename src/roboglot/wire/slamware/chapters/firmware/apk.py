@@ -1,4 +1,4 @@
-"""Android packages: name and version of an app from the binary XML of its manifest. Knows nothing of what it does.
+"""Android packages: name and version of an app from the binary XML of its manifest. Runs no app.
 
 The format is Android's ResourceTypes.h: a chunk of strings, one with the resource ids of attributes, then elements.
 """
@@ -23,19 +23,19 @@ HEADER = struct.Struct("<HHI")
 
 @dataclass(frozen=True, slots=True)
 class Apk:
-    """``version`` is the name that people see, or its number where there is none."""
+    """An app; ``version``: its displayed version, or the version's number without one."""
 
     name: str
     version: str
 
 
 def read_apk(file: BinaryIO) -> Apk:
-    """Read the content of a package. Raises BadPackage."""
+    """Return name and version of a package. Raises BadPackage."""
     return parse_manifest(entry_of(file, MANIFEST))
 
 
 def parse_manifest(data: bytes) -> Apk:
-    """Name and version in a binary manifest. Raises BadPackage."""
+    """Return name and version in a binary manifest. Raises BadPackage."""
     try:
         return _parse(data)
     except (struct.error, IndexError, UnicodeDecodeError) as error:
@@ -57,7 +57,7 @@ def _parse(data: bytes) -> Apk:
 
 
 def _chunks(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """The chunks within the outermost one."""
+    """Yield the chunks within the outermost one."""
     kind, header, _ = HEADER.unpack_from(data)
     if kind != XML:
         raise BadPackage("the manifest is no binary XML")
@@ -71,7 +71,7 @@ def _chunks(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 class _Strings:
-    """The manifest's strings, each read when it is asked for: many may lie at the same place."""
+    """The manifest's strings, each decoded on demand, as many may share the same bytes."""
 
     def __init__(self, chunk: bytes = b"") -> None:
         self._chunk = chunk
@@ -107,7 +107,7 @@ def _utf16(chunk: bytes, at: int) -> str:
 
 
 def _manifest(chunk: bytes, strings: _Strings, ids: tuple[int, ...]) -> Apk:
-    """The attributes of the first element, which is the manifest."""
+    """Return the app in the attributes of the first element, which is the manifest."""
     _, name, start, width, count = struct.unpack_from("<iiHHH", chunk, 16)
     if strings[name] != "manifest" or count > ATTRIBUTES_MAX:
         raise BadPackage("the manifest begins with something else")

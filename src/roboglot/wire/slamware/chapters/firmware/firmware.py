@@ -1,4 +1,4 @@
-"""Chapter "firmware": what the maker offers. Packages have their own file."""
+"""Chapter "firmware": versions offered by the maker. Packages have their own file."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Packages that clients upload: zip archives with a description in front. Bounded before anything is unpacked.
+"""Packages that clients upload: zip archives with a description. Bounded before anything is unpacked.
 
-How the vendor packs firmware is not public. A firmware package of ours is a zip archive that has ``firmware.json``:
-``{"version": "2.1.0", "model": "…", "modules": {"motion": "1.4"}, "notes": "…"}``, where only the version is needed;
-the rest of it is the firmware.
+The vendor's format of firmware is not public. Our firmware packages are zip archives with a file ``firmware.json``,
+``{"version": "2.1.0", "model": "…", "modules": {"motion": "1.4"}, "notes": "…"}``, where only the version is
+required; the other files are the firmware.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class FirmwareDescription(msgspec.Struct):
 
 
 def read_firmware(file: BinaryIO) -> FirmwareDescription:
-    """Read the content of a package. Raises BadPackage."""
+    """Return the description in a package. Raises BadPackage."""
     try:
         return msgspec.json.decode(entry_of(file, DESCRIPTION), type=FirmwareDescription)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -44,7 +44,7 @@ def read_firmware(file: BinaryIO) -> FirmwareDescription:
 
 
 def entry_of(file: BinaryIO, name: str) -> bytes:
-    """One file of a zip archive, unpacked. Raises BadPackage for what is no archive, has no such file or is a bomb."""
+    """Return an unpacked file of a zip archive. Raises BadPackage if it is missing, too large or damaged."""
     file.seek(0, 2)
     size = file.tell()
     file.seek(max(0, size - TAIL))

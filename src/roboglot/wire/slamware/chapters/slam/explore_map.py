@@ -25,12 +25,12 @@ CELLS_MAX = 1 << 28  # 16384 x 16384
 
 
 class BadMap(ValueError):
-    """The bytes are no explore map; the message says why."""
+    """The bytes are not a valid map; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExploreMap:
-    """Corner (x, y), cell size (m), and ``cells`` (height, width) int8: 0 unknown, above free, below occupied."""
+    """Corner (x, y) and cell size in m; ``cells``: int8, shape (height, width), 0 unknown, > 0 free, < 0 occupied."""
 
     x: float
     y: float
@@ -39,14 +39,14 @@ class ExploreMap:
 
 
 def encode_explore_map(explored: ExploreMap) -> bytes:
-    """The bytes of ``explored``."""
+    """Return the bytes of ``explored``."""
     height, width = explored.cells.shape
     header = HEADER.pack(explored.x, explored.y, width, height, explored.resolution, width * height)
     return header + explored.cells.tobytes()
 
 
 def decode_explore_map(data: bytes) -> ExploreMap:
-    """The map in ``data``. Raises BadMap."""
+    """Return the map in ``data``. Raises BadMap."""
     if len(data) < HEADER.size:
         raise BadMap(f"{len(data)} bytes are too few for the header of {HEADER.size}")
     x, y, width, height, resolution, size = HEADER.unpack_from(data)

@@ -1,9 +1,9 @@
 """Composite maps (.stcm): a container of layers, each with text by key and a payload.
 
-The vendor has not published the format; this is what clients in the field read and write. Little endian. File: "STCM",
+The vendor has not published the format; this is the form that real clients read and write. Little endian. File: "STCM",
 four uint16 (18, 1, 1, 1), uint32 number of layers, pairs, layers. Layer: uint32 size, pairs, payload. Pairs: uint16
-count, then per pair uint16 length and key, uint16 length and value. Some writers count the size field in its own size,
-some do not; both are read. Payloads are ``stcm_layers``'s business; here every layer is kept byte for byte.
+count, then per pair uint16 length and key, uint16 length and value. Some writers include the size field in the size,
+some do not; both are read. ``stcm_layers`` decodes payloads; here every layer is kept byte for byte.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ Pairs = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """``pairs`` in their order; bytes that are no UTF-8 are kept as surrogates."""
+    """A layer; ``pairs`` keep their order, and bytes that are not UTF-8 as surrogates."""
 
     pairs: Pairs
     payload: bytes = b""
 
     @property
     def metadata(self) -> Mapping[str, str]:
-        """The pairs by key; the last one of a key counts."""
+        """Values of the pairs by key; of repeated keys the last one counts."""
         return dict(self.pairs)
 
 
 @dataclass(frozen=True, slots=True)
 class CompositeMap:
-    """All layers. ``pairs`` are the file's own, ``tail`` what followed the layers; both are usually empty."""
+    """All layers. ``pairs``: those of the file; ``tail``: bytes after the layers; both are usually empty."""
 
     layers: tuple[Layer, ...] = ()
     version: tuple[int, int, int, int] = VERSION
@@ -49,7 +49,7 @@ class CompositeMap:
 
 
 def encode_stcm(composite: CompositeMap) -> bytes:
-    """The bytes of ``composite``, sizes counting themselves in. Raises BadMap beyond the format's bounds."""
+    """Return the bytes of ``composite``; sizes include their own field. Raises BadMap beyond the bounds."""
     if len(composite.layers) > LAYERS_MAX:
         raise BadMap(f"more than {LAYERS_MAX} layers")
     parts = [MAGIC, _VERSION.pack(*composite.version), _SIZE.pack(len(composite.layers)), pack_pairs(composite.pairs)]
@@ -63,7 +63,7 @@ def encode_stcm(composite: CompositeMap) -> bytes:
 
 
 def decode_stcm(data: bytes) -> CompositeMap:
-    """The layers in ``data``. Raises BadMap."""
+    """Return the map in ``data``. Raises BadMap."""
     if len(data) > MAP_BYTES_MAX:
         raise BadMap(f"more than {MAP_BYTES_MAX} bytes")
     if not data.startswith(MAGIC):
@@ -85,7 +85,7 @@ def decode_stcm(data: bytes) -> CompositeMap:
 
 
 def _layers(data: bytes, begin: int, count: int, counted_in: int) -> tuple[tuple[Layer, ...], int]:
-    """``count`` layers from ``begin`` on, whose sizes count ``counted_in`` bytes of themselves in; and their end."""
+    """Return ``count`` layers from ``begin`` on, and their end; sizes include ``counted_in`` bytes of themselves."""
     reader, layers = Reader(data, begin), []
     for number in range(count):
         size = _SIZE.unpack(reader.take(_SIZE.size))[0] - counted_in
@@ -97,14 +97,14 @@ def _layers(data: bytes, begin: int, count: int, counted_in: int) -> tuple[tuple
 
 
 def pack_pairs(pairs: Pairs) -> bytes:
-    """Pairs as they stand before layers and in entries. Raises BadMap beyond the bounds."""
+    """Return the bytes of pairs, as used before layers and in entries. Raises BadMap beyond the bounds."""
     if len(pairs) > PAIRS_MAX:
         raise BadMap(f"more than {PAIRS_MAX} pairs")
     return _SHORT.pack(len(pairs)) + b"".join(pack_text(key) + pack_text(value) for key, value in pairs)
 
 
 def pack_text(text: str) -> bytes:
-    """Length and bytes. Raises BadMap beyond ``TEXT_MAX``."""
+    """Return a text as length and bytes. Raises BadMap beyond ``TEXT_MAX``."""
     data = text.encode("utf-8", "surrogateescape")
     if len(data) > TEXT_MAX:
         raise BadMap(f"a text of {len(data)} bytes")
@@ -112,14 +112,14 @@ def pack_text(text: str) -> bytes:
 
 
 class Reader:
-    """Takes bytes from the front; BadMap when there are too few."""
+    """Takes values from the front of bytes. Raises BadMap if there are too few."""
 
     def __init__(self, data: bytes, at: int = 0) -> None:
         self._data = data
         self.at = at
 
     def take(self, size: int) -> bytes:
-        """The next ``size`` bytes."""
+        """Return the next ``size`` bytes."""
         end = self.at + size
         if end > len(self._data):
             raise BadMap(f"it ends at {len(self._data)}, in the middle of something of {size} bytes at {self.at}")
@@ -128,19 +128,19 @@ class Reader:
         return taken
 
     def rest(self) -> bytes:
-        """Return all that is left."""
+        """Return all remaining bytes."""
         return self.take(len(self._data) - self.at)
 
     def short(self) -> int:
-        """A uint16."""
+        """Return a uint16."""
         return int(_SHORT.unpack(self.take(_SHORT.size))[0])
 
     def text(self) -> str:
-        """Length and bytes."""
+        """Return a text that is stored as length and bytes."""
         return self.take(self.short()).decode("utf-8", "surrogateescape")
 
     def pairs(self) -> Pairs:
-        """A count and so many pairs."""
+        """Return pairs that are stored after their number."""
         count = self.short()
         if count > PAIRS_MAX:
             raise BadMap(f"more than {PAIRS_MAX} pairs")

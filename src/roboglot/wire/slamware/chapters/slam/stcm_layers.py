@@ -1,8 +1,7 @@
 """Layers of a composite map, as far as publicly known: grids, lines, poses.
 
-The vendor's encoding of rectangles and landmarks is not known. Areas go into a layer of our own, as JSON, so that they
-survive; a vendor's layer of that kind is left alone. Every reader answers None for a layer that it does not understand
-wholly.
+The vendor's encoding of rectangles and landmarks is not known. They are stored in layers of our own, as JSON; a
+vendor's layer of that kind stays as it is. Every reader returns None for a layer that it does not fully understand.
 """
 
 from __future__ import annotations
@@ -105,7 +104,7 @@ def grid_layer(explored: ExploreMap, extra: Pairs = ()) -> Layer:
 
 
 def read_grid(layer: Layer) -> ExploreMap | None:
-    """The explore map in ``layer``; None if it is another layer. Raises BadMap for one that is broken."""
+    """Return the explore map in ``layer``; None for another layer. Raises BadMap for a damaged one."""
     if not _is(layer, EXPLORE, "grid-map"):
         return None
     values = layer.metadata
@@ -122,7 +121,7 @@ def read_grid(layer: Layer) -> ExploreMap | None:
 
 
 def line_layer(usage: str, lines: list[LineEntry]) -> Layer:
-    """Walls or tracks."""
+    """Return the layer of walls or tracks."""
     entries = (
         pack_text(line.id) + _ENDS.pack(line.x1, line.y1, line.x2, line.y2) + pack_pairs(line.metadata)
         for line in lines
@@ -131,7 +130,7 @@ def line_layer(usage: str, lines: list[LineEntry]) -> Layer:
 
 
 def read_lines(layer: Layer, usage: str) -> list[LineEntry] | None:
-    """The lines in ``layer``; None if it is another layer, or written in another way."""
+    """Return the lines in ``layer``; None for another layer or encoding."""
     if not _is(layer, usage, "line-map"):
         return None
     reader, lines = Reader(layer.payload), []
@@ -146,7 +145,7 @@ def read_lines(layer: Layer, usage: str) -> list[LineEntry] | None:
 
 
 def pose_layer(usage: str, poses: list[PoseEntry]) -> Layer:
-    """Places or docks."""
+    """Return the layer of places or docks."""
     entries = (
         pack_text(p.name) + b"\0" + _POSE.pack(p.x, p.y, p.yaw) + pack_pairs(p.metadata) + bytes((p.flags,))
         for p in poses
@@ -155,7 +154,7 @@ def pose_layer(usage: str, poses: list[PoseEntry]) -> Layer:
 
 
 def read_poses(layer: Layer, usage: str) -> list[PoseEntry] | None:
-    """The poses in ``layer``; None if it is another layer, or written in another way."""
+    """Return the poses in ``layer``; None for another layer or encoding."""
     if not _is(layer, usage, "pose-map"):
         return None
     reader, poses = Reader(layer.payload), []
@@ -178,22 +177,22 @@ def _check(numbers: tuple[float, ...], count: int) -> None:
 
 
 def area_layer(areas: list[AreaEntry]) -> Layer:
-    """Areas, in our own way."""
+    """Return the layer of areas, in our own encoding."""
     return Layer(_named(AREAS, JSON, ("count", str(len(areas)))), msgspec.json.encode(areas))
 
 
 def read_areas(layer: Layer) -> list[AreaEntry] | None:
-    """The areas in a layer of ours; None for any other."""
+    """Return the areas in our own layer; None for any other."""
     return _read_json(layer, AREAS, list[AreaEntry])
 
 
 def landmark_layer(marks: list[MarkEntry]) -> Layer:
-    """Landmarks, in our own way."""
+    """Return the layer of landmarks, in our own encoding."""
     return Layer(_named(LANDMARKS, JSON, ("count", str(len(marks)))), msgspec.json.encode(marks))
 
 
 def read_landmarks(layer: Layer) -> list[MarkEntry] | None:
-    """The landmarks in a layer of ours; None for any other."""
+    """Return the landmarks in our own layer; None for any other."""
     return _read_json(layer, LANDMARKS, list[MarkEntry])
 
 

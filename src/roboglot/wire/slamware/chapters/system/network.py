@@ -1,4 +1,4 @@
-"""Chapter "system", network: what goes over the wire."""
+"""Chapter "system": messages about the network."""
 
 from __future__ import annotations
 

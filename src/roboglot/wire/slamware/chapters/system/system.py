@@ -118,12 +118,12 @@ class LaserScan(msgspec.Struct):
 
 
 def error_code(level: Level, part: HealthPart, code: int) -> int:
-    """The 32-bit number of a health record: level, component and the component's own code in one."""
+    """Return the 32-bit number of a health record, made of level, component and the component's own code."""
     return level << 24 | part << 16 | code
 
 
 def health_record(level: Level, part: HealthPart, code: int, error_type: int, message: str) -> BaseError:
-    """A record with its numbers worked out; ``error_type`` counts within the component, from 1."""
+    """Return a record with its computed numbers; ``error_type`` counts from 1 within the component."""
     number = error_code(level, part, code)
     return BaseError(0, part, number, level, message, code, 1024 * (part + 1) + error_type)
 
