@@ -19,7 +19,7 @@ class Audio(Calls):
     """The voice board."""
 
     async def audio_identity(self) -> Identity:
-        """3001: return the voice board's identity."""
+        """3001: return the device's identity."""
         return await self.ask(Code.AUDIO_IDENTITY, Identity)
 
     async def set_audio_token(self, uid: str, access: str, fresh: str, expires_in: int) -> None:

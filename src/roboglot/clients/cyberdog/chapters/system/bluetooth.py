@@ -73,11 +73,11 @@ class Bluetooth(Calls):
         await self.do(Code.UPDATE_BLUETOOTH, within=15.0)
 
     async def set_gear(self, gear: int) -> None:
-        """8011: set the bracelet's gear: 0 slow, 1 middle, 2 fast."""
+        """8011: set the gear of the bracelet's stick: 0 slow, 1 middle, 2 fast."""
         await self.text(Code.SET_GEAR, {"data": gear})
 
     async def gear(self) -> int:
-        """8013: return the bracelet's gear."""
+        """8013: return the gear of the bracelet's stick."""
         return (await self.ask(Code.GEAR, _Data)).data
 
     async def _devices(self, code: Code, params: object, within: float) -> _Devices:

@@ -40,7 +40,7 @@ class Updates(Calls):
         return await self.ask(Code.UPDATE_PROGRESS, UpdateProgress)
 
     async def update_time(self) -> int:
-        """5006: return the update's time, s; below 0: unknown."""
+        """5006: return the remaining time of the update, s; below 0: unknown."""
         return (await self.ask(Code.UPDATE_TIME, _Time)).time
 
     async def update(
