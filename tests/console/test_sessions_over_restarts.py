@@ -50,7 +50,7 @@ async def test_file_lets_no_one_in_but_the_cookie(tmp_path: Path) -> None:
     third.close()
 
 
-async def test_who_is_put_out_while_signing_in_stays_out(tmp_path: Path) -> None:
+async def test_putting_out_while_signing_in_lasts(tmp_path: Path) -> None:
     now = 1000.0
     first = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)
     await first.open(PROOF, "ben")

@@ -75,7 +75,7 @@ async def test_error_of_one_timer_affects_no_other(kind: type[BaseException]) ->
     assert [type(error) for error in errors] == [kind]
 
 
-async def test_a_time_that_is_no_number_stops_no_other() -> None:
+async def test_nan_stops_no_other_timer() -> None:
     hours = Hours()
     hours.timers.add(math.nan, hours.note("at once"))
     hours.timers.add(1.0, hours.note("next"))

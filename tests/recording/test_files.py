@@ -243,7 +243,7 @@ def test_only_the_unwritable_value_is_left_out(tmp_path: Path) -> None:
     assert thread.dropped == 2
 
 
-def test_a_line_logged_in_the_midst_of_a_put_is_taken_along(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_line_logged_within_a_put_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     sink = SlowSink()
     sink.go_on.set()
     thread, full, logged = WriterThread(sink), WriterThread._full, list[bool]()
