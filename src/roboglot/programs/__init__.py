@@ -1,5 +1,4 @@
-"""Visual programming: the language, the jailed workers that run it, and what is built on them.
+"""Visual programming: the language, the jailed workers that run it, their functions, tasks and modules.
 
-Importing this package costs nothing and pulls nothing in: the program zygote starts through it, with the standard
-library alone.
+This package imports nothing, because the program zygote, which has only the standard library, starts through it.
 """

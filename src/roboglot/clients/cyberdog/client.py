@@ -129,9 +129,9 @@ class CyberDogClient(
             elif code in self._feeds:
                 self._feeds[code].push(msgspec.json.decode(text or "{}", type=PUSHED[Code(code)], strict=False))
             else:
-                log.debug("push %d is not known", code)
+                log.debug("unknown push %d", code)
         except (msgspec.MsgspecError, NotJson, BadSignal) as error:
-            log.warning("push %d is not what it should be: %s", code, error)
+            log.warning("cannot read push %d: %s", code, error)
 
 
 def _feed() -> Feed[object]:

@@ -49,7 +49,7 @@ class Certificates:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """Status that the robot sends twice a second, in its own numbers. ``at``: arrival, s on the client's clock."""
+    """Status that the robot sends twice a second, with its own codes. ``at``: arrival, s on the client's clock."""
 
     at: float
     ip: str

@@ -69,7 +69,9 @@ class MemoryBudget:
             size, run = by_size.pop()
             held -= size
             limit = self.total // 1024**2
-            log.warning("programs together hold more than %d MiB: the one with %d MiB is ended", limit, size // 1024**2)
+            log.warning(
+                "programs together use more than %d MiB: ending the largest one, %d MiB", limit, size // 1024**2
+            )
             words = f"all programs together used more than {limit} MiB, this one most of it"
             run.end(ExitReason.MEMORY, "MemoryError", words)
 

@@ -1,4 +1,4 @@
-"""cyberdog.audio: speaking, sounds, volume (4.4.08). Volumes are percent; -1 leaves them as they are."""
+"""cyberdog.audio: speaking, sounds, volume (4.4.08). Volumes are in percent; -1 changes nothing."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _BLOCKS = ("body", "orelse", "finalbody")
 
 
 class Cell(Protocol):
-    """A list of one item, or an object that can be stored to like one."""
+    """A list of one item, or an object with the same item assignment."""
 
     def __setitem__(self, item: int, mark: object, /) -> None: ...
 

@@ -13,7 +13,7 @@ from roboglot.programs.errors import NotAllowed, ProgramError
 from roboglot.programs.language.places import Step
 from roboglot.programs.tasks.service import ProgramService
 
-STOPS_MAX = 1000  # lines, and as many blocks, per task
+STOPS_MAX = 1000  # lines per task, and blocks per task
 STEPS = {"step": Step.INTO, "over": Step.OVER, "out": Step.OUT}
 NAME_MAX = 256  # characters of a module's or a block's name
 ID_MAX = 128  # characters of a task's id

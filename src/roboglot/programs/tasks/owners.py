@@ -10,7 +10,7 @@ from roboglot.programs.stores import StoredProgram
 
 
 def act_for_owner(robot: Robot, task: StoredProgram) -> None:
-    """Act for the task's owner from here on. Raises NotAllowed if the owner may no longer run programs."""
+    """Act for the task's owner from now on. Raises NotAllowed if the owner may no longer run programs."""
     ask_for(f"visual {task.id}", identity=task.owner)
     if robot.admission.asks and task.owner and not robot.admission.may(Right.PROGRAM):
         raise NotAllowed(f"{task.owner} may no longer run programs")

@@ -1,4 +1,4 @@
-"""Recovery of the tasks that were under way when the server ended. Starts nothing."""
+"""Recovery of tasks that were running or suspended when the server ended. Starts nothing."""
 
 from __future__ import annotations
 

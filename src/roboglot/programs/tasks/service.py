@@ -155,7 +155,7 @@ class ProgramService:
         refuse_wrong(problems)
 
     async def debug(self, task: StoredProgram) -> None:
-        """Save under the id debug and run at once; a debug run before this one is ended."""
+        """Save under the id debug and run at once; an earlier debug run is ended."""
         check_mode(self.robot, TaskOperation.DEBUG)
         problems, names = await self._inspector.inspect(task.body, self.library.functions)
         async with self._turns.take():

@@ -104,7 +104,7 @@ class Watched:
             self._halt()
 
     def _stepped(self, order: int, here: FrameType) -> bool:
-        """Return whether the step is done: none for OVER and OUT while calls from its start are running."""
+        """Return whether the step is done: OVER ends outside of calls, OUT also outside of its first function."""
         if order != self._order:
             self._order, self._origin = order, self._frame
         step = order & max(Step)

@@ -1,4 +1,4 @@
-"""cyberdog.follow: walking after a person whom the robot knows by face (4.4.03). Goes around what stands between."""
+"""cyberdog.follow: following a person known by face (4.4.03), around obstacles."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Frames and messages on the wire, by the same groups of chapters as ``protocols.cyberdog.chapters``."""
+"""Frames and messages on the wire, grouped by chapter as in ``protocols.cyberdog.chapters``."""

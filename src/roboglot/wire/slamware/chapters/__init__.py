@@ -1,1 +1,1 @@
-"""Schemas and formats by the same chapters of the manual as ``protocols.slamware.chapters``."""
+"""Schemas and formats, by chapter of the manual as in ``protocols.slamware.chapters``."""

@@ -1,4 +1,4 @@
-"""Chapter "artifact": points of interest (docks and landmarks are written the same way), lines and areas."""
+"""Chapter "artifact": points of interest (also the form of docks and landmarks), lines and areas."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Metadata = (
 
 
 class PoseEntry(msgspec.Struct, omit_defaults=True):
-    """A pose with a client-made id (a UUID) and free metadata. Without a pose: where the robot is."""
+    """A pose with a client-made id (a UUID) and free metadata. Without a pose: the robot's current one."""
 
     id: NewIdentifier
     pose: Pose2D | None = None
@@ -84,7 +84,7 @@ Lines = Annotated[list[Line], msgspec.Meta(max_length=10_000)]
 
 
 class Strip(msgspec.Struct):
-    """``half_width`` m to both sides of the centre line."""
+    """Area around a centre line, ``half_width`` m to both sides."""
 
     start: Point
     end: Point
@@ -106,7 +106,7 @@ class AreaChange(msgspec.Struct):
 
 
 class RectangleArea(msgspec.Struct):
-    """An area as it is answered."""
+    """A stored area."""
 
     id: int
     usage: AreaUsage

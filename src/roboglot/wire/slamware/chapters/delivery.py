@@ -16,7 +16,7 @@ VoiceText = Annotated[str, msgspec.Meta(max_length=4096)]
 
 
 class DeliveryEvent(StrEnum):
-    """Every value of the manual."""
+    """Event of a delivery; all values of the manual."""
 
     START_FROM_DOCK = "START_FROM_DOCK"
     DELIVERY_SETTINGS_CHANGED = "DELIVERY_SETTINGS_CHANGED"
@@ -65,7 +65,7 @@ class TaskError(msgspec.Struct):
 
 
 class TaskCreated(msgspec.Struct, omit_defaults=True):
-    """A refusal is ``result`` false with a 200."""
+    """Answer to POST tasks; a refusal has ``result`` false and status 200."""
 
     result: bool
     order_id: str = ""
@@ -73,7 +73,7 @@ class TaskCreated(msgspec.Struct, omit_defaults=True):
 
 
 class TasksCreated(msgspec.Struct, omit_defaults=True):
-    """All or none."""
+    """Answer to POST tasks/:batch, which creates all tasks or none."""
 
     result: bool
     order_ids: list[str] = []
@@ -88,7 +88,7 @@ class Untaken(msgspec.Struct):
 
 
 class DeliveryTaskRequest(msgspec.Struct):
-    """A task as the robot reports it; ``station_id``: the cabinet that it begins at."""
+    """A task in the robot's reports; ``station_id``: the cabinet at which it begins."""
 
     target: str
     type: str
@@ -122,7 +122,7 @@ class TaskResult(msgspec.Struct):
 
 
 class DeliveryTask(msgspec.Struct):
-    """A task and what became of it."""
+    """A task and its result."""
 
     id: str
     task: DeliveryTaskRequest
@@ -138,7 +138,7 @@ class LocationInfo(msgspec.Struct, omit_defaults=True):
 
 
 class DeviceError(msgspec.Struct):
-    """A fault, in the numbers of the health report."""
+    """A fault, with the codes of the health report."""
 
     component: int
     error_code: int
@@ -216,7 +216,7 @@ class OperationResult(msgspec.Struct):
 
 
 class AssignedCargo(msgspec.Struct):
-    """Boxes that a takeout has."""
+    """Boxes assigned to a takeout."""
 
     target: str
     order_id: str
@@ -225,7 +225,7 @@ class AssignedCargo(msgspec.Struct):
 
 
 class OperationReply(msgspec.Struct):
-    """The manual calls it text/plain; clients read JSON."""
+    """Result of an operation, as JSON; the manual calls it text/plain."""
 
     result: bool
     reason: str = ""
@@ -239,7 +239,7 @@ class Password(msgspec.Struct, omit_defaults=True):
 
 
 class AdminPassword(msgspec.Struct):
-    """Wrapped, as the API has it."""
+    """The API's wrapper of Password."""
 
     delivery_admin_password: Password
 
@@ -271,7 +271,7 @@ class WorkingTime(msgspec.Struct):
 
 
 class LineSpeed(msgspec.Struct):
-    """m/s; only what is to change need be sent."""
+    """Speeds, m/s; None: unchanged."""
 
     delivery_speed: SpeedValue | None = None
     return_speed: SpeedValue | None = None
@@ -288,7 +288,7 @@ class Configuration(msgspec.Struct):
 
 
 class BatteryLevels(msgspec.Struct):
-    """Percent: off, home, no cloud tasks, no takeouts."""
+    """Battery levels, percent: off, home, no cloud tasks, no takeouts."""
 
     level1: int
     level2: int
@@ -297,7 +297,7 @@ class BatteryLevels(msgspec.Struct):
 
 
 class Timeouts(msgspec.Struct):
-    """Seconds."""
+    """Time-outs, s."""
 
     takeout_pickup_timeout: int
     takeout_open_door_timeout: int
@@ -314,7 +314,7 @@ class DeliverySettings(msgspec.Struct):
 
 
 class WrappedSettings(msgspec.Struct):
-    """Wrapped, as the API has it."""
+    """The API's wrapper of DeliverySettings."""
 
     delivery_settings: DeliverySettings
 
@@ -336,7 +336,7 @@ class VoicePackage(msgspec.Struct):
 
 
 class VoicePackages(msgspec.Struct):
-    """Message from the cloud."""
+    """Voice packages in the form of the cloud's answer."""
 
     result: bool
     msg: str

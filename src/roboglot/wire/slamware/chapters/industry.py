@@ -1,4 +1,4 @@
-"""Chapter "industry": templates of rounds and the tasks that call buttons make of them."""
+"""Chapter "industry": templates of rounds, and tasks created from them by call buttons."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Text = Annotated[str, msgspec.Meta(max_length=256)]
 
 
 class TaskOperation(msgspec.Struct):
-    """Stop at the place of that display name: do ``action``, then wait (s)."""
+    """Stop at the place ``display_name``: do ``action``, then wait for ``wait_time`` s."""
 
     display_name: Annotated[str, msgspec.Meta(min_length=1, max_length=256)]
     action: Text = ""
@@ -23,7 +23,7 @@ class TaskOperation(msgspec.Struct):
 
 
 class TemplateRequest(msgspec.Struct):
-    """A template to make; without ``key`` the robot makes one."""
+    """A template to create; without ``key`` the robot assigns one."""
 
     name: Text
     action_list: Annotated[list[TaskOperation], msgspec.Meta(max_length=OPERATIONS_MAX)] = []
@@ -31,7 +31,7 @@ class TemplateRequest(msgspec.Struct):
 
 
 class TaskTemplate(msgspec.Struct):
-    """A template as it is kept."""
+    """A stored template."""
 
     task_template_key: str
     task_template_type: int
@@ -42,7 +42,7 @@ class TaskTemplate(msgspec.Struct):
 
 
 class CommonResponse(msgspec.Struct):
-    """The manual calls it text/plain; clients read JSON."""
+    """Result of an operation, as JSON; the manual calls it text/plain."""
 
     result: bool
     msg: str
@@ -58,7 +58,7 @@ class IndustryTarget(msgspec.Struct):
 
 
 class IndustryTaskRequest(msgspec.Struct):
-    """Kind of call."""
+    """Request of a call button."""
 
     target: str
     type: str
@@ -70,7 +70,7 @@ class IndustryTaskRequest(msgspec.Struct):
 
 
 class IndustryResult(msgspec.Struct):
-    """``stage`` is empty for calls: the client that carries them out reports no more than their status."""
+    """Result of a call; ``stage`` is empty, as the client that carries it out reports only its status."""
 
     stage: str
     reason: str
@@ -78,7 +78,7 @@ class IndustryResult(msgspec.Struct):
 
 
 class IndustryTask(msgspec.Struct):
-    """A call and what became of it."""
+    """A call and its result."""
 
     id: str
     task: IndustryTaskRequest
@@ -87,14 +87,14 @@ class IndustryTask(msgspec.Struct):
 
 
 class LandingRequest(msgspec.Struct):
-    """Distance ahead (m) of the robot, and whether headed back to it."""
+    """Distance ahead of the robot (m); ``reversed``: heading back to it."""
 
     distance: Annotated[float, msgspec.Meta(ge=-DISTANCE_MAX, le=DISTANCE_MAX)]
     reversed: bool = False
 
 
 class LandingPose(msgspec.Struct):
-    """The landing point and where the robot is, in the map."""
+    """The landing point and the robot's pose, in the map."""
 
     landing_pose: Pose3D
     robot_pose: Pose3D

@@ -36,7 +36,7 @@ class Result(IntEnum):
 
 
 class ActionState(msgspec.Struct):
-    """``reason`` is empty on success."""
+    """State of an action; ``reason`` is empty on success."""
 
     status: State
     result: Result
@@ -44,7 +44,7 @@ class ActionState(msgspec.Struct):
 
 
 class ActionInfo(msgspec.Struct):
-    """An action under way."""
+    """A running action."""
 
     action_id: int
     action_name: str
@@ -86,7 +86,7 @@ class PathQuery(msgspec.Struct):
 
 
 class Speed(msgspec.Struct):
-    """m/s forward and left, rad/s counter-clockwise."""
+    """Velocity: m/s forward and left, rad/s counter-clockwise."""
 
     vx: float
     vy: float
@@ -94,9 +94,9 @@ class Speed(msgspec.Struct):
 
 
 class MoveOptions(msgspec.Struct):
-    """Options of a move. ``yaw`` and ``fail_retry_count`` only count when ``flags`` names them.
+    """Options of a move. ``yaw`` and ``fail_retry_count`` have an effect only if ``flags`` names them.
 
-    Clients in the field send flags as a list, 0, null or [null], and 0 for numbers that they do not care about.
+    Real clients send flags as a list, 0, null or [null], and 0 for unused numbers.
     """
 
     mode: int = 0
@@ -149,7 +149,7 @@ class AngleOptions(msgspec.Struct):
 
 
 class GoHome(msgspec.Struct):
-    """``flags`` is text here: "dock", or "no_dock" to stop at the landing point."""
+    """Options of the way home; ``flags`` is text here: "dock", or "no_dock" to stop at the landing point."""
 
     flags: Literal["dock", "no_dock"] | None = None
     back_to_landing: bool | None = None
@@ -164,7 +164,7 @@ class GoHomeOptions(msgspec.Struct):
 
 
 class FollowPathPointsOptions(msgspec.Struct):
-    """Go along these."""
+    """Go along ``path_points``."""
 
     path_points: Annotated[list[Point], msgspec.Meta(min_length=1, max_length=TARGETS_MAX)]
     move_options: MoveOptions | None = None
@@ -195,14 +195,14 @@ class RecoverMovement(StrEnum):
 
 
 class RelocalizationOptions(msgspec.Struct):
-    """``max_recover_time`` in ms; 0: the robot's own limit."""
+    """Options of a relocalisation; ``max_recover_time``: ms, 0 for the robot's own limit."""
 
     max_recover_time: Annotated[int, msgspec.Meta(ge=0, le=TIMEOUT_MAX)] = 0
     recover_movement_type: RecoverMovement = RecoverMovement.NO_MOVE
 
 
 class RecoverLocalizationOptions(msgspec.Struct):
-    """Without ``area``, or with an empty one: anywhere on the map."""
+    """Search in ``area``; without it, or with an empty one, anywhere on the map."""
 
     area: Rectangle | None = None
     relocalization_options: RelocalizationOptions | None = None
@@ -215,27 +215,27 @@ class PlaceName(msgspec.Struct):
 
 
 class ReturnToParkingOptions(msgspec.Struct):
-    """Park there, or where there is room."""
+    """Park at ``target``, or at any free place."""
 
     target: PlaceName | None = None
     move_options: MoveOptions | None = None
 
 
 class JackMoveOptions(msgspec.Struct):
-    """Direction."""
+    """Direction of the jack."""
 
     move_direction: Literal["Up", "Down"]
 
 
 class JackTopWishes(msgspec.Struct):
-    """``robot_line_speed`` in m/s; 0 or absent: as fast as it drives otherwise."""
+    """Options with a load; ``robot_line_speed``: m/s, 0 or absent for the usual speed."""
 
     move_options: MoveOptions | None = None
     robot_line_speed: Annotated[float, msgspec.Meta(ge=0, le=100)] | None = None
 
 
 class JackTopMoveToOptions(msgspec.Struct):
-    """Through all targets. Beyond the manual, but in use."""
+    """Go through all targets. Not in the manual, but in use."""
 
     target: ScheduledTarget | None = None
     targets: Annotated[list[ScheduledTarget], msgspec.Meta(max_length=500)] = []
@@ -243,7 +243,7 @@ class JackTopMoveToOptions(msgspec.Struct):
 
 
 class MultiFloorTarget(msgspec.Struct):
-    """A place by its name or id, or a pose on a floor (absent: this one)."""
+    """A place by its name or id, or a pose on a floor (absent: the current one)."""
 
     poi_name: Annotated[str, msgspec.Meta(max_length=4096)] = ""
     building: Annotated[str, msgspec.Meta(max_length=64)] = ""
@@ -252,7 +252,7 @@ class MultiFloorTarget(msgspec.Struct):
 
 
 class MultiFloorMoveOptions(msgspec.Struct):
-    """Go there, by lift if need be."""
+    """Go to ``target``, by elevator if necessary."""
 
     target: MultiFloorTarget
     move_options: MoveOptions | None = None
@@ -284,7 +284,7 @@ class EnterElevator(msgspec.Struct):
 
 
 class EnterElevatorOptions(msgspec.Struct):
-    """Into this one."""
+    """Enter this elevator."""
 
     elevator_id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
     enter_elevator_options: EnterElevator | None = None
@@ -300,7 +300,7 @@ class LeaveElevator(msgspec.Struct):
 
 
 class LeaveElevatorOptions(msgspec.Struct):
-    """Out of this one."""
+    """Leave this elevator."""
 
     elevator_id: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
     target: Pose2D | None = None
@@ -317,16 +317,16 @@ class TagType(IntEnum):
 
 
 class TagOffset(msgspec.Struct):
-    """Place to stand: ``x`` m before the tag, ``y`` m to its left as it looks."""
+    """Place to stop in the tag's frame: ``x`` m in front of it, ``y`` m to its left."""
 
     x: Annotated[float, msgspec.Meta(ge=0, le=10)] = 0.0
     y: Annotated[float, msgspec.Meta(ge=-10, le=10)] = 0.0
 
 
 class TagWishes(msgspec.Struct):
-    """Options to dock. ``tag_ids``: any of these; ``reflect_tag_num``: how many strips mark the place.
+    """Options to dock. ``tag_ids``: any of these; ``reflect_tag_num``: number of strips that mark the place.
 
-    ``dock_allowance``: m of the robot that stay outside the shelf; its middle under the shelf's without it.
+    ``dock_allowance``: part of the robot outside the shelf, m; absent: robot centred under the shelf.
     """
 
     tag_type: TagType = TagType.VISUAL
@@ -340,7 +340,7 @@ class TagWishes(msgspec.Struct):
 
 
 class MoveToTagOptions(TagWishes, kw_only=True):
-    """Visual approach from ``target`` on."""
+    """Go to ``target``, then approach the tag visually."""
 
     target: Pose3D
 
@@ -355,7 +355,7 @@ class ScheduledTarget(msgspec.Struct):
 
 
 class ScheduledMoveToTagOptions(msgspec.Struct):
-    """Beyond the manual, but in use."""
+    """Go to a place and dock at its tag. Not in the manual, but in use."""
 
     target: ScheduledTarget
     move_to_tag_options: TagWishes | None = None
@@ -365,7 +365,7 @@ Backwards = Annotated[float, msgspec.Meta(ge=0, le=100)]
 
 
 class BackOffFromTagOptions(msgspec.Struct):
-    """``backup_mode`` 1: watch the tag; both spellings of the distance (m) are in use; 0: until it can turn."""
+    """Back off; ``backup_mode`` 1: watching the tag. The distance, m, has two spellings; 0: until it can turn."""
 
     backup_mode: Annotated[int, msgspec.Meta(ge=0, le=1)] = 0
     tag_type: TagType = TagType.VISUAL
@@ -375,6 +375,6 @@ class BackOffFromTagOptions(msgspec.Struct):
 
 
 class Strategy(msgspec.Struct):
-    """The one to use."""
+    """The strategy to use."""
 
     strategy: Annotated[str, msgspec.Meta(max_length=64)]

@@ -77,7 +77,7 @@ class DockInfo(msgspec.Struct):
 
 
 class NearbyPoi(msgspec.Struct, omit_defaults=True):
-    """The nearest place, seen from the robot; ``name`` may be ON_DOCK, IN_ELEVATOR or UNKNOWN."""
+    """The nearest place, in the robot's frame; ``name`` may be ON_DOCK, IN_ELEVATOR or UNKNOWN."""
 
     name: str
     id: str = ""
@@ -111,7 +111,7 @@ class Reload(msgspec.Struct):
 
 
 class Unbinding(msgspec.Struct):
-    """Persistence of the map on disk."""
+    """Unbinding from the cloud; ``keep_local_map``: keep the map on disk."""
 
     keep_local_map: bool = False
 

@@ -8,7 +8,7 @@ import msgspec
 
 
 class GeneralEvent(StrEnum):
-    """Every value of the manual."""
+    """Event of the robot; all values of the manual."""
 
     START_CHARGING = "START_CHARGING"
     STOP_CHARGING = "STOP_CHARGING"

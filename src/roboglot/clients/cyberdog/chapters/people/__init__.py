@@ -1,1 +1,1 @@
-"""Chapters "members", "faces", "following" and "audio": who the dog knows, sees and hears."""
+"""Chapters "members", "faces", "following" and "audio": people known, seen, followed and heard by the dog."""

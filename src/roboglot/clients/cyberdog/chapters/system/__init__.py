@@ -1,1 +1,1 @@
-"""Chapters "status", "settings", "ota", "bluetooth" and the rest: the dog's own system."""
+"""Chapters "status", "settings", "ota", "bluetooth" and others about the dog's own system."""

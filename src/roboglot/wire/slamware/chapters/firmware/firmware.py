@@ -6,7 +6,7 @@ import msgspec
 
 
 class FirmwareInfo(msgspec.Struct, omit_defaults=True):
-    """A version that the maker offers; nothing in it: there is none."""
+    """A version offered by the maker; empty if there is none."""
 
     manufacturer: str = ""
     model: str = ""

@@ -11,7 +11,7 @@ Minutes = Annotated[int, msgspec.Meta(ge=0, le=30 * 24 * 60)]
 
 
 class Shutdown(msgspec.Struct):
-    """Minutes until it is off, and from then until it starts again (0: it does not)."""
+    """Minutes until the robot is off, and from then until it starts again (0: never)."""
 
     shutdown_time_interval: Minutes = 0
     restart_time_interval: Minutes = 0
@@ -68,7 +68,7 @@ class Mode(StrEnum):
 
 
 class LightColour(msgspec.Struct):
-    """Parts of 255."""
+    """Colour, each part from 0 to 255."""
 
     red: ColourPart = 0
     green: ColourPart = 0
@@ -76,7 +76,7 @@ class LightColour(msgspec.Struct):
 
 
 class LightControl(msgspec.Struct, rename="camel"):
-    """``bright_ms``: a step of breathing, the bright time of a blink, or the time of one lamp."""
+    """Light of a strip; ``bright_ms``: step of breathing, bright time of a blink, or time per lamp."""
 
     channel: Channel
     control_part: Half
@@ -88,7 +88,7 @@ class LightControl(msgspec.Struct, rename="camel"):
 
 
 class DisabledSensor(msgspec.Struct, rename="camel"):
-    """A sensor that is switched off; not ``is_always``: until the robot restarts."""
+    """A disabled sensor; ``is_always`` false: until the robot restarts."""
 
     id: int
     is_always: bool

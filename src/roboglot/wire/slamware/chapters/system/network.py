@@ -11,7 +11,7 @@ Name = Annotated[str, msgspec.Meta(max_length=64)]
 
 
 class NetworkStatus(msgspec.Struct):
-    """``ethip1`` with the prefix length; ``quality`` in percent."""
+    """State of the network; ``ethip1`` with the prefix length, ``quality`` in percent."""
 
     ethip1: str
     ip: str
@@ -22,7 +22,7 @@ class NetworkStatus(msgspec.Struct):
 
 
 class WrappedStatus(msgspec.Struct):
-    """Wrapped, as the API has it."""
+    """The API's wrapper of NetworkStatus."""
 
     networkstatus: NetworkStatus
 
@@ -41,14 +41,14 @@ Nothing = Annotated[list[object], msgspec.Meta(max_length=0)]  # the manual's ex
 
 
 class StationOptions(msgspec.Struct):
-    """Both needed for a station, both optional for an access point."""
+    """Both are required for a station and optional for an access point."""
 
     ssid: Name | None = None
     password: Name | None = None
 
 
 class NetworkRequest(msgspec.Struct):
-    """A mode, and what it needs."""
+    """A mode and its options."""
 
     networkmode: RequestedMode
     options: StationOptions | Nothing | None = None

@@ -25,7 +25,7 @@ class DockingStatus(StrEnum):
 
 
 class PowerStatus(msgspec.Struct, rename="camel"):
-    """Battery in percent, where the power comes from, and how awake the robot is."""
+    """Battery in percent, source of power, and state of sleep."""
 
     battery_percentage: int
     docking_status: DockingStatus
@@ -90,7 +90,7 @@ class BaseError(msgspec.Struct, rename="camel"):
 
 
 class BaseHealthInfo(msgspec.Struct, rename="camel"):
-    """The health; real robots send the last four fields, which the manual does not have."""
+    """State of health; the last four fields come from real robots, not from the manual."""
 
     has_warning: bool
     has_error: bool
@@ -111,7 +111,7 @@ class LaserPoint(msgspec.Struct):
 
 
 class LaserScan(msgspec.Struct):
-    """One turn of the lidar and where the robot was then. ``laser_points``: LaserPoints, already encoded."""
+    """One turn of the lidar and the robot's pose at that time. ``laser_points``: LaserPoints, already encoded."""
 
     pose: Pose3D
     laser_points: msgspec.Raw
@@ -144,7 +144,7 @@ class ImuCounts(msgspec.Struct):
 
 
 class ImuValues(msgspec.Struct):
-    """The same in m/s2, rad/s and microtesla."""
+    """Values of accelerometer (m/s2), gyro (rad/s) and compass (microtesla); ``timestamp`` in ms."""
 
     acc_x: float
     acc_y: float
