@@ -1,4 +1,4 @@
-"""Pictures and sound as the world outside wants them: H.264, JPEG, MP4, Opus. Knows the model's values, no robot body.
+"""Pictures and sound in common formats: H.264, JPEG, MP4, Opus. Knows the model's values, no robot body.
 
-Importing this package is cheap: PyAV is loaded by the first encoder that is made.
+Importing this package is cheap: PyAV is loaded with the first encoder.
 """

@@ -1,4 +1,4 @@
-"""The microphone as live Opus, encoded once for all listeners and only while there are any."""
+"""The microphone as live Opus, encoded once for all listeners, and only while there is one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ QUEUE_MAX = 25  # packets: half a second
 
 
 class AudioStream(Component):
-    """Opus of the microphone, 50 packets a second of one size: ``robot[AudioStream].subscribe()``."""
+    """Opus of the microphone, 50 packets of equal size per second: ``robot[AudioStream].subscribe()``."""
 
     def __init__(self, microphone: Microphone, clock: Clock) -> None:
         self._microphone, self._clock = microphone, clock
@@ -25,7 +25,7 @@ class AudioStream(Component):
         self._encoding: asyncio.Task[None] | None = None
 
     def subscribe(self) -> Viewer[AudioPacket]:
-        """Packets from now on."""
+        """Return a viewer of the packets from now on."""
         return self._feed.subscribe()
 
     def _begin(self) -> None:

@@ -1,4 +1,4 @@
-"""A camera's pictures for a screen of another shape: scaled to a width, then cut or framed in black to a height."""
+"""A camera's pictures in another shape: scaled to a width, then cut or padded in black to a height."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BLACK = (16, 128)  # luma, chroma
 
 
 class FittedPictures:
-    """``camera``'s pictures at ``width`` x ``height`` (even numbers of pixels); made only while they have viewers.
+    """Pictures of ``camera`` at ``width`` x ``height`` (even numbers of pixels), made only while there are viewers.
 
     ``place``: 0 keeps the picture at the upper edge, 1 at the lower, 0.5 in the middle.
     """
@@ -40,7 +40,7 @@ class FittedPictures:
         self._fitting: asyncio.Task[None] | None = None
 
     def subscribe(self) -> Viewer[Frame]:
-        """Pictures from now on."""
+        """Return a viewer of the pictures from now on."""
         return self._feed.subscribe()
 
     def _begin(self) -> None:
@@ -62,7 +62,7 @@ class FittedPictures:
         self._feed.close()
 
     def fit(self, frame: Frame) -> Frame:
-        """``frame`` in the wanted shape."""
+        """Return ``frame`` in the other shape."""
         from av import VideoFrame
 
         scaled = 2 * round(frame.height * self.width / frame.width / 2)
@@ -83,6 +83,6 @@ class FittedPictures:
 
 
 def _paste(source: NDArray[np.uint8], target: NDArray[np.uint8], top: int) -> None:
-    """Lay ``source`` over ``target``, ``top`` rows below its upper edge, as far as there is room."""
+    """Copy ``source`` into ``target``, ``top`` rows below its upper edge, as far as it fits."""
     rows = source[max(0, -top) : max(0, -top) + target.shape[0] - max(0, top)]
     target[max(0, top) : max(0, top) + rows.shape[0]] = rows

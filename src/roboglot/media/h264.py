@@ -1,4 +1,4 @@
-"""H.264 as live viewers need it: Annex B, parameter sets before every key picture, no picture held back."""
+"""H.264 for live viewers: Annex B, parameter sets before every keyframe, no delayed pictures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BITRATE_MAX = 8_000  # kbit/s
 
 @dataclass(frozen=True, slots=True)
 class VideoPacket:
-    """One picture, encoded: a whole access unit with its delimiter. One may join at a ``keyframe``. ``stamp``: s."""
+    """One encoded picture: an access unit with its delimiter. Viewers join at a ``keyframe``. ``stamp``: s."""
 
     stamp: float
     data: bytes
@@ -32,7 +32,7 @@ class H264Encoder:
         self._codec = _open(width, height, rate)
 
     def encode(self, frame: Frame, *, keyframe: bool = False) -> VideoPacket:
-        """The packet of ``frame``; ``keyframe`` makes it one where viewers can join (every second one is anyway)."""
+        """Return the packet of ``frame``; ``keyframe``: force one to join at (there is one per second anyway)."""
         from av import VideoFrame
         from av.video.frame import PictureType
 

@@ -13,7 +13,7 @@ BITRATE = 32_000  # bit/s
 
 @dataclass(frozen=True, slots=True)
 class AudioPacket:
-    """One block of sound, encoded; ``stamp``: robot time of its first sample, s."""
+    """One encoded block of sound; ``stamp``: robot time of its first sample, s."""
 
     stamp: float
     data: bytes
@@ -34,7 +34,7 @@ class OpusEncoder:
         self._position = 0
 
     def encode(self, block: SoundBlock) -> AudioPacket:
-        """The one packet of a block of BLOCK samples. Raises ValueError for another length."""
+        """Return the packet of a block of BLOCK samples. Raises ValueError for another length."""
         from av import AudioFrame
 
         if len(block.samples) != BLOCK:

@@ -1,6 +1,6 @@
-"""Records the live video into MP4 files, from the packets that viewers get: no second encoder.
+"""Records the live video into MP4 files, from the viewers' packets, without a second encoder.
 
-A file appears under its name when it is complete, or not at all.
+A file gets its name only once it is complete.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Recording:
 
 
 class Recorder(Component):
-    """One recording at a time; ends by itself at SECONDS_MAX or BYTES_MAX, and is then fetched by ``stop``."""
+    """Recorder of one recording at a time, which ends at SECONDS_MAX or BYTES_MAX; ``stop`` returns it."""
 
     def __init__(self, video: VideoStream, clock: Clock) -> None:
         self._video, self._clock = video, clock
@@ -64,10 +64,10 @@ class Recorder(Component):
         self._writing = asyncio.get_running_loop().create_task(self._write(path, self._viewer), name="recorder")
 
     async def stop(self, *, at_once: bool = False) -> Recording:
-        """End the recording and complete its file; one that has just begun gets one picture, unless ``at_once``.
+        """End the recording and complete its file, with one picture at least, unless ``at_once``.
 
-        ``at_once`` takes no robot time: it is for an end at which no clock may move any more. Raises Refused if nothing
-        is being recorded, RobotError if it failed or there is no picture.
+        ``at_once`` takes no robot time, for a shutdown with a stopped clock. Raises Refused if there is no recording,
+        RobotError if it failed or there is no picture.
         """
         writing, viewer = self._writing, self._viewer
         if writing is None or viewer is None:
@@ -103,7 +103,7 @@ def _bound(add: Callable[[VideoPacket], None], packet: VideoPacket) -> Callable[
 
 
 class _File:
-    """An MP4 file in the making, beside the place where it will be."""
+    """An incomplete MP4 file, beside its final path."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._part = path, path.with_name(f"{path.name}.part")
@@ -125,7 +125,7 @@ class _File:
         self.seconds, self.size = packet.stamp - self._first, self.size + len(packet.data)
 
     def _open(self, packet: VideoPacket) -> Stream:
-        """The track's head takes the parameter sets, which a reader finds in the first keyframe."""
+        """Open the file, with the parameter sets of the first keyframe in the track's header."""
         import av
 
         self._container = av.open(str(self._part), "w", format="mp4")
@@ -136,7 +136,7 @@ class _File:
         return self._track
 
     def finish(self) -> Recording:
-        """Complete it and give it its name."""
+        """Complete the file and rename it. Raises OSError."""
         if self._container is None:
             raise OSError("no picture came")
         self._container.close()
@@ -145,7 +145,7 @@ class _File:
         return Recording(self._path, self.seconds, self._path.stat().st_size)
 
     def discard(self) -> None:
-        """Leave nothing half done."""
+        """Remove an incomplete file."""
         if self._container is not None:
             self._container.close()
             self._container = None

@@ -1,4 +1,4 @@
-"""A map as map_server of ROS keeps it: a yaml file and a pgm image beside it (http://wiki.ros.org/map_server)."""
+"""A map in the format of ROS's map_server: a yaml file beside a pgm image (http://wiki.ros.org/map_server)."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from roboglot.model.components.sensing.camera import Frame
 
 
 def jpeg(frame: Frame, quality: int = 90) -> bytes:
-    """``frame`` as a JPEG file; ``quality`` 1..95. Takes some tens of milliseconds: do it beside the loop."""
+    """Return ``frame`` as a JPEG file; ``quality`` 1..95. Takes tens of milliseconds: call it in a thread."""
     from PIL import Image
 
     if not 1 <= quality <= 95:

@@ -1,4 +1,4 @@
-"""Gives a robot that sees and hears its streams, shared by all doors."""
+"""Adds a robot's streams of video and audio, shared by all doors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboglot.model.robot import Robot
 
 
 def add_streams(robot: Robot) -> None:
-    """``VideoStream`` and ``Recorder`` if there is a camera, ``AudioStream`` if there is a microphone."""
+    """Add ``VideoStream`` and ``Recorder`` to a robot with a camera, ``AudioStream`` to one with a microphone."""
     if Camera in robot:
         video = robot.add(VideoStream, VideoStream(robot[Camera], robot.clock))
         robot.add(Recorder, Recorder(video, robot.clock))

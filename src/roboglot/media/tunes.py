@@ -34,18 +34,18 @@ _WALTZ = (
 
 @cache
 def romp() -> Sound:
-    """Eight lively bars in C, 6.4 s long."""
+    """Return eight lively bars in C, 6.4 s long."""
     return _played("romp", _ROMP, 0.2)
 
 
 @cache
 def evening_waltz() -> Sound:
-    """Eight bars of a slow waltz in A minor, 9.6 s long."""
+    """Return eight bars of a slow waltz in A minor, 9.6 s long."""
     return _played("evening waltz", _WALTZ, 0.4)
 
 
 def _played(name: str, voices: tuple[str, ...], beat: float) -> Sound:
-    """Mix all voices, with the given seconds per beat."""
+    """Return the mix of all voices, at ``beat`` s per beat."""
     parts = [_sung(voice, beat) for voice in voices]
     whole = np.zeros(max(map(len, parts)))
     for part in parts:
@@ -63,13 +63,13 @@ def _sung(voice: str, beat: float) -> NDArray[np.float64]:
 
 
 def _frequency(pitch: str) -> float:
-    """Hz of a note such as ``c4`` or ``g+4``, in equal temperament."""
+    """Return the frequency (Hz) of a note such as ``c4`` or ``g+4``, in equal temperament."""
     steps = _STEPS[pitch[0]] + pitch.count("+") + 12 * (int(pitch[-1]) - 4)
     return float(_A4 * 2.0 ** (steps / 12))
 
 
 def _plucked(frequency: float, samples: int) -> NDArray[np.float64]:
-    """A string: loud at once, dying away, its higher partials first; damped at the end, so that nothing clicks."""
+    """Return a plucked string: loud at once, fading, higher partials faster; damped at the end to avoid a click."""
     time = np.arange(samples) / SAMPLE_RATE
     fading = np.exp(-time / _RING)
     whole, sound = np.zeros(samples), fading.copy()

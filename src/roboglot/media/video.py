@@ -1,4 +1,4 @@
-"""The camera as live video, encoded once for all viewers and only while there are any."""
+"""The camera as live video, encoded once for all viewers, and only while there is one."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ QUEUE_MAX = 30  # packets, one second; a viewer further behind resumes at the ne
 
 
 async def beside(clock: Clock, job: Callable[[], R]) -> R:
-    """The result of ``job``: in a thread in real time, in place in lockstep, where threads would upset the order."""
+    """Return the result of ``job``, run in a thread in real time, in place in lockstep to keep the order."""
     return await background.beside(job) if isinstance(clock, RealClock) else job()
 
 
@@ -36,7 +36,7 @@ class Pictures(Protocol):
 
 
 class VideoStream(Component):
-    """H.264 of the camera at its rate: ``robot[VideoStream].subscribe()``. A newcomer gets a keyframe at once."""
+    """H.264 of the camera at its rate: ``robot[VideoStream].subscribe()``. New viewers get a keyframe at once."""
 
     def __init__(self, camera: Pictures, clock: Clock) -> None:
         self._camera, self._clock = camera, clock
@@ -57,13 +57,13 @@ class VideoStream(Component):
         return self._camera.rate
 
     def subscribe(self) -> Viewer[VideoPacket]:
-        """Packets from the next keyframe on, which comes with the next picture."""
+        """Return a viewer of the packets from the next picture on, which is a keyframe."""
         viewer = self._feed.subscribe()
         self.request_keyframe()
         return viewer
 
     def request_keyframe(self) -> None:
-        """Make the next picture one where viewers can join (for those who lost packets)."""
+        """Make the next picture a keyframe, for viewers that lost packets."""
         self._keyframe_wanted = True
 
     def _begin(self) -> None:

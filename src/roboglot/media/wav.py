@@ -21,7 +21,7 @@ BYTES_MAX = 200_000_000
 
 
 def read_wav(source: Path | IO[bytes], name: str = "") -> Sound:
-    """The file, mixed to mono, at 48 kHz. Raises ValueError in plain words, OSError if it cannot be read."""
+    """Return a file's sound, mixed to mono, at 48 kHz. Raises ValueError in plain words, OSError."""
     name = name or (source.stem if isinstance(source, Path) else "sound")
     try:
         with wave.open(str(source) if isinstance(source, Path) else source, "rb") as file:
@@ -39,7 +39,7 @@ def read_wav(source: Path | IO[bytes], name: str = "") -> Sound:
 
 
 def _numbers(frames: bytes, width: int) -> NDArray[np.float64]:
-    """-1..1."""
+    """Return the samples as numbers in -1..1. Raises ValueError."""
     match width:
         case 1:
             return np.frombuffer(frames, dtype=np.uint8) / 127.5 - 1.0
@@ -54,7 +54,7 @@ def _numbers(frames: bytes, width: int) -> NDArray[np.float64]:
 
 
 def _resampled(wave_form: NDArray[np.float64], rate: int) -> NDArray[np.float64]:
-    """At SAMPLE_RATE: straight between samples; from higher rates after a mean that keeps out what would fold back."""
+    """Return the wave at SAMPLE_RATE, interpolated linearly; higher rates are averaged first, against aliasing."""
     if rate == SAMPLE_RATE or not len(wave_form):
         return wave_form
     if rate > SAMPLE_RATE:

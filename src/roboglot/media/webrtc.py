@@ -1,7 +1,7 @@
 """Live video and sound to one viewer by WebRTC: the streams' own packets, so that one encoder serves all viewers.
 
 Imports aiortc: import this module only when a picture is requested. Independent of the signalling: texts go in and
-come out. Its time is the network's, not the robot's: what is sent is stamped with the time at which it is to be shown.
+come out. Packets are stamped with their time of display, in the network's time, not the robot's.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ H264, RETRANSMISSION = "video/h264", "video/rtx"
 
 
 class BadOffer(ValueError):
-    """An SDP that cannot be answered; the message says why."""
+    """An SDP that cannot be answered, with the reason as its message."""
 
 
 @dataclass(frozen=True, slots=True)
 class IceCandidate:
-    """One address of ours in SDP's words, for the media section ``mid`` (number ``index``)."""
+    """One address of this side as SDP text, for the media section ``mid`` (number ``index``)."""
 
     text: str
     mid: str
@@ -72,7 +72,7 @@ class _PacketTrack(MediaStreamTrack, Generic[P]):
         self._last = -1
 
     async def recv(self) -> Packet[Stream]:
-        """The next packet. Raises MediaStreamError when there are no more."""
+        """Return the next packet. Raises MediaStreamError at the end."""
         try:
             if self._viewer is None:
                 self._viewer = self._subscribe()
@@ -91,11 +91,11 @@ class _PacketTrack(MediaStreamTrack, Generic[P]):
         return Packet(media.data)
 
     def _due(self, now: int) -> int:
-        """Return when the packet is to be shown, in units of ``base``; ``now`` is when it was made."""
+        """Return the time to show a packet, in units of ``base``; ``now``: the time of its media."""
         return max(self._last + 1, now)
 
     def _shown_at(self, stamp: float) -> float:
-        """Outside time in s: a clock that runs faster shows its pictures faster; in lockstep, when they come."""
+        """Return the real time (s) of a stamp: faster clocks show pictures faster; in lockstep, the present time."""
         if isinstance(self._clock, RealClock):
             return self._clock.real_time_of(stamp)
         return asyncio.get_running_loop().time()
@@ -107,7 +107,7 @@ class _PacketTrack(MediaStreamTrack, Generic[P]):
 
 
 class _PictureTrack(_PacketTrack[VideoPacket]):
-    """The camera's."""
+    """Track of the camera."""
 
     kind, base = "video", Fraction(1, 90_000)
 
@@ -122,7 +122,7 @@ class _PictureTrack(_PacketTrack[VideoPacket]):
         return packet
 
     def request_keyframe(self) -> None:
-        """The viewer lost something."""
+        """Request a keyframe for a viewer that lost packets, at a limited rate."""
         now = asyncio.get_running_loop().time()
         if now - self._keyframe_at >= KEYFRAME_EVERY:
             self._keyframe_at = now
@@ -130,7 +130,7 @@ class _PictureTrack(_PacketTrack[VideoPacket]):
 
 
 class _SoundTrack(_PacketTrack[AudioPacket]):
-    """The microphone's."""
+    """Track of the microphone."""
 
     kind, base = "audio", Fraction(1, SAMPLE_RATE)
 
@@ -138,15 +138,15 @@ class _SoundTrack(_PacketTrack[AudioPacket]):
         super().__init__(stream.subscribe, clock, lambda: None)
 
     def _due(self, now: int) -> int:
-        """Right after the packet before, unless sound was missing in between."""
+        """Return the end of the last packet, unless sound was missing in between."""
         follows = self._last + BLOCK
         return follows if self._last >= 0 and abs(now - follows) < GAP else max(self._last + 1, now)
 
 
 class VideoCall:
-    """One viewer. ``changed(state)`` receives aiortc's connection states, and "blind" after the last picture.
+    """Call of one viewer. ``changed(state)`` receives aiortc's connection states, and "blind" after the last picture.
 
-    ``sound`` is sent, too, to a viewer that asks for it.
+    ``sound`` is also sent to a viewer that asks for it.
     """
 
     def __init__(
@@ -160,7 +160,7 @@ class VideoCall:
         self._peer.add_listener("connectionstatechange", lambda: changed(self._peer.connectionState))
 
     async def answer(self, offer: str) -> str:
-        """The SDP that answers ``offer``, with all our addresses in it. Raises BadOffer. Once."""
+        """Return the SDP answer to ``offer``, with all addresses of this side; to be called once. Raises BadOffer."""
         if offer.count("m=") > SECTIONS_MAX:
             raise BadOffer(f"more than {SECTIONS_MAX} media sections")
         peer = self._peer
@@ -189,7 +189,7 @@ class VideoCall:
         return str(peer.localDescription.sdp)
 
     def candidates(self) -> Sequence[IceCandidate]:
-        """Our addresses, as in the answer."""
+        """Return the addresses of this side, as in the answer."""
         found: list[IceCandidate] = []
         section, mid = -1, ""
         lines = self._peer.localDescription.sdp.splitlines() if self._peer.localDescription else []
@@ -203,7 +203,7 @@ class VideoCall:
         return found
 
     async def add_candidate(self, text: str, mid: str | None, index: int | None) -> None:
-        """An address of the viewer; empty: there are no more. Raises BadOffer for what is none."""
+        """Add an address of the viewer; empty: there are no more. Raises BadOffer for a malformed one."""
         if not text:
             return  # later ones are accepted
         try:

@@ -1,1 +1,1 @@
-"""Robot bodies: their descriptions, their hulls in the physics, feet and motions, and how components are fitted."""
+"""Robot bodies: descriptions, hulls in the physics, feet and motions, and the fitting of components."""

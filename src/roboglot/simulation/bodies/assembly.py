@@ -1,4 +1,4 @@
-"""Fits a robot with the parts that its body describes, and runs them in order."""
+"""Fits a robot with the parts of its body's description, and runs them in order."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ P = TypeVar("P")
 
 
 class SimulatedRobot:
-    """The simulated parts of one robot, run by the world once a tick: ``control``, physics, ``sense``.
+    """The simulated parts of one robot, run by the world in every tick: ``control``, physics, ``sense``.
 
-    Parts that sense once in some ticks begin ``turn`` ticks later, within their period: the scans of many robots do not
-    all come in one tick, which would keep their clients waiting.
+    Parts with a longer period begin ``turn`` ticks later, within their period: otherwise the scans of many robots would
+    all come in one tick, and delay their clients.
     """
 
     def __init__(self, fitting: Fitting, turn: int = 0) -> None:
@@ -49,11 +49,11 @@ class SimulatedRobot:
         return self._fitting.find(kind)
 
     def control(self) -> None:
-        """Run before the physics of a tick."""
+        """Run the parts' control, before the physics of a tick."""
         self._context.run(self._controls.run)
 
     def sense(self, stamp: float) -> None:
-        """Run after it."""
+        """Run the parts' sensing, after the physics of a tick."""
         self._context.run(self._senses.run_at, stamp)
 
     def displaced(self) -> None:
@@ -62,7 +62,7 @@ class SimulatedRobot:
             displaced()
 
     def detach(self) -> None:
-        """Let the parts end what they do beside the world's time."""
+        """Let the parts end their background tasks."""
         for detach in self._detach:
             detach()
 

@@ -1,4 +1,4 @@
-"""Motors that bring one axis somewhere in time, and the loop of an action that waits for them.
+"""Motors that move one axis over time, and the loop of an action that waits for them.
 
 Knows no robot: gimbal, arm, gripper and servos are made of these.
 """
@@ -18,7 +18,7 @@ LOOK = 0.02  # s between checks whether a motion has ended
 
 @dataclass(slots=True)
 class Axis:
-    """An angle or a way between two ends, with limited acceleration (per s2)."""
+    """An angle (rad) or a distance (m) between two ends, with limited acceleration (per s2)."""
 
     lowest: float
     highest: float
@@ -27,15 +27,15 @@ class Axis:
     rate: float = 0.0
 
     def run(self, rate: float, seconds: float) -> None:
-        """Come to ``rate`` and move on with it; the ends stop it."""
+        """Approach ``rate`` (per s) and move at it; the ends stop the axis."""
         step = self.acceleration * seconds
         self.rate += max(-step, min(step, rate - self.rate))
         self.shift(self.rate * seconds)
 
     def trail(self, way: float, pull: float, top: float, seconds: float) -> None:
-        """Be shifted by ``way``, then come back to the middle at ``pull`` (1/s) times the distance, up to ``top``.
+        """Shift by ``way``, then return to the middle at ``pull`` (1/s) times the distance, up to ``top``.
 
-        Does what ``shift`` and ``run`` do, in one go: a gimbal does this in every tick of a robot that turns.
+        Combines ``shift`` and ``run`` for speed: a gimbal calls it in every tick of a turning robot.
         """
         position, rate, low, high = self.position + way, self.rate, self.lowest, self.highest
         if not low <= position <= high:
@@ -53,7 +53,7 @@ class Axis:
         self.position, self.rate = position, rate
 
     def approach(self, goal: float, speed: float, seconds: float) -> None:
-        """Come nearer to ``goal`` at up to ``speed`` and in time to stop there."""
+        """Approach ``goal`` at up to ``speed``, braking in time to stop there."""
         left = goal - self.position
         step = self.acceleration * seconds
         top = min(speed, math.sqrt(2.0 * self.acceleration * abs(left)), abs(self.rate) + step)
@@ -67,7 +67,7 @@ class Axis:
         self.shift(wanted * seconds)
 
     def shift(self, way: float) -> None:
-        """Move by so much at once; the ends stop it."""
+        """Move by ``way`` at once; the ends stop the axis."""
         there = self.position + way
         self.position = max(self.lowest, min(self.highest, there))
         if self.position != there:
@@ -77,7 +77,7 @@ class Axis:
 async def move(
     action: Action, clock: Clock, begin: Callable[[], None], arrived: Callable[[], bool], halt: Callable[[], None]
 ) -> None:
-    """Begin a motion and wait until it has arrived; pausing halts it, and however it ends it is halted."""
+    """Begin a motion and wait until it has arrived; ``halt`` is called on pauses and at any end."""
     begin()
     try:
         while not arrived():

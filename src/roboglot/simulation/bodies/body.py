@@ -1,7 +1,7 @@
-"""Declarative descriptions of robot bodies: which parts there are and their parameters. SI units.
+"""Declarative descriptions of robot bodies: their parts and parameters. SI units.
 
-What the physics is built from (hull, base, legs) is described here; every other section stands beside the component
-that reads it, in ``simulation/components``. ``bodies.files`` reads the files.
+The sections that the physics needs (hull, base, legs) are here; every other section is beside its component in
+``simulation/components``. ``bodies.files`` reads the files.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ S = TypeVar("S", bound=Struct)
 
 
 class HullSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Two cylinders, chassis and torso, of one radius around base_link."""
+    """Two cylinders, chassis and torso, of equal radius around base_link."""
 
     radius: Positive
     height: Positive
@@ -49,11 +49,11 @@ class BaseSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class LegsSection(Struct, frozen=True, forbid_unknown_fields=True):
-    """Belly heights (m) and how long the ways between them take (s); ``lowest`` to ``highest`` can be held standing.
+    """Belly heights (m) and times to change between them (s); ``lowest`` to ``highest``: heights held while standing.
 
-    ``angle_max`` (rad) and ``shift_max`` (m) of the body against the feet; powers in W; with a charge up to
-    ``tired_below`` no motion is performed; without a ``gait`` of its own the body rolls on its wheels. ``reach``: how
-    far from below its hip a foot stands at most, m.
+    ``angle_max`` (rad) and ``shift_max`` (m) of the body relative to the feet; powers in W; no motion is performed at a
+    charge up to ``tired_below``; without a ``gait`` the body rolls on its wheels. ``reach``: largest distance of a foot
+    from the place below its hip, m.
     """
 
     standing: Positive
@@ -71,7 +71,7 @@ class LegsSection(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def limits(self) -> LegLimits:
-        """Limits of such legs."""
+        """Limits of the legs."""
         return LegLimits(
             lowest=self.lowest, highest=self.highest, angle=self.angle_max, shift=self.shift_max, reach=self.reach
         )
@@ -79,7 +79,7 @@ class LegsSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A kind of robot: ``body[LidarSection]`` is a section, ``body.get(LidarSection)`` the same or None."""
+    """A kind of robot: ``body[LidarSection]`` is a section, ``body.get(LidarSection)`` is None without it."""
 
     maker: str
     model: str
@@ -103,17 +103,17 @@ class Body:
 
     @property
     def base(self) -> BaseSection:
-        """The wheels, or what else moves the hull over the floor."""
+        """The section of the base, which moves the hull over the floor."""
         return self[BaseSection]
 
     @property
     def legs(self) -> LegsSection | None:
-        """The legs, if it has any."""
+        """The section of the legs; None: it has none."""
         return self.get(LegsSection)
 
     @property
     def walks(self) -> bool:
-        """True if it has feet, and no wheels."""
+        """True if the body walks on feet, without wheels."""
         return self.legs is not None and self.legs.gait is not None
 
     def describe(self, serial: str, software_version: str) -> Description:

@@ -1,6 +1,6 @@
-"""Four feet that step: planted ones stay where they are in the world, the others swing to their next foothold.
+"""Four feet that step: planted ones keep their places in the world, the others swing to their next foothold.
 
-Kinematic: base_link is moved by others; this says where the feet are meanwhile, and whether they let it go on.
+Kinematic: base_link is moved by others; the feet follow, and may hold it back.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ HOME = 0.01  # m from its place at which a foot is at rest
 
 
 class Feet:
-    """Places of one body's feet in the world's frame, as plain numbers: they are moved at every tick."""
+    """Places of one body's feet in the world frame, as plain numbers for speed."""
 
     def __init__(self, homes: Sequence[Point], reach: float, pose: Pose) -> None:
         self._below_hips = self._homes = [(home.x, home.y) for home in homes]
@@ -30,7 +30,7 @@ class Feet:
         self.restless = False  # whether a foot is away from its place or in the air
 
     def states(self, pose: Pose) -> Mapping[Foot, FootState]:
-        """Return the state of each foot, seen from base_link at ``pose``."""
+        """Return the state of each foot in base_link, which is at ``pose`` (world)."""
         states = {}
         for index, foot in enumerate(Foot):
             grounded = not self._hanging and self._starts[index] is None and self._heights[index] <= 0.0
@@ -39,18 +39,18 @@ class Feet:
         return states
 
     def narrow(self, inward: float) -> None:
-        """Come down so much (m) nearer to the body's middle from now on than below the hips."""
+        """Set the feet's places ``inward`` m nearer to the body's middle than below the hips."""
         self._homes = [(x, y - math.copysign(inward, y)) for x, y in self._below_hips]
 
     def hang(self, pose: Pose) -> None:
-        """Let the feet touch nothing: the robot flies, is held up or lies on its side."""
+        """Let the feet hang: the robot is in the air, held up or on its side."""
         self._hanging = self.restless = True
         self._places = [_there(pose, *home) for home in self._homes]
         self._heights = [0.0] * len(self._homes)
         self._starts = [None] * len(self._homes)
 
     def holds_back(self, pose: Pose, twist: Twist, swings: Swings) -> bool:
-        """True if a leg that stands is stretched to its end and ``twist`` (base_link) would stretch it further."""
+        """True if ``twist`` (base_link) would stretch a standing leg beyond its reach."""
         if twist == STILL:
             return False
         for index, (home_x, home_y) in enumerate(self._homes):
@@ -63,7 +63,7 @@ class Feet:
         return False
 
     def step(self, pose: Pose, twist: Twist, swings: Swings, seconds: float) -> None:
-        """One tick of ``seconds``: base_link is at ``pose`` and moves at ``twist``; None of ``swings`` stands."""
+        """Move the feet for ``seconds``: base_link is at ``pose`` with ``twist``; a swing of None: the foot stands."""
         self._hanging = False
         if swings is DOWN and not self.restless and twist == STILL and self._near(pose):
             return
@@ -76,7 +76,7 @@ class Feet:
                 self.restless = True
 
     def _lowers(self, index: int, seconds: float) -> bool:
-        """True if a foot that was kept up is still on its way down."""
+        """Lower a foot that was kept up; return whether it is still on its way down."""
         last = self._last[index]
         if last is None or last.left != math.inf or self._heights[index] <= max(0.0, last.to.z):
             return False
@@ -84,7 +84,7 @@ class Feet:
         return True
 
     def _near(self, pose: Pose) -> bool:
-        """Two of them show it: a body that was moved moved all."""
+        """Return whether the feet are at their places; two diagonal ones suffice, as a moved body moves all."""
         return self._off(0, pose) <= HOME and self._off(3, pose) <= HOME
 
     def _off(self, index: int, pose: Pose) -> float:
@@ -92,7 +92,7 @@ class Feet:
         return math.hypot(x - self._homes[index][0], y - self._homes[index][1])
 
     def _stand(self, index: int, pose: Pose, twist: Twist) -> float:
-        """Land a foot, or drag it along with a body that is pushed too far. Return its distance from home, m."""
+        """Land a foot, or drag it along with a body beyond its reach; return its distance from its place, m."""
         last = self._last[index]
         if self._starts[index] is not None and last is not None:
             self._places[index] = self._foothold(index, last, 0.0, pose, twist)
@@ -117,7 +117,7 @@ class Feet:
         self._heights[index] = height + (end - height) * share + swing.to.lift * swing.rise
 
     def _foothold(self, index: int, swing: Swing, left: float, pose: Pose, twist: Twist) -> tuple[float, float]:
-        """Return the landing place (world): half of the stand's way ahead of its place, as the body will be by then."""
+        """Return the landing place (world): ahead of the foot's place by half of the body's way during the stand."""
         (home_x, home_y), half = self._homes[index], swing.stand / 2
         x = home_x + swing.to.x + (twist.x - twist.yaw * home_y) * half
         y = home_y + swing.to.y + (twist.y + twist.yaw * home_x) * half

@@ -1,4 +1,4 @@
-"""Reads body files: a section that is absent is a part that the robot does not have."""
+"""Reads body files: without its section, a part is missing from the robot."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ BODIES = Path(__file__).parent
 
 
 def load_body(name: str) -> Body:
-    """Return a shipped body by its name, or one's own by the path of its TOML file; ``+hard`` or ``+clean`` behind it
-    chooses how good its sensors are. Raises BadFile.
+    """Return a shipped body by its name, or a user's by the path of its TOML file; the suffix ``+hard`` or ``+clean``
+    sets the realism of its sensors. Raises BadFile.
     """
     path, (name, preset) = body_source(name), split_realism(name)
     if not name.endswith(".toml") and (not name.isidentifier() or not path.is_file()):
@@ -43,14 +43,14 @@ def body_source(name: str) -> Path:
 
 
 def split_realism(name: str) -> tuple[str, str]:
-    """Return name or path of a body, and the preset behind it."""
+    """Return name or path of a body, and its preset."""
     body, plus, preset = name.rpartition("+")
     return (body, preset) if plus and preset.isalpha() else (name, USUAL)
 
 
 @cache
 def _file_type() -> type[Struct]:
-    """Return the type of a whole file: the name plate, the hull, and a section for each part that has one."""
+    """Return the type of a whole file: name plate, hull, and the sections of all parts."""
     plate: list[tuple[str, object]] = [("maker", str), ("model", str), ("hardware_version", str), ("hull", HullSection)]
     sections = [(part.name, part.section) for part in parts() if part.section is not None]
     plate += [(name, section) for name, section in sections if name == "base"]

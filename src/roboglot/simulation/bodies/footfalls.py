@@ -17,10 +17,9 @@ DUTY = 0.55  # of a step for which a foot stands
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """A foot in the air: ``share`` of its way is done, it lands in ``left`` s and stands for ``stand`` s then.
+    """A foot in the air after ``share`` of its way: it lands in ``left`` s, then stands for ``stand`` s.
 
-    ``left`` is endless for one that is raised and kept up. ``landing``: how fast it comes down in the end, as a share
-    of how fast it rose.
+    ``left`` is infinite for a foot that is kept up. ``landing``: final downward speed, as a share of the upward one.
     """
 
     share: float
@@ -61,13 +60,13 @@ _DUTIES: Mapping[Gait, float] = {Gait.STAIRS: 0.75, Gait.SLOPE: 0.75, Gait.THREE
 
 @lru_cache(maxsize=64)
 def lifted(lift: FootLift) -> tuple[Foothold, ...]:
-    """The footholds, in the order of Foot, of feet that are lifted so and come down in their places."""
+    """Return the footholds (in the order of Foot) of feet lifted by ``lift`` that land in their places."""
     front, rear = Foothold(lift=lift.front), Foothold(lift=lift.rear)
     return front, front, rear, rear
 
 
 def walking(gait: Gait, strides: float, lift: FootLift) -> Swings:
-    """Return the swing of each foot after so many steps of every leg; None for feet on the floor."""
+    """Return the swing of each foot after ``strides`` steps of every leg; None for feet on the floor."""
     rate, duty = GAITS[gait].steps, _DUTIES.get(gait, DUTY)
     swings: list[Swing | None] = []
     for to, rises in zip(lifted(lift), _RISES.get(gait, _TROT), strict=True):
@@ -81,7 +80,7 @@ def walking(gait: Gait, strides: float, lift: FootLift) -> Swings:
 
 
 class FootfallCycle:
-    """Footfalls, again from the start whenever they are over."""
+    """Footfalls, repeated endlessly."""
 
     def __init__(self, footfalls: Sequence[Footfall]) -> None:
         self.period = math.fsum(footfall.seconds for footfall in footfalls)
@@ -104,7 +103,7 @@ class FootfallCycle:
 
 
 def _flights(footfalls: Sequence[Footfall], foot: Foot) -> list[tuple[float, float]]:
-    """Return start and length of the foot's flights, s; a flight goes on from the last footfall into the first."""
+    """Return start and length of the foot's flights, s; a flight may last from the last footfall into the first."""
     flights: list[tuple[float, float]] = []
     start, flying = 0.0, False
     for footfall in footfalls:

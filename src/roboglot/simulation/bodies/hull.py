@@ -1,6 +1,6 @@
-"""One robot's body in the physics: where it is, how it is driven, what it touches. Truth, world frame.
+"""One robot's body in the physics: pose, drive and contacts. Truth, world frame.
 
-The simulated components read and drive it; nothing outside the simulation sees it.
+The simulated components read and drive it; it is invisible outside the simulation.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 
 
 class HullContact(NamedTuple):
-    """Place of a contact on the hull (base_link, m); ``person`` by a person, ``light`` by what gives way too easily."""
+    """Contact on the hull (base_link, m), with a ``person``, or with a ``light`` object that does not press bumpers."""
 
     x: float
     y: float
@@ -65,7 +65,7 @@ def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
 class Hull:
     """Handles into MuJoCo's arrays for one robot.
 
-    ``pulls``: wheels pull along the floor; ``rests``: it was seen to stand; ``disturbed``: not only physics moved it.
+    ``pulls``: the wheels are driven; ``rests``: it stood at the last check; ``disturbed``: moved by more than physics.
     """
 
     def __init__(
@@ -121,13 +121,13 @@ class Hull:
 
     @property
     def geoms(self) -> list[int]:
-        """The geoms that bump into things."""
+        """The geoms that collide."""
         return self._solid
 
     # -- where it is ---------------------------------------------------------------------------------------------------
 
     def place(self, pose: Pose, floor: int) -> None:
-        """Put it there, standing still."""
+        """Place the robot at ``pose`` (world), at rest."""
         self.support.release()
         self.disturbed = True
         height = self._elevations[floor]
@@ -142,7 +142,7 @@ class Hull:
         self.look()
 
     def halt_at(self, pose: Pose) -> None:
-        """Something stops it dead over the ground, here."""
+        """Stop the robot at ``pose`` (world) at once."""
         self.disturbed = True
         turned = self.turned + wrap_angle(pose.yaw - self.turned)
         self._data.qpos[self._q], self._data.qpos[self._q + 1], self._data.qpos[self._q + 3] = pose.x, pose.y, turned
@@ -150,11 +150,11 @@ class Hull:
         self.look()
 
     def look(self) -> None:
-        """Read from the physics where it is and how it moves."""
+        """Read pose and motion from the physics."""
         self.see(self._data.qpos.tolist(), self._data.qvel.tolist())
 
     def see(self, positions: list[float], velocities: list[float]) -> None:
-        """Take where it is and how it moves from all that the physics has: once after every step."""
+        """Take pose and motion from all positions and velocities of the physics, once after every step."""
         place, way = self._level
         x, y, z, self.turned = positions[place]
         vx, vy, vz, turn = velocities[way]
@@ -186,13 +186,13 @@ class Hull:
 
     @property
     def pose(self) -> Pose:
-        """base_link in world."""
+        """Pose of base_link in world (m, rad)."""
         if self._pose is None:
             self._pose = Pose(self.x, self.y, wrap_angle(self.turned))
         return self._pose
 
     def _look_round(self, x: float, y: float) -> None:
-        """Notice edges and walls, and how far it may go until it could meet others."""
+        """Check for edges and walls nearby, and note the distance until the next check is due."""
         floor, edges, walls = self.floor, self.edges, self.walls
         edges.look(x, y, floor)
         if walls.look(x, y, floor):
@@ -206,32 +206,32 @@ class Hull:
 
     @property
     def position(self) -> Floats:
-        """base_link in the world, m."""
+        """Position of base_link in world (x, y, z), m."""
         return np.array((self.x, self.y, self.elevation))
 
     def seen_from(self, x: float, y: float) -> tuple[float, float]:
-        """A place of the world in base_link, m."""
+        """Return a place of the world in base_link, m."""
         c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
         x, y = x - self.x, y - self.y
         return c * x + s * y, c * y - s * x
 
     def to_world(self, points: Floats) -> Floats:
-        """Directions (n x 3) from base_link, turned into the world."""
+        """Return directions (n x 3) of base_link in the world frame."""
         return points @ rotation(self.tilt, self.turned).T
 
     def held(self, points: Floats) -> Floats:
-        """Directions (n x 3) from the torso's own frame, turned into base_link: as the legs hold it."""
+        """Return directions (n x 3) of the torso's frame in base_link, by the legs' attitude."""
         held = self.attitude
         return points @ rotation((held.roll, held.pitch), held.yaw).T if held != STRAIGHT else points
 
     def covers(self, height: float) -> bool:
-        """True if chassis, torso or what is between them reach to ``height`` m above the floor."""
+        """True if the robot's body is at ``height`` m above the floor."""
         return self.clearance <= height - self.rise < self.belly + self.body.hull.torso_height
 
     # -- how it moves --------------------------------------------------------------------------------------------------
 
     def drive(self, twist: Twist, seconds: float) -> None:
-        """Let the wheels pull at ``twist`` (base_link) for the next ``seconds``, if they stand on the ground."""
+        """Drive the wheels at ``twist`` (base_link) for the next ``seconds``, if they are on the ground."""
         if self.hand is not None or self.overturned or self._free:
             self._servos[1][:] = 0.0  # held by a hand, or lying
             self.pulls = False
@@ -250,7 +250,7 @@ class Hull:
         self.pulls = bool(vx or vy)
 
     def stand(self, wheels: float) -> None:
-        """Take note that this share of the wheels touches the ground: as much force do they pass on."""
+        """Set the share of wheels on the ground, which limits the drive's force."""
         self.standing = wheels
         share = ROLLING if self._free else wheels
         if self.hand is not None:
@@ -264,7 +264,7 @@ class Hull:
             self._model.actuator_forcerange[self._drive] = self._forces * share
 
     def roll_freely(self, free: bool) -> None:
-        """Leave the wheels to themselves: only rolling resistance is left; or brake with them again."""
+        """Release the wheels, leaving rolling resistance only; or brake with them again."""
         self._free = free
         self._share = ROLLING if free else 1.0
         self._model.actuator_forcerange[self._drive] = self._forces * self._share
@@ -272,14 +272,14 @@ class Hull:
     # -- hands ---------------------------------------------------------------------------------------------------------
 
     def lift(self, height: float | None) -> None:
-        """Hold it so high above where it is (m), or let go (None)."""
+        """Hold the robot ``height`` m above its present place, or let go (None)."""
         self.support.release()
         self.hand = None if height is None else self.elevation + height
         self.loose = True
         self._applied[self._rates] = 0.0
 
     def push(self, x: float, y: float, z: float) -> None:
-        """Give it a blow (N s, base_link)."""
+        """Apply an impulse (N s, base_link)."""
         self.support.release()
         self.disturbed = True
         c, s = math.cos(self.turned), math.sin(self.turned)
@@ -288,7 +288,7 @@ class Hull:
         self.loose = True
 
     def overturn(self, roll: float) -> None:
-        """Lay it on a side or its back (rad; 0: on its wheels): the attitude changes, the shape in the physics not."""
+        """Lay the robot on a side or its back (rad; 0: on its wheels): changes the attitude, not the physics' shape."""
         self.support.release()
         self.overturned = abs(roll) > TIPPED
         self.tilt, self.tilting = (roll, 0.0), LEVEL
@@ -309,14 +309,14 @@ class Hull:
 
     @property
     def traction_power(self) -> float:
-        """Current power of the wheels, W; slipping wheels work against the floor, braking gives nothing back."""
+        """Current power of the wheels, W; slip on the floor costs power, braking returns none."""
         force, speed = self._servos
         return max(0.0, float(force.dot(speed)))
 
     # -- leaps ---------------------------------------------------------------------------------------------------------
 
     def leap(self, x: float, y: float, turn: float, airtime: float) -> None:
-        """Take off at this velocity (base_link, m/s, rad/s) and fly for ``airtime`` s if the ground is level."""
+        """Take off at this velocity (base_link, m/s, rad/s), and fly for ``airtime`` s over level ground."""
         self.support.release()
         c, s = math.cos(self.turned), math.sin(self.turned)
         up = GRAVITY * (airtime + float(self._model.opt.timestep)) / 2  # Euler integration falls slightly too fast
@@ -325,6 +325,6 @@ class Hull:
         self.loose = True
 
     def stop(self) -> None:
-        """The feet catch it: no more motion over the ground from now on."""
+        """Stop the motion over the ground: the feet have landed."""
         self._data.qvel[self._v : self._v + 2] = 0.0
         self._data.qvel[self._v + 3] = 0.0

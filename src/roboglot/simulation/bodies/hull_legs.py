@@ -1,4 +1,4 @@
-"""The legs of a hull in the physics: a servo that holds the torso, and a chassis that feet carry over what is low."""
+"""The legs of a hull in the physics: a servo that holds the torso, and a chassis that steps over low obstacles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TORSO = 0.4  # of the mass; the rest is the chassis
 
 
 class HullLegs:
-    """``torso`` and ``sinking``: where MuJoCo keeps the height of the torso's underside, and its rate."""
+    """``torso`` and ``sinking``: indices of the torso's underside in MuJoCo's positions and velocities."""
 
     def __init__(self, model: MjModel, data: MjData, name: str, body: Body) -> None:
         self._model, self._section = model, body.hull
@@ -36,12 +36,12 @@ class HullLegs:
             self._ctrl[self._servo] = height + (0.0 if weightless else self._sag)
 
     def put(self, height: float) -> None:
-        """Have the torso at ``height`` m at once."""
+        """Set the torso's height (m) at once."""
         self._positions[self.torso] = height
         self.hold(height)
 
     def step_over(self, height: float) -> float:
-        """Lift the feet so that what is lower than ``height`` m passes under the chassis; return how low that is."""
+        """Let obstacles lower than ``height`` m pass under the chassis; return the resulting clearance, m."""
         section, geom, model = self._section, self._chassis, self._model
         half = max(0.01, (section.clearance + section.chassis_height - height) / 2)
         clearance = section.clearance + section.chassis_height - 2 * half

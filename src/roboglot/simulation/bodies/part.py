@@ -1,7 +1,7 @@
-"""Declaration of a file of ``simulation/components``: a kind of part, its fitting to a robot and when it runs.
+"""Declaration of a file of ``simulation/components``: a kind of part, its fitting to a robot, and its schedule.
 
-Each such file ends with ``PART = Part(...)``. Bodies then may have its section, and robots fit and run it; nothing else
-has to be edited (docs/components.md).
+Each such file ends with ``PART = Part(...)``. Bodies may then have its section, and robots fit and run it; no other
+file needs a change (docs/components.md).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ P = TypeVar("P")
 
 @dataclass(frozen=True, slots=True)
 class Fitting:
-    """One robot while its parts are fitted: what they may use. ``tick``: the period of control and sensors, s."""
+    """Objects that the parts of one robot may use at fitting. ``tick``: period of control and sensors, s."""
 
     robot: Robot
     hull: Hull
@@ -62,8 +62,8 @@ class Fitting:
 class Part(Generic[P]):
     """A kind of simulated part. ``P`` is its class, which implements ``interface``.
 
-    name: its section's key in a body file, and how other parts name it. ``section``: the section's type; a part without
-        one is offered to every robot. ``needs``: sections without which a body file with this one is refused.
+    name: its section's key in a body file, and its name for others. ``section``: the section's type; a part without
+        one is offered to every robot. ``needs``: sections that a body file with this one must have.
     fit: makes the part, or returns None where it makes no sense.
     after: parts that are fitted, and whose ``sense`` runs, before this one's.
     control: called before the physics of every tick with its length (s), after the control of ``control_after``.
@@ -91,7 +91,7 @@ class Part(Generic[P]):
 
 @cache
 def parts() -> tuple[Part[Any], ...]:
-    """Return every part that there is, each after those that it names in ``after``."""
+    """Return all parts, each after the parts in its ``after``."""
     package = import_module("roboglot.simulation.components")
     modules = (import_module(info.name) for info in walk_packages(package.__path__, f"{package.__name__}."))
     found = {part.name: part for module in modules if (part := getattr(module, "PART", None)) is not None}
@@ -99,7 +99,7 @@ def parts() -> tuple[Part[Any], ...]:
 
 
 def ordered(among: Iterable[Part[object]], before: Callable[[Part[object]], tuple[str, ...]]) -> list[Part[object]]:
-    """Sort parts so that each comes after those it names; otherwise as they come. Raises ValueError for a circle."""
+    """Sort parts so that each follows those it names, otherwise in their order. Raises ValueError for a circle."""
     named = {part.name: part for part in among}
     rank = {name: index for index, name in enumerate(named)}
     sorter = TopologicalSorter({name: [n for n in before(part) if n in named] for name, part in named.items()})

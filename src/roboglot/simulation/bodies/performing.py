@@ -1,6 +1,6 @@
-"""Motions and choreographies tick by tick: how a body on legs is moved while it performs. Pure time and geometry.
+"""Frames of motions and choreographies of a body on legs, tick by tick. Pure time and geometry.
 
-Knows no physics: the player of the frames finds out whether something stood in the way.
+Knows no physics: the player of the frames detects obstacles.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Body:
     shift: Point = CENTRED
 
     def towards(self, other: Body, part: float) -> Body:
-        """Between the two: 0 this one, 1 the other."""
+        """Return the body between this one (``part`` 0) and the other (1)."""
         a, b = self.attitude, other.attitude
         return Body(
             _mix(self.height, other.height, part),
@@ -44,14 +44,14 @@ class Body:
         )
 
     def turn_to(self, other: Body) -> float:
-        """The largest angle between them, rad."""
+        """Return the largest difference in roll, pitch or yaw, rad."""
         a, b = self.attitude, other.attitude
         return max(abs(a.roll - b.roll), abs(a.pitch - b.pitch), abs(a.yaw - b.yaw))
 
 
 @dataclass(frozen=True, slots=True)
 class MotionTick:
-    """One tick: base_link's motion and the body. ``leap``: take off now, for so long (s). ``landed``: be still now."""
+    """One tick: the body, and base_link's motion. ``leap``: take off now, for this time (s). ``landed``: stop now."""
 
     body: Body
     twist: Twist = STILL
@@ -72,12 +72,12 @@ class Stance:
     tick: float
 
     def at(self, height: float, attitude: Orientation = LEVEL, shift: Point = CENTRED) -> Body:
-        """A body at ``height`` cut to what the legs reach."""
+        """Return a body at ``height`` within the legs' range."""
         return Body(max(self.lowest, min(self.highest, height)), attitude, shift)
 
 
 class Track:
-    """A body on its way from one way of being held to another."""
+    """Motion of a body from ``start`` to ``goal`` in ``seconds``."""
 
     def __init__(self, start: Body, goal: Body, seconds: float) -> None:
         self._start, self._goal, self._seconds = start, goal, max(seconds, 1e-9)
@@ -86,17 +86,17 @@ class Track:
 
     @property
     def over(self) -> bool:
-        """True if the body is there."""
+        """True if the goal is reached."""
         return self._gone >= self._seconds
 
     def advance(self, seconds: float) -> Body:
-        """The body after that much more time."""
+        """Return the body after further ``seconds``."""
         self._gone = min(self._seconds, self._gone + (0.0 if self.halted else seconds))
         return self._start.towards(self._goal, self._gone / self._seconds)
 
 
 class Performance:
-    """A motion under way: its frames, and whether something stopped it; ``lift`` as the last frame has it."""
+    """A motion under way: its frames, whether an obstacle was ``hit``, and ``lift`` of the last frame."""
 
     def __init__(self, frames: Iterator[MotionTick]) -> None:
         self.frames = frames
@@ -107,7 +107,7 @@ class Performance:
 
 
 def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTick]:
-    """All ticks of a motion of the table."""
+    """Return all ticks of a motion."""
     if spec.jumps:
         return _jumps(spec, begin, stance)
     return _figure(spec, begin, stance)
@@ -116,7 +116,7 @@ def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[Mot
 def dance_frames(
     steps: Sequence[Step], begin: Body, stance: Stance, footfalls: Sequence[Footfall] = ()
 ) -> Iterator[MotionTick]:
-    """All ticks of a choreography, and standing straight again."""
+    """Yield all ticks of a choreography, and of straightening at its end."""
     body, twist, ticks, end = begin, STILL, 0, 0.0
     order = FootfallCycle(footfalls) if footfalls else None
     for step in steps:
@@ -136,7 +136,7 @@ def dance_frames(
 
 
 def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
-    """Return the speed as near to ``wanted`` as a change of ``most`` m/s brings it."""
+    """Return the velocity ``now`` moved to ``wanted`` by at most ``most`` m/s."""
     change = math.hypot(wanted.x - now.x, wanted.y - now.y)
     if change <= most:
         return wanted
@@ -144,31 +144,31 @@ def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
 
 
 def straighten(begin: Body, stance: Stance, seconds: float = STRAIGHTEN) -> Iterator[MotionTick]:
-    """Return the motion from wherever it is to standing straight."""
+    """Yield the ticks from any body to a straight stand."""
     for part in _parts(seconds, stance):
         yield MotionTick(begin.towards(stance.straight, ease(part)))
 
 
 def fall(begin: Body, stance: Stance, seconds: float) -> Iterator[MotionTick]:
-    """End a leap that was stopped in the air: the body comes down where it is."""
+    """Yield the ticks of a fall in place, after a leap was stopped in the air."""
     for part in _parts(seconds, stance):
         yield MotionTick(begin.towards(stance.straight, part), airborne=True)
     yield MotionTick(stance.straight, landed=True)
 
 
 def strayed(there: Pose, wanted: Pose) -> bool:
-    """True if a motion that ended there was stopped on its way."""
+    """True if the end of a motion is too far from the ``wanted`` one."""
     return there.distance_to(wanted) > OFF_MAX or abs(there.relative_to(wanted).yaw) > OFF_ANGLE_MAX
 
 
 def ease(part: float) -> float:
-    """Smoothly from 0 to 1."""
+    """Return a smooth step from 0 to 1."""
     part = max(0.0, min(1.0, part))
     return part * part * (3.0 - 2.0 * part)
 
 
 def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTick]:
-    """Feet on the floor: the body goes to its rest, swings about it, and goes on to its end; walking meanwhile."""
+    """Yield a motion with feet on the floor: to the rest pose, swinging about it, to the end pose, while walking."""
     sway, duration = spec.sway, spec.duration
     rest = stance.at(stance.straight.height - sway.rest_height, Orientation(roll=sway.rest_roll, pitch=sway.rest_pitch))
     end = rest if spec.after is Posture.SITTING else stance.straight
@@ -186,7 +186,7 @@ def _figure(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTic
 
 
 def _swung(body: Body, sway: Sway, t: float, share: float, stance: Stance) -> Body:
-    """The body off its rest at a moment; yaw a quarter beat ahead, so that roll or pitch with yaw make circles."""
+    """Return the swinging body at ``t`` s; yaw is a quarter beat ahead, so that roll or pitch with yaw make circles."""
     sine, cosine = share * math.sin(math.tau * sway.beat * t), share * math.cos(math.tau * sway.beat * t)
     a = body.attitude
     attitude = Orientation(a.roll + sway.roll * sine, a.pitch + sway.pitch * sine, a.yaw + sway.yaw * cosine)
@@ -194,7 +194,7 @@ def _swung(body: Body, sway: Sway, t: float, share: float, stance: Stance) -> Bo
 
 
 def _jumps(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTick]:
-    """A run-up, if any, then one jump after the other, evenly over the time."""
+    """Yield a run-up, if any, then the jumps, spread evenly over the duration."""
     run = spec.run_up / RUN_SPEED
     for part in _parts(run, stance) if run else ():
         speed = spec.run_up / run * (1.0 - math.cos(math.tau * part))
@@ -217,7 +217,7 @@ def _jumps(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTick
 
 
 def _flight(spec: MotionSpec, velocity: Twist, air: float, stance: Stance) -> Iterator[MotionTick]:
-    """In the air, turning about the body's own axes."""
+    """Yield a flight, turning about the body's own axes, and the landing."""
     for index, part in enumerate(_parts(air, stance)):
         turned = Orientation(math.remainder(spec.roll * part, math.tau), math.remainder(spec.pitch * part, math.tau))
         body = Body(stance.straight.height, turned)
@@ -226,7 +226,7 @@ def _flight(spec: MotionSpec, velocity: Twist, air: float, stance: Stance) -> It
 
 
 def _parts(seconds: float, stance: Stance) -> Iterator[float]:
-    """The share of ``seconds`` that has passed at the end of each tick."""
+    """Return the share of ``seconds`` that has passed, at the end of each tick."""
     ticks = round(seconds / stance.tick)
     return ((index + 1) / ticks for index in range(ticks))
 

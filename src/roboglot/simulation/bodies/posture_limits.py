@@ -1,4 +1,4 @@
-"""Limits of a legged body: poses that it can hold, and its walk on a leash. Pure geometry."""
+"""Limits of a legged body: possible poses, balance, and its walk on a leash. Pure geometry."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TAUT, GIVING = 3.0, 0.05  # N of a pull that it notices, and m/s by which it yie
 
 
 def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
-    """Return the current pose with ``by`` on top, cut to the limits."""
+    """Return the sum of the current pose and ``by``, within the limits."""
 
     def cut(value: float, most: float) -> float:
         return max(-most, min(most, value))
@@ -46,7 +46,7 @@ def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
 
 
 def check_pose(body: BodyPose, limits: LegLimits) -> None:
-    """Raises InvalidGoal for a pose that the legs cannot hold."""
+    """Raise InvalidGoal for a pose that the legs cannot hold."""
     a = body.attitude
     numbers = (a.roll, a.pitch, a.yaw, body.shift.x, body.shift.y, body.height or 0.0)
     if not all(map(math.isfinite, numbers)):
@@ -60,7 +60,7 @@ def check_pose(body: BodyPose, limits: LegLimits) -> None:
 
 
 def check_lift(lift: FootLift) -> None:
-    """Raises InvalidGoal for feet that are lifted too little or too far."""
+    """Raise InvalidGoal for feet lifted too little or too far."""
     if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
         raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
     if not 0.0 <= lift.inward <= INWARD_MAX:
@@ -68,7 +68,7 @@ def check_lift(lift: FootLift) -> None:
 
 
 def check_steps(steps: Sequence[Step], footfalls: Sequence[Footfall], limits: LegLimits, fastest: Twist) -> None:
-    """Raises InvalidGoal for a choreography that the body cannot follow, step by step and on its feet."""
+    """Raise InvalidGoal for a choreography that the body cannot follow, by its steps or its balance."""
     if len(steps) > STEPS_MAX:
         raise InvalidGoal(f"a choreography has at most {STEPS_MAX} steps")
     for step in steps:
@@ -109,9 +109,9 @@ def _check_balance(footfalls: Sequence[Footfall]) -> None:
 
 
 def led(pull: tuple[float, float], turned: float) -> Twist:
-    """Return the walk of a robot facing ``turned`` (rad) under a pull (N, both in the world): the harder, the faster.
+    """Return the velocity of a robot at yaw ``turned`` (rad) under a pull (N, world); it grows with the pull.
 
-    It turns towards the pull; a leash that hangs leaves it standing.
+    The robot turns towards the pull; a slack leash leaves it standing.
     """
     strength = math.hypot(*pull)
     if strength <= TAUT:

@@ -1,4 +1,4 @@
-"""True if a robot on legs is fit to jump and dance now, and whether its way is free. Knows no motion."""
+"""Checks before motions: fitness of a robot on legs, and contacts in its way. Knows no motion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from roboglot.simulation.bodies.hull import Hull
 
 
 def check_fit(robot: Robot, hull: Hull, tired_below: float, *, getting_up: bool) -> None:
-    """Raises Refused for a robot that had better not; ``tired_below``: charge. Getting up is allowed to more."""
+    """Raise Refused for a robot unfit for motions; ``tired_below``: charge (0..1). Getting up needs less."""
     if hull.hand is not None:
         raise Refused("the robot is held up by a hand")
     if hull.overturned and not getting_up:
@@ -29,5 +29,5 @@ def check_fit(robot: Robot, hull: Hull, tired_below: float, *, getting_up: bool)
 
 
 def in_the_way(hull: Hull, twist: Twist) -> bool:
-    """True if something touches the hull where it goes (base_link)."""
+    """True if the hull has a contact in its direction of motion (base_link)."""
     return any(touch.x * twist.x + touch.y * twist.y > 0.0 for touch in hull.touches)

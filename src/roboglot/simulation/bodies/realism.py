@@ -1,6 +1,6 @@
-"""Realism of a body's sensors: ``clean`` without noise, ``usual`` as in its file, ``hard`` a bad day.
+"""Realism of a body's sensors: ``clean`` without noise, ``usual`` as in its file, ``hard`` with large errors.
 
-Chosen behind the body's name: ``hermes+hard``.
+Chosen by a suffix of the body's name: ``hermes+hard``.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def _clean_lidar(section: LidarSection) -> LidarSection:
 
 
 def _hard_odometry(section: OdometrySection) -> OdometrySection:
-    """Wheels of the wrong size on a slippery floor, an encoder that misses counts."""
+    """Return odometry with wrong wheel sizes, slip, and an encoder that misses counts."""
     scale, noise = max(0.06, 3.0 * section.scale_error), max(0.05, 3.0 * section.noise)
     return replace(section, scale_error=scale, noise=noise, turn_slip=0.1, jump=0.04, jump_every=30.0)
 
@@ -43,7 +43,7 @@ def _hard_imu(section: ImuSection) -> ImuSection:
 
 
 def _hard_lidar(section: LidarSection) -> LidarSection:
-    """Rays that meet glossy things, black furniture, packets that are lost, stamps that are late."""
+    """Return a lidar with dropouts, black furniture, lost packets and late stamps."""
     return replace(section, noise=max(0.02, section.noise), dropouts=0.03, sector_every=4.0, jitter=0.03, dark=0.2)
 
 
@@ -55,6 +55,6 @@ PRESETS: Mapping[str, Mapping[type[Struct], Callable[..., Struct]]] = {
 
 
 def with_realism(sections: Mapping[type[Struct], Struct], preset: str) -> dict[type[Struct], Struct]:
-    """Return the sections of a body as the preset has them. Raises KeyError for an unknown one."""
+    """Return the sections of a body changed by a preset. Raises KeyError for an unknown preset."""
     changes = PRESETS[preset]
     return {kind: changes[kind](section) if kind in changes else section for kind, section in sections.items()}

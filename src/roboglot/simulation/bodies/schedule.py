@@ -1,4 +1,4 @@
-"""Schedule of a robot's parts: each tick calls those that are due and have something to do. Knows no part."""
+"""Schedule of a robot's parts: each tick calls the parts that are due and on duty. Knows no part."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Entry = tuple[int, Callable[..., None], float]  # rank, function, s since its la
 
 
 class Duty:
-    """Switch of a part that has something to do; while off, the part is not called (``Part.duty``)."""
+    """Switch of a part, which is called only while it is on (``Part.duty``)."""
 
     __slots__ = ("changed", "on")
 
@@ -22,12 +22,12 @@ class Duty:
         self.changed: Callable[[bool], None] | None = None
 
     def begin(self) -> None:
-        """Be called from now on, in this tick if its turn is still to come."""
+        """Switch on: the part is called from now on, in this tick if its turn is still to come."""
         if not self.on:
             self._set(True)
 
     def end(self) -> None:
-        """Be called no more. In the tick in which this is said one more call may come."""
+        """Switch off: the part is not called any more, but possibly once in this tick."""
         if self.on:
             self._set(False)
 
@@ -39,7 +39,7 @@ class Duty:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One part's call: every so many ticks, from tick ``first`` on, while it has a duty; None: always."""
+    """One part's call: every ``every`` ticks from tick ``first`` on, while ``duty`` is on (None: always)."""
 
     call: Callable[..., None]
     every: int = 1
@@ -47,14 +47,14 @@ class Job:
     duty: Duty | None = None
 
     def due(self, tick: int) -> bool:
-        """True in the ticks in which it is called; they count from 1."""
+        """Return whether the job is called in this tick, counted from 1."""
         return tick >= self.first and (tick - self.first) % self.every == 0
 
 
 class Schedule:
-    """Calls in the order of ``jobs``. The lists for all ticks of a cycle are made once, and when a duty changes.
+    """Calls in the order of ``jobs``. The lists for all ticks of a cycle are made once, and changed with a duty.
 
-    They share their entries: what a robot touches in a cycle has to stay small, or a hundred robots crowd the caches.
+    They share their entries, to need little memory: the data of a hundred robots must fit the caches.
     """
 
     __slots__ = ("_at", "_entries", "_jobs", "_length", "_next", "_pass", "_rounds", "_running", "_seconds", "_start")
@@ -74,7 +74,7 @@ class Schedule:
                 job.duty.changed = _Change(self, rank)
 
     def due(self) -> Iterator[Entry]:
-        """Return the calls of the next tick: rank, call, seconds since its last one."""
+        """Return the calls of the next tick: rank, function, s since its last call."""
         self._at = at = self._next
         self._next = at + 1 if at + 1 < self._length else self._start
         self._running = self._rounds[at]
@@ -82,17 +82,17 @@ class Schedule:
         return self._pass
 
     def run(self) -> None:
-        """Run the next tick: give every call that is due the seconds since its last one."""
+        """Run the next tick: call each due function with the s since its last call."""
         for _, call, seconds in self.due():
             call(seconds)
 
     def run_at(self, stamp: float) -> None:
-        """The same for calls that want to know the time as well."""
+        """Run the next tick for functions that also take the stamp (s)."""
         for _, call, seconds in self.due():
             call(stamp, seconds)
 
     def change(self, rank: int, on: bool) -> None:
-        """A part's duty began or ended."""
+        """Update the lists after a part's duty began or ended."""
         for index, entries in enumerate(self._rounds):
             entry = self._entry(rank, index + 1)
             if entry is None:
@@ -103,7 +103,7 @@ class Schedule:
                 self._join(entry)
 
     def _join(self, entry: Entry) -> None:
-        """Add it to the tick that is being run, unless its turn has passed."""
+        """Add an entry to the present tick, unless its turn has passed."""
         place = bisect_left(self._running, entry[0], key=_rank)
         if place >= len(self._running) - length_hint(self._pass):
             self._running.insert(place, entry)
@@ -139,12 +139,12 @@ class _Change:
 
 
 def _every_tick(job: Job) -> Job:
-    """A job whose period does not fit into a cycle counts for itself."""
+    """Return a job that counts its own period, which does not divide a cycle."""
     return Job(_Periodic(job.call, job.every, job.first), duty=job.duty)
 
 
 class _Periodic:
-    """Runs a call once in so many ticks, with the time since the last one as its last argument."""
+    """Calls a function every ``every`` ticks, with the time since the last call as its last argument."""
 
     def __init__(self, call: Callable[..., None], every: int, first: int) -> None:
         self._call, self._every, self._left = call, every, first

@@ -1,7 +1,7 @@
-"""Sleep of the physics: while everything rests and no input changes, a step would change nothing, and none is done.
+"""Sleep of the physics: while everything rests and no input changes, steps are left out, as they would change nothing.
 
-A step of bodies at rest moves them by rounding alone. That is taken back, so that a world in which steps are done all
-the same (to look for contacts) stays the same to the last bit.
+A step of bodies at rest moves them by rounding only. That is undone, so that a world with such steps (to search for
+contacts) stays identical.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ RESTS = 1e-12  # m/s, rad/s and their rates up to which a body counts as at rest
 
 
 class Sleep:
-    """Keeps places, velocities and inputs with which everything came to rest."""
+    """Positions, velocities and inputs at which everything came to rest."""
 
     def __init__(self, model: MjModel, data: MjData) -> None:
         self._data = data
@@ -27,14 +27,14 @@ class Sleep:
 
     @property
     def lasts(self) -> bool:
-        """True while nothing differs from when everything came to rest."""
+        """True while nothing has changed since everything came to rest."""
         if not self._kept:
             return False
         (qpos, qvel), (places, rates) = self._state, self._there
         return qpos.tobytes() == places and qvel.tobytes() == rates and self._same
 
     def settle(self, velocities: list[float]) -> bool:
-        """Look at a step that was done; True if all rested before and after it, and what it moved was taken back."""
+        """Check a step; return whether everything rested before and after it, and its rounding was undone."""
         data = self._data
         if data.nefc or not (_tiny(velocities) and _tiny(data.qacc.tolist())):
             self._kept = None

@@ -1,4 +1,4 @@
-"""The steps of a body on legs: in which gait, how high its feet are lifted, and where each foot is."""
+"""The steps of a body on legs: gait, lift of the feet, and the feet's places."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roboglot.simulation.bodies.walking_body import no_floor_under
 
 
 class Steps:
-    """``count``: steps made, with parts of one; ``feet``: None for a body on wheels."""
+    """Steps; ``count``: number of steps so far, with fractions; ``feet``: None for a body on wheels."""
 
     def __init__(self, section: LegsSection, hull: Hull) -> None:
         assert hull.legs is not None, "legs belong to a body that has them"
@@ -25,19 +25,19 @@ class Steps:
         self.feet = Feet([Point(x, y) for x, y in places], section.reach, hull.pose) if section.gait else None
 
     def walk(self, gait: Gait | None, lift: FootLift) -> None:
-        """Step like this from now on."""
+        """Set gait and lift from now on."""
         self.gait, self.lift = gait, lift
         if self.feet:
             self.feet.narrow(lift.inward)
         self.step_over(None)
 
     def step_over(self, lowest: float | None) -> None:
-        """Set the height (m) below which things pass under the body; None: the gait's. Wheels keep their clearance."""
+        """Set the height (m) of obstacles that pass under the body; None: the gait's. Wheels keep their clearance."""
         walking = min(self.lift.front, self.lift.rear) if self.gait else self._hull.body.hull.clearance
         self._hull.clearance = self._legs.step_over(walking if lowest is None or not self.gait else lowest)
 
     def step(self, velocity: Twist, seconds: float, frame: MotionTick | None = None, *, standing: bool = False) -> None:
-        """The feet follow what the body does: at ``velocity``, ``standing`` on them, or in a ``frame`` of a motion."""
+        """Move the feet with the body: at ``velocity``, ``standing``, or by a ``frame`` of a motion."""
         if self.feet is None or self.gait is None:
             return
         if no_floor_under(self._hull, frame):
@@ -53,7 +53,7 @@ class Steps:
         self.feet.step(self._hull.pose, velocity, swings, seconds)
 
     def hold_back(self, frame: MotionTick) -> bool:
-        """True if feet on the ground keep the body from moving as ``frame`` has it."""
+        """True if feet on the ground hold the body back from the motion of ``frame``."""
         if not frame.feet or self.feet is None:
             return False
         return self.feet.holds_back(self._hull.pose, frame.twist, frame.feet)

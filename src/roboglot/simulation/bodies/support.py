@@ -1,7 +1,7 @@
-"""Contacts of a robot with its surroundings: floor and walls cost contacts only near edges and near walls.
+"""Contacts of a robot with floor and walls, computed only near edges and near walls.
 
-Far from every edge the level floor is a spring. Contacts with the floor and the search for those with walls were most
-of a step of the physics.
+Far from edges, the level floor is a spring: contacts with the floor and the search for those with walls would take most
+of the time of a physics step.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ AGAIN = 0.1  # m of motion near an object after which the distance is checked ag
 
 
 class Nearness:
-    """Distance check between a robot and the building; repeated only once it has gone as far as there was room."""
+    """Distance check between a robot and the building, repeated only after it has moved by the last free distance."""
 
     def __init__(self, radius: float) -> None:
         self._zone = radius + NEAR  # m from the middle
@@ -38,7 +38,7 @@ class Nearness:
         self.near = True  # before the first check objects may be anywhere
 
     def call(self, duty: Duty, reach: float = 0.0) -> Duty:
-        """Have ``duty`` begin when it may be within ``reach`` m of the middle, or near the rim."""
+        """Begin ``duty`` whenever the building may be within ``reach`` m of the middle, or near the rim."""
         self._zone = max(self._zone, reach)
         self._duties.append(duty)
         if self.near:
@@ -46,23 +46,23 @@ class Nearness:
         return duty
 
     def learn(self, room: Callable[[float, float, int], float]) -> None:
-        """Look from now on; ``room`` answers how far the next one is from a place, m."""
+        """Check from now on; ``room`` returns the distance from a place to the building, m."""
         self._room, self._floor = room, -1
 
     def left(self, x: float, y: float, floor: int) -> float:
-        """Return how far (m) the robot may go from there until the next ``look``; below 0: not at all."""
+        """Return the distance (m) that the robot may move until the next ``look``; below 0: none."""
         if floor != self._floor or self._room is None:
             return -1.0
         return self._free - abs(x - self._x) - abs(y - self._y)
 
     def gap(self, x: float, y: float, floor: int) -> float:
-        """Return the room (m) that a robot at that place has around it at least; less than nothing: that is unknown."""
+        """Return the least free distance (m) around a robot at a place; negative if unknown."""
         if floor != self._floor or self._room is None:
             return -math.inf
         return self._next - self._radius - abs(x - self._x) - abs(y - self._y)
 
     def look(self, x: float, y: float, floor: int) -> bool:
-        """Note that the robot is there now; True if that changed whether something may be near."""
+        """Update by the robot's place; return whether ``near`` changed."""
         if floor == self._floor and abs(x - self._x) + abs(y - self._y) <= self._free:
             return False
         if self._room is None:
@@ -79,7 +79,7 @@ class Nearness:
 
 
 class Support:
-    """Switches one robot between contacts and the spring, without moving it, and between walls and none."""
+    """Switches one robot between floor contacts and a spring, without moving it, and wall contacts on and off."""
 
     def __init__(self, model: MjModel, name: str, mass: float, wheels: list[int]) -> None:
         joint = model.joint(f"{name} z")
@@ -91,7 +91,7 @@ class Support:
         self.sprung = False
 
     def rest(self, z: float) -> None:
-        """Let the floor carry it as a spring, where it stands."""
+        """Support the robot by a spring, at its present height ``z`` (m)."""
         model = self._model
         self.sprung, self._rest = True, z
         model.jnt_stiffness[self._joint] = self._mass * SPRING
@@ -104,14 +104,14 @@ class Support:
         return not -LIFTED <= z - self._rest <= LIFTED
 
     def release(self) -> None:
-        """Have it stand on contacts again: the floor may end, or something else carries it."""
+        """Support the robot by contacts again: the floor may end, or a hand lifts it."""
         if self.sprung:
             self.sprung = False
             self._model.jnt_stiffness[self._joint] = self._model.dof_damping[self._v] = 0.0
             self._meet()
 
     def walls(self, near: bool) -> None:
-        """Have the physics look for contacts with walls and furniture, or not."""
+        """Switch the search for contacts with walls and furniture."""
         self._bits = STANDS | MOVES if near else MOVES
         self._meet()
 

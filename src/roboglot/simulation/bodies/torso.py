@@ -1,4 +1,4 @@
-"""The torso of a body on legs: how it is to be held, on which way to there, and how the physics holds it now."""
+"""The torso of a body on legs: its goal, its way there, and its present state in the physics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboglot.simulation.bodies.walking_body import followed
 
 
 class Torso:
-    """``body`` is how it is to be held before it sways; ``taken``, what the physics has. ``straight``: standing so."""
+    """``body``: the set pose without sway; ``taken``: the pose in the physics; ``straight``: the straight stand."""
 
     def __init__(self, hull: Hull, straight: Body) -> None:
         assert hull.legs is not None, "legs belong to a body that has them"
@@ -21,11 +21,11 @@ class Torso:
 
     @property
     def is_straight(self) -> bool:
-        """True if it is to be held straight."""
+        """True if the set pose is the straight stand."""
         return self.body == self.straight
 
     async def follow(self, track: Track, action: Action, clock: Clock, period: float) -> None:
-        """Wait until the body is there; for ever if something else moves it now."""
+        """Move along ``track``, and wait for its end; never returns if another track takes over."""
         self.track = track
         try:
             await followed(track, action, clock, period)
@@ -33,7 +33,7 @@ class Torso:
             self.track = None if self.track is track else self.track
 
     def take(self, body: Body, *, weightless: bool = False) -> None:
-        """Hold it like this from now on."""
+        """Hold the torso at ``body`` from now on."""
         self.taken = body
         self._legs.hold(body.height, weightless=weightless)
         # One shared object for a level torso: the IMU asks for it in every tick.
@@ -41,10 +41,10 @@ class Torso:
         self._hull.shift = body.shift
 
     def put(self, height: float) -> None:
-        """Have it at ``height`` m at once."""
+        """Set the torso's height (m) at once."""
         self._legs.put(height)
         self._hull.look()
 
     def let_sink(self) -> None:
-        """Hold it no more."""
+        """Release the torso, which sinks."""
         self._legs.hold(None)

@@ -1,4 +1,4 @@
-"""Movement of a walking or jumping body: it sways with its steps and comes down from a jump. Starts no action."""
+"""Movement of a walking or jumping body: sway with the steps, and landing after a jump. Starts no action."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from roboglot.simulation.bodies.support import GRAVITY
 
 
 def swayed(body: Body, spec: GaitSpec, strides: float, velocity: Twist, stance: Stance) -> Body:
-    """Return ``body`` as it sways and bounces after so many ``strides`` at ``velocity`` (m/s, rad/s)."""
+    """Return ``body`` with sway and bounce after ``strides`` steps at ``velocity`` (m/s, rad/s)."""
     share = min(1.0, (velocity.speed + 0.2 * abs(velocity.yaw)) / 0.1)
     swing, a = share * math.sin(math.tau * strides), body.attitude
     turned = Orientation(a.roll, a.pitch + spec.rock * swing, a.yaw)
@@ -26,14 +26,14 @@ def swayed(body: Body, spec: GaitSpec, strides: float, velocity: Twist, stance: 
 
 
 def landing(hull: Hull, body: Body, stance: Stance) -> Iterator[MotionTick]:
-    """Return the frames of a fall from where ``hull`` is in the air."""
+    """Return the frames of a fall of ``hull`` from its height in the air."""
     up = max(0.0, hull.motion[2])
     drop = max(0.0, hull.rise) + up**2 / (2 * GRAVITY)
     return fall(body, stance, math.sqrt(2 * drop / GRAVITY) + up / GRAVITY)
 
 
 def held_body(hull: Hull) -> Body:
-    """Return how the body is held now; one that lies on its side rolls back onto its feet from there."""
+    """Return the body's present pose; set a body that lies on its side back onto its feet."""
     if not hull.overturned:
         return Body(hull.belly, hull.attitude, hull.shift)
     held = Body(hull.belly, Orientation(roll=hull.tilt[0]), hull.shift)
@@ -54,7 +54,7 @@ async def followed(track: Track, action: Action, clock: Clock, period: float) ->
 
 
 def walking_effort(hull: Hull, spec: GaitSpec, lift: FootLift) -> float:
-    """Return the power that steps of this height take, in W."""
+    """Return the power for steps of this height, W."""
     return hull.body.hull.mass * GRAVITY * ((lift.front + lift.rear) / 2) * spec.steps
 
 
@@ -64,7 +64,7 @@ def no_floor_under(hull: Hull, frame: MotionTick | None) -> bool:
 
 
 def check_posture(posture: Posture, before: frozenset[Posture], off: str) -> None:
-    """Raise Refused unless the motors have power (``off`` is empty) and ``posture`` is one to begin in."""
+    """Raise Refused unless the motors have power (``off`` is empty) and ``posture`` is in ``before``."""
     if posture not in before:
         raise Refused(f"the robot is {posture}; this begins {' or '.join(sorted(before))}")
     if off:
@@ -72,7 +72,7 @@ def check_posture(posture: Posture, before: frozenset[Posture], off: str) -> Non
 
 
 def given_up(performance: Performance, hull: Hull, body: Body, straight: Body, stance: Stance) -> Iterator[MotionTick]:
-    """The frames that end a performance before its end: land if need be, then straighten."""
+    """Return the frames after a performance was given up: land if in the air, then straighten."""
     if performance.frame and performance.frame.airborne:
         hull.stop()
         return chain(landing(hull, body, stance), straighten(straight, stance))

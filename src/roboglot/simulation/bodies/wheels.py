@@ -1,4 +1,4 @@
-"""Kinematics of a base's wheels, both ways: mecanum, or a differential drive with one motor a side."""
+"""Forward and inverse kinematics of wheels: mecanum, or a differential drive with one motor per side."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from roboglot.simulation.bodies.body import BaseSection
 
 
 def four(wheels: WheelSpeeds) -> tuple[float, float, float, float]:
-    """Front left and right, rear left and right."""
+    """Return the speeds of front left and right, rear left and right, rad/s."""
     return wheels.front_left, wheels.front_right, wheels.rear_left, wheels.rear_right
 
 
 class Wheels:
-    """``radius`` and ``lever`` (m): from turning wheels to a moving and a turning body.
+    """``radius`` (m): wheel speed to the body's speed; ``lever`` (m): turn rate to the wheels' ground speed.
 
-    ``dead``: wheels (field names of WheelSpeeds) whose motors give nothing.
+    ``dead``: wheels (field names of WheelSpeeds) without motor power.
     """
 
     def __init__(self, section: BaseSection) -> None:
@@ -27,7 +27,7 @@ class Wheels:
         self.dead: frozenset[str] = frozenset()
 
     def kill(self, wheels: frozenset[str]) -> None:
-        """These motors give nothing from now on: their wheels drag."""
+        """Set the wheels without motor power, which drag; empty: none. Raises ValueError."""
         if wheels - set(WheelSpeeds.__struct_fields__):
             raise ValueError(f"a wheel is one of {', '.join(WheelSpeeds.__struct_fields__)}")
         if not self.mecanum:  # one motor per side
@@ -36,11 +36,11 @@ class Wheels:
         self.dead = wheels
 
     def driven(self, wheels: WheelSpeeds) -> WheelSpeeds:
-        """Wheels that have a motor; the others stand."""
+        """Return the wheel speeds with 0 for dead wheels."""
         return replace(wheels, **dict.fromkeys(self.dead, 0.0))
 
     def speeds_of(self, twist: Twist) -> WheelSpeeds:
-        """Return the speeds of the wheels, rad/s, while the body moves at ``twist``."""
+        """Return the wheel speeds (rad/s) of a body moving at ``twist``."""
         turn = self.lever * twist.yaw
         if not self.mecanum:
             left, right = (twist.x - turn) / self.radius, (twist.x + turn) / self.radius
@@ -53,7 +53,7 @@ class Wheels:
         )
 
     def twist_of(self, wheels: WheelSpeeds) -> Twist:
-        """Return the body's twist by four wheels that disagree: the mean; the rest is slip."""
+        """Return the body's twist as the mean of four wheels; their differences are slip."""
         fl, fr, rl, rr = four(wheels)
         quarter = self.radius / 4
         if not self.mecanum:

@@ -1,1 +1,1 @@
-"""The building and its things: walls, lifts, docks, shelves, tags, objects that move. Knows no robot's components."""
+"""The building and its things: walls, lifts, docks, shelves, tags, movable objects. Knows no robot's components."""

@@ -1,4 +1,4 @@
-"""Turns a world's description into plain solids per floor: what one bumps into and what rays hit.
+"""Turns a world's description into plain solids per floor, for collisions and rays.
 
 Pure geometry, in each floor's own plane (z from the floor's surface). Knows no simulator.
 """
@@ -71,7 +71,7 @@ class Rectangle:
 
 
 def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Solid]:
-    """Yield all that stands still on one floor. ``lift_here``: the car is parked here, so the landing door is open."""
+    """Yield all still solids of one floor. ``lift_here``: the car is parked here, so the landing door is open."""
     if floor.enclosed:
         yield from _enclosure(floor)
     for wall in floor.walls:
@@ -86,7 +86,7 @@ def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Soli
 
 
 def slabs_of(floor: Floor, lift: Lift | None) -> Iterator[Rectangle]:
-    """The floor's surface as rectangles that leave the lift's shaft and the holes open."""
+    """Yield the floor's surface as rectangles, without the lift's shaft and the holes."""
     slabs = [Rectangle(*floor.origin, *floor.size)]
     for gap in ([shaft_of(lift)] if lift else []) + holes_of(floor):
         slabs = [piece for slab in slabs for piece in _without(slab, gap)]
@@ -94,14 +94,14 @@ def slabs_of(floor: Floor, lift: Lift | None) -> Iterator[Rectangle]:
 
 
 def shaft_of(lift: Lift) -> Rectangle:
-    """The lift car's floor from above."""
+    """Return the lift car's floor (world)."""
     c, s = abs(math.cos(math.radians(lift.facing))), abs(math.sin(math.radians(lift.facing)))
     width, depth = c * lift.size[0] + s * lift.size[1], s * lift.size[0] + c * lift.size[1]
     return Rectangle(lift.at[0] - width / 2, lift.at[1] - depth / 2, width, depth)
 
 
 def holes_of(floor: Floor) -> list[Rectangle]:
-    """Return the rectangles without a floor."""
+    """Return the holes in a floor (world)."""
     return [Rectangle(h.at[0] - h.size[0] / 2, h.at[1] - h.size[1] / 2, *h.size) for h in floor.holes]
 
 
@@ -121,7 +121,7 @@ def _without(slab: Rectangle, gap: Rectangle) -> Iterator[Rectangle]:
 
 
 def _enclosure(floor: Floor) -> Iterator[Solid]:
-    """Walls around the floor, their inner faces on its edge."""
+    """Yield the walls around the floor, their inner faces on its edge."""
     (x0, y0), (width, depth) = floor.origin, floor.size
     h, t = OUTER_WALL / 2, OUTER_WALL
     x1, y1 = x0 + width, y0 + depth
@@ -132,7 +132,7 @@ def _enclosure(floor: Floor) -> Iterator[Solid]:
 
 
 def _pieces(wall: Wall) -> Iterator[tuple[Spot, Spot]]:
-    """The wall without its doors."""
+    """Yield the ends of the wall's pieces between its doors."""
     (ax, ay), (bx, by) = wall.start, wall.end
     length = wall.length
 
@@ -165,13 +165,13 @@ def _furniture(thing: Box | Cylinder) -> Solid:
 
 
 def dock_solid(front: Pose) -> Solid:
-    """A charging dock whose front's middle is there, +x away from it."""
+    """Return a charging dock with the middle of its front at ``front``, +x away from it."""
     middle = front.compose(Pose(-DOCK_DEPTH / 2))
     return Solid(SolidKind.DOCK, middle, (DOCK_DEPTH, DOCK_WIDTH, DOCK_HEIGHT))
 
 
 def door_panels(lift: Lift, height: float, opening: float) -> Iterator[Solid]:
-    """Both halves of a landing door, telescoped into the jambs by ``opening`` (0..1)."""
+    """Yield both halves of a landing door, moved into the jambs by ``opening`` (0..1)."""
     frame, left = Pose(*lift.at, math.radians(lift.facing)), (1.0 - opening) * lift.door_width / 2
     for side in (1, -1):
         y = side * (lift.door_width - left) / 2
@@ -180,7 +180,7 @@ def door_panels(lift: Lift, height: float, opening: float) -> Iterator[Solid]:
 
 
 def shelf_solids(shelf: Shelf, pose: Pose, lifted: float) -> Iterator[Solid]:
-    """Four legs, then the board with what stands on it."""
+    """Yield four legs, then the board with its goods, ``lifted`` m above the floor."""
     width, depth = shelf.size
     for x in (-1, 1):
         for y in (-1, 1):
@@ -190,7 +190,7 @@ def shelf_solids(shelf: Shelf, pose: Pose, lifted: float) -> Iterator[Solid]:
 
 
 def _shaft(lift: Lift, height: float, open_door: bool) -> Iterator[Solid]:
-    """Three walls around the car, and a front wall with the landing door."""
+    """Yield three walls around the car, and a front wall with the landing door."""
     frame = Pose(*lift.at, math.radians(lift.facing))
     deep, wide = lift.size
     t = SHAFT_WALL

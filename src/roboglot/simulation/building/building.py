@@ -1,4 +1,4 @@
-"""Movable parts of the building: docks, shelves and the lift. Puts them there and steps them."""
+"""Movable parts of the building: docks, shelves and the lift. Places and steps them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from roboglot.simulation.world.placing import docks_of
 
 
 class Building:
-    """``docks``: per floor, their fronts, +x away from the dock. ``lift`` is None where there is none."""
+    """``docks``: fronts by floor (world), +x away from the dock. ``lift``: None if there is none."""
 
     def __init__(self, world: WorldDescription, physics: Mechanics, walkers: Sequence[Walker]) -> None:
         self._props = physics.props
@@ -43,7 +43,7 @@ class Building:
                 hull.look()
 
     def move_dock(self, front: Pose, index: int, floor: int) -> None:
-        """Have a dock stand with the middle of its front there. Raises NotFound."""
+        """Move a dock's front to this pose (world). Raises NotFound."""
         if not (0 <= floor < len(self.docks) and 0 <= index < len(self.docks[floor])):
             raise NotFound(f"there is no dock {index} on floor {floor}")
         self.docks[floor][index] = front

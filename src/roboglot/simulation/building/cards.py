@@ -1,4 +1,4 @@
-"""Flat squares in the world, and what is printed on them."""
+"""Flat squares in the world, and the codes printed on them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.model.perception import TagKind
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """A flat square: ``pose`` in world, +x out of it; the ``height`` of its middle above the floor, m."""
+    """A flat square: ``pose`` in world, +x out of it; ``height`` of its middle above the floor, and ``size``, m."""
 
     pose: Pose
     height: float
@@ -19,7 +19,7 @@ class Card:
 
 @dataclass(frozen=True, slots=True)
 class PrintedTag:
-    """A card and what is printed on it."""
+    """A card and the code printed on it."""
 
     kind: TagKind
     text: str

@@ -1,4 +1,4 @@
-"""Edges of the floor: holes, the shaft while the lift is elsewhere, open ends; and distances to walls.
+"""Edges of the floor: holes, the shaft without the lift's car, open ends; and distances to walls.
 
 World frame.
 """
@@ -21,7 +21,7 @@ STEP = 0.03  # m by which the car may be lower before that counts as a drop
 
 
 class Walls:
-    """Distances to walls and furniture; movable things are left out."""
+    """Distances to walls and furniture, without movable things."""
 
     def __init__(self, world: WorldDescription) -> None:
         self._floors = []
@@ -31,7 +31,7 @@ class Walls:
             self._floors.append(np.array(rows).reshape(-1, 6).T.copy())
 
     def room(self, x: float, y: float, floor: int) -> float:
-        """Metres to the nearest; inf if there is none."""
+        """Return the distance to the nearest wall or piece of furniture, m; inf: there is none."""
         at_x, at_y, c, s, width, depth = self._floors[floor]
         dx, dy = x - at_x, y - at_y
         along = np.maximum(0.0, np.abs(c * dx + s * dy) - width / 2)
@@ -40,7 +40,7 @@ class Walls:
 
 
 class Footing:
-    """Answers whether there is something to stand on."""
+    """Ground under robots, by floors, holes and the lift's car."""
 
     def __init__(self, world: WorldDescription, lift: LiftCar | None) -> None:
         self._holes = [holes_of(floor) for floor in world.floors]
@@ -49,7 +49,7 @@ class Footing:
         self._shaft = shaft_of(world.lift) if world.lift else None
 
     def ends_near(self, x: float, y: float, floor: int, elevation: float, reach: float) -> bool:
-        """True if the floor may end within ``reach`` m at this elevation: a quick first check."""
+        """True if the floor may end within ``reach`` m at this elevation (m): a quick first check."""
         edge = self._edges[floor]
         if edge is not None and not (
             edge.x + reach <= x <= edge.x + edge.width - reach and edge.y + reach <= y <= edge.y + edge.depth - reach
@@ -60,7 +60,7 @@ class Footing:
         return any(gap.distance_to(x, y) <= reach for gap in self._gaps(floor, elevation))
 
     def room(self, x: float, y: float, floor: int) -> float:
-        """Metres to the nearest place where the floor may end, wherever the lift's car is."""
+        """Return the distance to the nearest possible end of the floor, for any place of the lift's car, m."""
         gaps = [*self._holes[floor], *([self._shaft] if self._shaft else [])]
         nearest = min((gap.distance_to(x, y) for gap in gaps), default=math.inf)
         edge = self._edges[floor]

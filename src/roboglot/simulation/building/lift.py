@@ -1,6 +1,6 @@
-"""The building's lift: takes calls, rides, opens and shuts its door, and says what happens. Knows no radio.
+"""The building's lift: takes calls, rides, opens and closes its door, and publishes events. Knows no radio.
 
-It stands with its door open where it last arrived until it is called elsewhere.
+After a ride it stays with its door open until the next call to another floor.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class LiftCar:
 
     @property
     def frame(self) -> Pose:
-        """The middle of the car's floor, +x towards its door, world frame."""
+        """Middle of the car's floor, +x towards its door (world)."""
         return Pose(*self.section.at, math.radians(self.section.facing))
 
     @property
@@ -64,7 +64,7 @@ class LiftCar:
 
     @property
     def floor(self) -> int:
-        """The floor that the car is nearest to."""
+        """Floor nearest to the car."""
         return min(range(len(self._elevations)), key=lambda number: abs(self._elevations[number] - self._height))
 
     @property
@@ -76,7 +76,7 @@ class LiftCar:
     # -- status --------------------------------------------------------------------------------------------------------
 
     def call(self, floor: int) -> None:
-        """Have it come. Raises InvalidGoal, and Refused when out of service or called too often."""
+        """Call the car to a floor. Raises InvalidGoal; Refused if out of service or called too often."""
         if not 0 <= floor < len(self._elevations):
             raise InvalidGoal(f"the lift does not stop at {floor}")
         self._refuse_if_dead()
@@ -87,7 +87,7 @@ class LiftCar:
         self._calls.append(floor)
 
     def hold_door(self, seconds: float) -> None:
-        """Keep the door open, or open it, where the car stands. Raises InvalidGoal and Refused."""
+        """Open the door, or keep it open, for ``seconds``. Raises InvalidGoal; Refused during a ride."""
         if not 0.0 < seconds <= HOLD_MAX:
             raise InvalidGoal(f"a door is held for up to {HOLD_MAX:g} s, not {seconds}")
         self._refuse_if_dead()
@@ -98,14 +98,14 @@ class LiftCar:
             self._door = LiftDoor.OPENING
 
     def close_door(self) -> None:
-        """Let the door shut as soon as it is free. Raises Refused."""
+        """Close the door as soon as it is free. Raises Refused."""
         self._refuse_if_dead()
         self._open_until = self._now
         if self._door in (LiftDoor.OPEN, LiftDoor.OPENING):
             self._door = LiftDoor.CLOSING
 
     def take_out_of_service(self, out: bool) -> None:
-        """Switch it off: it ends its ride and takes no more calls; or on again."""
+        """Switch the lift off: it ends its ride and takes no more calls; or on again."""
         if out and self.in_service:
             self._calls.clear()
             self._notify(LiftFailed(stamp=self._now, reason="out of service"))
@@ -130,7 +130,7 @@ class LiftCar:
             self._answer()
 
     def _answer(self) -> None:
-        """The next call: open here, or shut the door and leave."""
+        """Serve the next call: open the door here, or close it and leave."""
         target = self._calls[0]
         if target == self._floor:
             self._calls.pop(0)
@@ -153,7 +153,7 @@ class LiftCar:
         return over
 
     def _close(self, seconds: float) -> None:
-        """Shut, unless a person stands in the door: then open again and wait."""
+        """Close the door; if it is obstructed, open it again and wait."""
         if self._opening > 0.0 and self.passengers.in_doorway(self, self._floor):
             if self._obstructed_since is None:
                 self._obstructed_since = self._now
@@ -192,7 +192,7 @@ class LiftCar:
                 props.remove(key)
 
     def _ride(self, seconds: float) -> None:
-        """Move the servo's set point: speed up, slow down in time, settle, arrive."""
+        """Move the servo's set point: accelerate, brake in time, settle, arrive."""
         assert self._target is not None
         goal = self._elevations[self._target]
         left = abs(goal - self._height)

@@ -1,4 +1,4 @@
-"""Passengers in the lift's car or its door, by their places; and the people whom a fault puts into it."""
+"""Passengers in the lift's car or its door, by their places; and people put into it by a fault."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SILL = 0.05  # m in front of and behind the door that must be free as well
 
 
 class Car(Protocol):
-    """The lift's car, as its passengers see it."""
+    """Part of the lift's car that passengers need."""
 
     @property
     def section(self) -> Lift:
@@ -27,7 +27,7 @@ class Car(Protocol):
 
     @property
     def frame(self) -> Pose:
-        """The middle of its floor, +x towards its door, world frame."""
+        """Middle of the car's floor, +x towards its door (world)."""
 
     @property
     def elevation(self) -> float:
@@ -35,18 +35,18 @@ class Car(Protocol):
 
     @property
     def floor(self) -> int:
-        """The floor of the building that it is nearest to."""
+        """Floor of the building nearest to the car."""
 
 
 class Passengers:
-    """Looks at robots, walkers and boxes; moves only the people that ``board`` put in."""
+    """Passengers among robots, walkers and boxes; moves only the people added by ``board``."""
 
     def __init__(self, hulls: Iterable[Hull], walkers: Sequence[Walker], props: Props) -> None:
         self._hulls, self._walkers, self._props = list(hulls), walkers, props
         self._count = 0
 
     def board(self, lift: Car, count: int) -> None:
-        """Have so many people stand in the car, facing its door. Raises ValueError."""
+        """Set the number of people in the car, facing its door. Raises ValueError."""
         if not 0 <= count <= PASSENGERS_MAX:
             raise ValueError(f"0 to {PASSENGERS_MAX} people can be put into the lift, not {count}")
         for index in range(self._count):
@@ -75,7 +75,7 @@ class Passengers:
         return load
 
     def in_doorway(self, lift: Car, floor: int) -> bool:
-        """True if anything is where the door of that floor wants to shut."""
+        """True if a robot, person or thing obstructs the door on that floor."""
         section = lift.section
         for pose, radius in self._everything(floor):
             seen = pose.relative_to(lift.frame)
@@ -85,7 +85,7 @@ class Passengers:
         return False
 
     def _everything(self, floor: int) -> Iterator[tuple[Pose, float]]:
-        """Places and radii of all that may stand in a door."""
+        """Yield poses and radii (m) of everything that may obstruct a door."""
         for hull in self._hulls:
             if hull.floor == floor:
                 yield hull.pose, hull.body.hull.radius
@@ -97,7 +97,7 @@ class Passengers:
                 yield solid.pose, max(solid.size[:2]) / 2
 
     def _standing(self, floor: int) -> Iterator[Pose]:
-        """People and objects that stand there."""
+        """Yield the poses of people and objects on a floor."""
         yield from (walker.pose for walker in self._walkers if walker.floor == floor)
         yield from (s.pose for s in self._props.on(floor) if s.kind in (SolidKind.FURNITURE, SolidKind.PERSON))
 

@@ -11,7 +11,7 @@ from roboglot.simulation.building.terrain import Ground
 
 
 class Mechanics(Protocol):
-    """A world's physics, as far as what belongs to the building moves in it."""
+    """Part of a world's physics that moves the building's parts."""
 
     @property
     def props(self) -> Props:

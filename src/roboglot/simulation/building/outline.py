@@ -1,4 +1,4 @@
-"""A floor from above, as polygons for people to look at. Knows no robot and no physics."""
+"""A floor plan as polygons, for display. Knows no robot and no physics."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROUND_CORNERS = 16  # of a cylinder's outline
 
 
 def plan_of(world: WorldDescription, number: int) -> FloorPlan:
-    """Return one floor of a world as it was described; the lift's door is shown open."""
+    """Return the plan of a world's floor as described, with the lift's door open."""
     floor = world.floors[number]
     walls: list[Sequence[Point]] = []
     furniture: list[Sequence[Point]] = []
@@ -24,7 +24,7 @@ def plan_of(world: WorldDescription, number: int) -> FloorPlan:
 
 
 def _outline(solid: Solid) -> Sequence[Point]:
-    """The footprint's corners, counter-clockwise, in the world's frame."""
+    """Return the footprint's corners, counter-clockwise (world, m)."""
     width, depth, _ = solid.size
     if solid.round:
         angles = [math.tau * corner / ROUND_CORNERS for corner in range(ROUND_CORNERS)]

@@ -1,6 +1,6 @@
-"""The squares of printed codes, as other people's readers read them: AprilTags of the family 36h11, and QR codes.
+"""The squares of printed codes, readable by standard readers: AprilTags of the family 36h11, and QR codes.
 
-Arrays of 1 (black) and 0 (white), row 0 above, without the white margin. Knows no picture and no world.
+Arrays of 1 (black) and 0 (white), row 0 at the top, without the white margin. Knows no picture and no world.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def _family() -> tuple[int, ...]:
 
 
 def april(number: int) -> Squares:
-    """8 x 8: 36 bits within a black rim. Raises ValueError for a number that the family does not have."""
+    """Return a tag, 8 x 8: 36 bits within a black rim. Raises ValueError for a number outside the family."""
     family = _family()
     if not 0 <= number < len(family):
         raise ValueError(f"the family has tags 0 to {len(family) - 1}, not {number}")
@@ -36,7 +36,7 @@ def april(number: int) -> Squares:
 
 
 def qr(text: str) -> Squares:
-    """A QR code, 21 x 21 to 37 x 37. Raises ValueError for a text of more than QR_BYTES_MAX bytes (UTF-8)."""
+    """Return a QR code, 21 x 21 to 37 x 37. Raises ValueError for a text above QR_BYTES_MAX bytes (UTF-8)."""
     data = text.encode()
     version = next((v for v, (size, _) in _QR_SIZES.items() if len(data) <= size - 2), None)
     if version is None:
@@ -50,14 +50,14 @@ def qr(text: str) -> Squares:
 
 
 def _words(data: bytes, size: int) -> list[int]:
-    """Mode (bytes), length, data, end and padding."""
+    """Return the code words: mode (bytes), length, data, end and padding."""
     bits = f"0100{len(data):08b}" + "".join(f"{byte:08b}" for byte in data) + "0000"
     words = [int(bits[i : i + 8], 2) for i in range(0, len(bits), 8)]
     return words + [(0xEC, 0x11)[i % 2] for i in range(size - len(words))]
 
 
 def _times(a: int, b: int) -> int:
-    """Multiply in the field of 256 elements that QR codes compute in."""
+    """Return the product in the field of 256 elements of QR codes."""
     result = 0
     while b:
         if b & 1:
@@ -67,7 +67,7 @@ def _times(a: int, b: int) -> int:
 
 
 def _corrections(words: list[int], count: int) -> list[int]:
-    """Reed and Solomon's: the remainder of the division by (x - 1)(x - 2)(x - 4)..."""
+    """Return the Reed-Solomon words: the remainder of the division by (x - 1)(x - 2)(x - 4)..."""
     divisor, root = [1], 1
     for _ in range(count):
         divisor = [a ^ _times(b, root) for a, b in zip([*divisor, 0], [0, *divisor], strict=True)]
@@ -97,7 +97,7 @@ def _frame(version: int) -> Squares:
 
 
 def _write_format(squares: Squares) -> None:
-    """Level L, mask 0, twice, and the dark square."""
+    """Write the format (level L, mask 0) twice, and the dark square."""
     n, rest = len(squares), 0b01000 << 10
     for place in range(14, 9, -1):
         if rest >> place & 1:
@@ -112,7 +112,7 @@ def _write_format(squares: Squares) -> None:
 
 
 def _fill(squares: Squares, words: list[int]) -> None:
-    """Up and down in columns of two from the right, masked like a chessboard."""
+    """Write the data up and down in columns of two from the right, masked like a chessboard."""
     n = len(squares)
     bits = iter([word >> place & 1 for word in words for place in range(7, -1, -1)])
     columns = [*range(n - 1, 6, -2), *range(5, 0, -2)]

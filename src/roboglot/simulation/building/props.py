@@ -1,4 +1,4 @@
-"""Boxes of the world that can be moved: docks, landing doors, shelves, obstacles, people in the lift.
+"""Movable boxes of the world: docks, landing doors, shelves, obstacles, people in the lift.
 
 Each is a mocap body in the physics under its key, and a solid on a floor for sensors. Knows no meaning.
 """
@@ -25,7 +25,7 @@ AWAY = (0.0, 0.0, -50.0)  # where absent props wait
 
 
 class Props:
-    """The movable boxes by key. ``solids`` has those that are there: floor and box, z from that floor's surface."""
+    """The movable boxes by key. ``solids``: the present ones, with floor and box, z from the floor's surface."""
 
     def __init__(self, model: MjModel, data: MjData, elevations: list[float]) -> None:
         self._model, self._data, self._elevations = model, data, elevations
@@ -35,7 +35,7 @@ class Props:
         """Printed codes that hands hung up, by number: floor and code; nothing collides with them."""
 
     def put(self, key: str, floor: int, solid: Solid) -> None:
-        """Have the box stand there, from now on or instead of where it was."""
+        """Place a box, or move it."""
         before = self.solids.get(key)
         if before == (floor, solid):
             return
@@ -50,14 +50,14 @@ class Props:
         self._data.mocap_quat[mocap] = (math.cos(pose.yaw / 2), 0.0, 0.0, math.sin(pose.yaw / 2))
 
     def remove(self, key: str) -> None:
-        """Take it away; nothing happens if it is not there."""
+        """Remove a box; do nothing if it is absent."""
         if (before := self.solids.pop(key, None)) is not None:
             self._touched(before[0], None)
             self._collide(key, False)
             self._data.mocap_pos[self._model.body(key).mocapid[0]] = AWAY
 
     def hang(self, tag: PrintedTag, floor: int) -> int:
-        """Hang a printed code there; return its number. Raises ValueError when too many hang."""
+        """Hang up a printed code; return its number. Raises ValueError for too many."""
         number = next((n for n in range(TAGS_MAX) if n not in self.tags), None)
         if number is None:
             raise ValueError(f"no more than {TAGS_MAX} tags can be hung up in a world")
@@ -65,7 +65,7 @@ class Props:
         return number
 
     def take_down(self, number: int) -> None:
-        """Take a printed code away. Raises NotFound."""
+        """Remove a printed code. Raises NotFound."""
         if self.tags.pop(number, None) is None:
             raise NotFound(f"no tag {number} was hung up")
 
@@ -74,7 +74,7 @@ class Props:
         return self._elevations[floor]
 
     def on(self, floor: int) -> list[Solid]:
-        """Return the props that stand on a floor."""
+        """Return the props on a floor."""
         return [solid for number, solid in self.solids.values() if number == floor]
 
     def _touched(self, floor: int, before: tuple[int, Solid] | None) -> None:
@@ -83,12 +83,12 @@ class Props:
             self.revisions[before[0]] += 1
 
     def _collide(self, key: str, there: bool) -> None:
-        """Have the physics look whether robots touch the box, or rule it out early."""
+        """Switch the check for contacts between robots and a box."""
         model, body = self._model, self._model.body(key)
         model.body_conaffinity[body.id] = model.geom_conaffinity[body.geomadr[0]] if there else 0
 
     def _resize(self, key: str, size: tuple[float, float, float]) -> None:
-        """Give a box its size, also in the bounds by which collisions and rays are ruled out early."""
+        """Set a box's size, also in the bounds that rule out collisions and rays early."""
         model, half = self._model, [extent / 2 for extent in size]
         geom, body = model.geom(key).id, model.body(key).id
         model.geom_size[geom] = half
@@ -97,7 +97,7 @@ class Props:
 
 
 def keys_of(world: WorldDescription) -> list[str]:
-    """All movable boxes that a world may ever have."""
+    """Return the keys of all movable boxes that a world may have."""
     keys = [f"obstacle {index}" for index in range(OBSTACLES_MAX)]
     for number, floor in enumerate(world.floors):
         keys += [f"dock {number} {index}" for index in range(len(floor.docks))]

@@ -9,14 +9,14 @@ Rectangle = tuple[int, int, int, int]  # first row, first column, rows, columns
 
 
 def cover(cells: NDArray[np.bool_]) -> list[Rectangle]:
-    """Disjoint rectangles that cover exactly the set cells; the better of growing along rows or along columns first."""
+    """Return disjoint rectangles that exactly cover the set cells: the fewer of two, grown by rows or columns first."""
     along_rows = _grow(cells)
     along_columns = [(column, row, columns, rows) for row, column, rows, columns in _grow(cells.T)]
     return min(along_rows, along_columns, key=len)
 
 
 def _grow(cells: NDArray[np.bool_]) -> list[Rectangle]:
-    """Greedy: every run of a row that is not covered yet grows over the rows that follow as long as they are set."""
+    """Return rectangles by a greedy search: each uncovered run of a row grows over the next rows while they are set."""
     left = cells.copy()
     found: list[Rectangle] = []
     for row in range(left.shape[0]):
@@ -30,6 +30,6 @@ def _grow(cells: NDArray[np.bool_]) -> list[Rectangle]:
 
 
 def _runs(line: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and one past the last index of every run of set cells."""
+    """Return [begin, end) of every run of set cells."""
     edges = np.flatnonzero(np.diff(line.astype(np.int8), prepend=0, append=0))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Rooms of a floor, from its walls with all doors closed: where a crowd is to be spread. Knows no robot."""
+"""Rooms of a floor, from its walls with all doors closed, to spread a crowd. Knows no robot."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Cell = tuple[int, int]  # column and row
 
 @dataclass(frozen=True, slots=True)
 class Rooms:
-    """Cells of each room, and what lies between them: ``doors`` are the middles of all openings, m."""
+    """Cells of each room; ``doors``: middles of all openings between them (world, m)."""
 
     cell: float
     corner: Spot
@@ -46,7 +46,7 @@ class Rooms:
 
 
 def rooms_of(floor: Floor, lift: Lift | None) -> Rooms:
-    """Return the rooms of a floor that has walls inside; what is open to the next room belongs to it."""
+    """Return the rooms of a floor; places without a wall between them are in one room."""
     cell = max(CELL, max(floor.size) / CELLS_MAX)
     blank = Rooms(cell, floor.origin, (), tuple(_doors(floor)))
     width, depth = (math.ceil(size / cell) for size in floor.size)
@@ -66,7 +66,7 @@ def rooms_of(floor: Floor, lift: Lift | None) -> Rooms:
 
 
 def _closed(floor: Floor, lift: Lift | None, grid: Rooms) -> Iterator[Cell]:
-    """Yield the cells of walls, doors and all, and those without a level floor."""
+    """Yield the cells of walls, including doors, and those without a level floor."""
     for wall in floor.walls:
         (x0, y0), (x1, y1) = wall.start, wall.end
         steps = max(1, math.ceil(2.0 * wall.length / grid.cell))

@@ -1,4 +1,4 @@
-"""Shelves that robots lift with their jacks and carry about, and what they meet on the way."""
+"""Shelves that robots lift and carry with their jacks, and their collisions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from roboglot.simulation.world.overlap import overlap, reach_of
 
 
 class ShelfStand:
-    """One shelf: where it stands, or how it is carried."""
+    """One shelf, standing or carried."""
 
     def __init__(self, shelf: Shelf, floor: int, key: str, props: Props, world: WorldDescription) -> None:
         self.shelf, self.floor, self._key, self._props, self._world = shelf, floor, key, props, world
@@ -28,13 +28,13 @@ class ShelfStand:
         self._show()
 
     def covers(self, pose: Pose, floor: int) -> bool:
-        """True if something at ``pose`` (world) stands well under its board."""
+        """True if ``pose`` (world) is well under the board."""
         seen = pose.relative_to(self.pose)
         width, depth = self.shelf.size
         return floor == self.floor and abs(seen.x) <= width / 4 and abs(seen.y) <= depth / 4
 
     def meets(self, pose: Pose, floor: int, lifted: float) -> frozenset[Hashable]:
-        """Names of all that its legs or its board would be in, if it were there: walls, furniture, other shelves."""
+        """Return the names of all solids that the shelf would overlap there: walls, furniture, other shelves."""
         parts = list(shelf_solids(self.shelf, pose, lifted))
         if floor not in self._fixed:
             solids = solids_of(self._world.floors[floor], self._world.lift, lift_here=True)
@@ -50,7 +50,7 @@ class ShelfStand:
         return frozenset(name for name, solid in near if any(overlap(solid, part) for part in parts))
 
     def move(self, pose: Pose, floor: int, lifted: float) -> None:
-        """Have it there, so high above the floor (m)."""
+        """Move the shelf to ``pose`` (world), ``lifted`` m above the floor."""
         self.pose, self.floor, self.lifted = pose, floor, lifted
         self._show()
 
@@ -60,5 +60,5 @@ class ShelfStand:
 
 
 def shelf_pose(shelf: Shelf) -> Pose:
-    """Return the pose of a shelf's middle by the description."""
+    """Return the described pose of a shelf's middle (world)."""
     return Pose(*shelf.at, math.radians(shelf.facing))

@@ -17,13 +17,13 @@ SHELF_TAG_SIZE, SHELF_TAG_HEIGHT = 0.16, 0.35
 
 
 def fixed_tags(floor: Floor) -> Iterator[PrintedTag]:
-    """Return the tags that stay where they are."""
+    """Yield the fixed tags of a floor (world)."""
     for tag in floor.tags:
         yield PrintedTag(tag.kind, tag.text, Card(Pose(*tag.at, math.radians(tag.facing)), tag.height, tag.size))
 
 
 def moving_tags(world: WorldDescription, props: Props, floor: int) -> Iterator[PrintedTag]:
-    """Return tags on docks' fronts, between shelves' hind legs, and those hung up; world frame."""
+    """Yield tags on docks' fronts, between shelves' hind legs, and those hung up (world)."""
     yield from (tag for level, tag in props.tags.values() if level == floor)
     for number, storey in enumerate(world.floors):
         for index, dock in enumerate(storey.docks):

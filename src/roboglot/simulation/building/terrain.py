@@ -18,24 +18,24 @@ Corner = tuple[float, float, float]
 
 
 class Ground:
-    """Height and slope of the ground under wheels, per floor."""
+    """Height and grip of the ground under wheels, by floor."""
 
     def __init__(self, world: WorldDescription) -> None:
         self._terrain = [floor.relief for floor in world.floors]
         self.uneven = any(self._terrain)
 
     def height(self, x: float, y: float, floor: int) -> float:
-        """Return the height of the surface above the floor's, m."""
+        """Return the height of the surface above the floor's level, m."""
         return max((_height(terrain, x, y) for terrain in self._terrain[floor]), default=0.0)
 
     def grip(self, x: float, y: float, floor: int) -> float:
-        """Relative to a dry floor's; where terrain overlaps, the last one's."""
+        """Return the grip relative to a dry floor's; for overlapping terrain, the last one's."""
         on = [terrain.grip for terrain in self._terrain[floor] if _way(terrain, x, y) is not None]
         return on[-1] if on else 1.0
 
 
 def pieces_of(terrain: Terrain) -> Iterator[Sequence[Corner]]:
-    """Convex pieces, each by its corners."""
+    """Yield convex pieces as lists of their corners (m)."""
     frame, half = Pose(*terrain.at, math.radians(terrain.facing)), terrain.width / 2
     for (a, low), (b, high) in zip(terrain.profile, terrain.profile[1:], strict=False):
         if max(low, high) < FLAT:
@@ -49,7 +49,7 @@ def pieces_of(terrain: Terrain) -> Iterator[Sequence[Corner]]:
 
 
 def slices_of(terrain: Terrain, height: float) -> Iterator[tuple[Pose, float, float]]:
-    """Yield the rectangles that a level plane cuts out: middle, length along their x, width."""
+    """Yield the rectangles of a terrain above a level plane at ``height``: middle, length along x, width (m)."""
     frame = Pose(*terrain.at, math.radians(terrain.facing))
     for (a, low), (b, high) in zip(terrain.profile, terrain.profile[1:], strict=False):
         if height >= max(low, high):
@@ -61,7 +61,7 @@ def slices_of(terrain: Terrain, height: float) -> Iterator[tuple[Pose, float, fl
 
 
 def _way(terrain: Terrain, x: float, y: float) -> float | None:
-    """Return how far along its profile a point lies, m; None beside it."""
+    """Return a point's distance along the profile, m; None beside it."""
     seen = Pose(x, y).relative_to(Pose(*terrain.at, math.radians(terrain.facing)))
     inside = abs(seen.y) <= terrain.width / 2 and terrain.profile[0][0] <= seen.x <= terrain.profile[-1][0]
     return seen.x if inside else None

@@ -1,4 +1,4 @@
-"""The small things that lie about and can be pushed, gripped and carried. Handles into MuJoCo's arrays; truth."""
+"""Small things that can be pushed, gripped and carried. Handles into MuJoCo's arrays; truth."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 class Thing:
-    """One of them."""
+    """One small thing."""
 
     def __init__(self, model: MjModel, data: MjData, section: ThingSection, elevation: float) -> None:
         self.name, self.diameter, self.height, self.mass = section.name, section.diameter, section.height, section.mass
@@ -39,29 +39,29 @@ class Thing:
 
     @property
     def position(self) -> Floats:
-        """The middle of its foot, world, m."""
+        """Middle of the foot (world), m."""
         position: Floats = self._origin + self._place
         return position
 
     def put(self, position: Floats) -> None:
-        """Have it there at once, at rest."""
+        """Place the thing at ``position`` (world, m), at rest."""
         self._place[:] = position - self._origin
         self._rate[:] = 0.0
 
     def take(self) -> None:
-        """Start to be carried: it bumps into nothing."""
+        """Start being carried, without collisions."""
         self.carried = True
         for kind, affinity in self._contacts:
             kind[0] = affinity[0] = 0
         self._applied[2] = self._weight
 
     def carry(self, position: Floats, velocity: tuple[float, float, float]) -> None:
-        """Take it along."""
+        """Move with the gripper (world; m, m/s)."""
         self._place[:] = position - self._origin
         self._rate[:] = velocity
 
     def drop(self) -> None:
-        """Let it fall."""
+        """End being carried: the thing falls."""
         self.carried = False
         for (kind, affinity), bits in zip(self._contacts, self._bits, strict=True):
             kind[0], affinity[0] = bits

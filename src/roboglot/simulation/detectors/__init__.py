@@ -1,4 +1,4 @@
-"""Detectors in a camera's picture, computed from the world's geometry: one function for each kind of thing.
+"""Detectors for a camera's picture, computed from the world's geometry: one function per kind of thing.
 
-They find what is in the picture, near and large enough, turned the right way and not hidden; and not quite exactly.
+They find things in the picture that are near and large enough, face the camera and are not hidden; with some noise.
 """

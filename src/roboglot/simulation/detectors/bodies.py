@@ -1,4 +1,4 @@
-"""People, their faces, gestures and joints, and other robots, as a camera's detectors make them out."""
+"""Detectors of people, their faces, gestures and joints, and of other robots."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ WRIST = JOINTS.index("right_wrist")
 
 @dataclass(slots=True)
 class _Somebody:
-    """A person who is seen: joints in the world, which of them are seen, and the box of the whole body."""
+    """A person in sight: joints (world), their visibility, and the box of the whole body."""
 
     walker: Walker
     joints: Floats
@@ -48,13 +48,13 @@ class _Somebody:
 
     @property
     def middle(self) -> Floats:
-        """Middle of the torso, world."""
+        """Middle of the torso (world)."""
         middle: Floats = self.joints[5:13].mean(axis=0)
         return middle
 
 
 def see_people(glance: Glance) -> list[PersonSeen]:
-    """Return the people of whom enough is visible."""
+    """Return the people who are sufficiently visible."""
     found = []
     for who in _everybody(glance):
         distance, place = glance.estimate(who.middle)
@@ -63,7 +63,7 @@ def see_people(glance: Glance) -> list[PersonSeen]:
 
 
 def see_skeletons(glance: Glance) -> list[SkeletonSeen]:
-    """Return the joints of people, those outside the picture or hidden marked so."""
+    """Return the joints of people, with those outside the picture or hidden marked as invisible."""
     found = []
     for who in _everybody(glance):
         places, _ = glance.view.project(who.joints)
@@ -74,7 +74,7 @@ def see_skeletons(glance: Glance) -> list[SkeletonSeen]:
 
 
 def see_faces(glance: Glance) -> list[FaceSeen]:
-    """Faces that look this way, near enough to be distinguished."""
+    """Return the faces turned to the camera and near enough to be distinguished."""
     found = []
     for who in _everybody(glance):
         walker = who.walker
@@ -92,7 +92,7 @@ def see_faces(glance: Glance) -> list[FaceSeen]:
 
 
 def see_gestures(glance: Glance) -> list[GestureSeen]:
-    """Gestures made towards the camera with a hand that is seen."""
+    """Return the gestures made towards the camera with a visible hand."""
     found = []
     for who in _everybody(glance):
         showing = who.walker.showing
@@ -104,7 +104,7 @@ def see_gestures(glance: Glance) -> list[GestureSeen]:
 
 
 def see_robots(glance: Glance) -> list[RobotSeen]:
-    """The other robots of which enough is seen."""
+    """Return the other robots that are sufficiently visible."""
     found = []
     for hull in glance.around.hulls:
         if hull is glance.hull or hull.floor != glance.floor:
@@ -124,7 +124,7 @@ def see_robots(glance: Glance) -> list[RobotSeen]:
 
 
 def _everybody(glance: Glance) -> Iterator[_Somebody]:
-    """Return the people in sight, nearest first."""
+    """Yield the people in sight, nearest first."""
     near = []
     for walker in glance.around.walkers:
         away = math.dist((walker.pose.x, walker.pose.y), glance.view.at[:2])
@@ -153,13 +153,13 @@ def _turned(places: Floats, yaw: float) -> Floats:
 
 
 def _heights(hull: Hull) -> tuple[float, float]:
-    """Return the heights of underside and top of a robot, world."""
+    """Return the heights of a robot's underside and top (world), m."""
     section = hull.body.hull
     return hull.elevation + hull.clearance, hull.elevation + hull.belly + section.torso_height
 
 
 def _outline(hull: Hull) -> Floats:
-    """Around its bottom and its top."""
+    """Return points around a robot's underside and top (world)."""
     angles = np.arange(24) * math.tau / 24
     x = hull.pose.x + hull.body.hull.radius * np.cos(angles)
     y = hull.pose.y + hull.body.hull.radius * np.sin(angles)
@@ -167,7 +167,7 @@ def _outline(hull: Hull) -> Floats:
 
 
 def _spots(hull: Hull, glance: Glance) -> Floats:
-    """Nine places across it, as seen from the camera."""
+    """Return nine points across a robot, as seen from the camera (world)."""
     bearing = math.atan2(hull.pose.y - glance.view.at[1], hull.pose.x - glance.view.at[0])
     low, high = _heights(hull)
     aside = 0.8 * hull.body.hull.radius

@@ -1,4 +1,4 @@
-"""Visual markers, AprilTags and QR codes, as a camera's detectors make them out."""
+"""Detectors of visual markers, AprilTags and QR codes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TAG_HEIGHT_NOISE = 0.003  # m
 
 
 def see_markers(glance: Glance) -> list[MarkerSeen]:
-    """Markers, nearest first."""
+    """Return the markers, nearest first."""
     found = []
     for marker in glance.around.world.floors[glance.floor].markers:
         card = Card(Pose(*marker.at, math.radians(marker.facing)), marker.height, marker.size)
@@ -33,7 +33,7 @@ def see_markers(glance: Glance) -> list[MarkerSeen]:
 
 
 def see_tags(glance: Glance) -> list[TagSeen]:
-    """Codes on walls, docks and shelves, nearest first."""
+    """Return the codes on walls, docks and shelves, nearest first."""
     found = []
     around = glance.around
     fixed = fixed_tags(around.world.floors[glance.floor])
@@ -52,7 +52,7 @@ def see_tags(glance: Glance) -> list[TagSeen]:
 
 
 def _box(card: Card, least: float, glance: Glance) -> Box | None:
-    """Return the card's box in the picture, if it can be read."""
+    """Return the card's box in the picture; None: it cannot be read."""
     if glance.bearing_from(card.pose) > SLANT:
         return None
     middle, _ = glance.view.project(_middle(card, glance)[None])
@@ -72,7 +72,7 @@ def _middle(card: Card, glance: Glance) -> Floats:
 
 
 def _spots(card: Card, glance: Glance) -> Floats:
-    """Return the corners and a grid between them, dense enough to meet table legs."""
+    """Return a grid of points over the card, dense enough to notice table legs before it (world)."""
     aside, up = ASIDE * card.size, UP * card.size
     x = card.pose.x - math.sin(card.pose.yaw) * aside
     y = card.pose.y + math.cos(card.pose.yaw) * aside

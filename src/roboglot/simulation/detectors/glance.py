@@ -1,4 +1,4 @@
-"""One look at the world through one robot's camera: what all detectors share. Knows no kind of thing."""
+"""One look at the world through one robot's camera, shared by all detectors. Knows no kind of thing."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MISSED = 0.01  # share of visible objects that are missed
 
 
 class Surroundings:
-    """All that there is to see in a world; looked at anew each time."""
+    """Everything visible in a world, in its present state."""
 
     def __init__(
         self,
@@ -42,7 +42,7 @@ class Surroundings:
         self._tapes: dict[int, list[Tape]] = {}
 
     def tapes(self, floor: int) -> list[Tape]:
-        """The lines on a floor."""
+        """Return the lines on a floor."""
         if floor not in self._tapes:
             self._tapes[floor] = tapes_of(self.world.floors[floor])
         return self._tapes[floor]
@@ -50,7 +50,7 @@ class Surroundings:
 
 @dataclass(slots=True)
 class Glance:
-    """``numbers``: the robot's own numbers for people, kept from look to look. ``names``: of known faces."""
+    """One look; ``numbers``: the robot's numbers of people, kept between looks; ``names``: of known faces."""
 
     around: Surroundings
     hull: Hull
@@ -67,7 +67,7 @@ class Glance:
 
     @property
     def ground(self) -> float:
-        """The height of that floor in the world, m."""
+        """Elevation of the robot's floor (world), m."""
         return self.around.world.elevation(self.hull.floor)
 
     def visible(self, places: Floats, of: Hull | Walker | None = None) -> NDArray[np.bool_]:
@@ -82,7 +82,7 @@ class Glance:
         return seen
 
     def overlooked(self) -> bool:
-        """Return True now and then: detectors miss some objects."""
+        """Return True for a random share of calls, as detectors miss some objects."""
         return bool(self.random.random() < MISSED)
 
     def shaken(self, box: Box) -> Box:
@@ -101,6 +101,6 @@ class Glance:
         return float(np.linalg.norm(off)) * scale, turned.point
 
     def bearing_from(self, pose: Pose) -> float:
-        """Return the angle (rad) at which ``pose`` (world) sees the camera, 0 straight ahead."""
+        """Return the angle (rad, >= 0) between the x axis of ``pose`` (world) and the direction to the camera."""
         towards = math.atan2(self.view.at[1] - pose.y, self.view.at[0] - pose.x)
         return abs(math.remainder(towards - pose.yaw, math.tau))

@@ -1,4 +1,4 @@
-"""Coloured lines on the floor, as a camera's detector makes them out."""
+"""Detector of coloured lines on the floor."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CURVATURE_NOISE = 0.02  # 1/m
 
 
 def see_lines(glance: Glance) -> list[LineSeen]:
-    """Return of every line the piece that begins nearest, if it is long enough; nearest line first."""
+    """Return the nearest visible piece of each line, if it is long enough; nearest line first."""
     found = []
     for tape in glance.around.tapes(glance.floor):
         run = _nearest_run(tape, glance)
@@ -26,7 +26,7 @@ def see_lines(glance: Glance) -> list[LineSeen]:
 
 
 def _nearest_run(tape: Tape, glance: Glance) -> NDArray[np.intp] | None:
-    """The points of the piece, from its nearer end on."""
+    """Return the indices of the nearest visible piece, from its nearer end; None: there is none."""
     away = np.hypot(*(tape.points - glance.view.at[:2]).T)
     seen = away <= LINE_RANGE
     if not seen.any():
@@ -40,7 +40,7 @@ def _nearest_run(tape: Tape, glance: Glance) -> NDArray[np.intp] | None:
 
 
 def _runs(seen: NDArray[np.bool_], closed: bool) -> list[NDArray[np.intp]]:
-    """Pieces of neighbouring points."""
+    """Return the runs of neighbouring visible points (indices)."""
     which = np.flatnonzero(seen)
     if not len(which):
         return []

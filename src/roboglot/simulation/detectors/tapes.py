@@ -19,7 +19,7 @@ POINTS_MAX = 20_000  # per line
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tape:
-    """``points`` (n x 2, m); ``curvature`` (n): 1/m, positive to the left going along. ``closed``: it is a ring."""
+    """``points`` (n x 2, m); ``curvature`` (n): 1/m, positive to the left along the tape. ``closed``: a ring."""
 
     colour: Colour
     points: Floats
@@ -28,7 +28,7 @@ class Tape:
 
 
 def tapes_of(floor: Floor) -> list[Tape]:
-    """All lines of a floor."""
+    """Return all lines of a floor (world)."""
     return [_tape(line) for line in floor.lines]
 
 
@@ -45,7 +45,7 @@ def _tape(line: Line) -> Tape:
 
 
 def _curvature(points: Floats, closed: bool) -> Floats:
-    """The change of direction between the ways of SMOOTH points before and after each."""
+    """Return the curvature (1/m) at each point, over SMOOTH points before and after."""
     padded = np.pad(points, ((SMOOTH, SMOOTH), (0, 0)), mode="wrap" if closed else "edge")
     before, after = points - padded[: -2 * SMOOTH], padded[2 * SMOOTH :] - points
     lengths = np.hypot(*before.T), np.hypot(*after.T)

@@ -1,1 +1,1 @@
-"""Fault injection: the kinds of faults and their life, through the same physics that would cause them."""
+"""Fault injection: kinds of faults and their lifecycle, acting through the physics."""

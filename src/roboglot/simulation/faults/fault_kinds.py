@@ -1,4 +1,4 @@
-"""Kinds of faults, one function each: it begins the fault and returns what ends it.
+"""Kinds of faults: one function each, which begins the fault and returns a function that ends it.
 
 The functions' keyword parameters are the fault's options.
 """
@@ -56,7 +56,7 @@ KIDNAP_DISTANCE = 4.0  # m at least
 
 
 class FragileWorld(Protocol):
-    """Interface of a world that faults need."""
+    """Part of a world that faults need."""
 
     @property
     def description(self) -> WorldDescription:
@@ -91,13 +91,13 @@ class FragileWorld(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """The world, and the robot that it happens to (None: the building)."""
+    """The world, and the name of the affected robot (None: the building)."""
 
     world: FragileWorld
     name: str | None
 
     def part(self, interface: type[Component], simulated: type[C]) -> C:
-        """The robot's simulated component. Raises ComponentMissing."""
+        """Return the robot's simulated component. Raises ComponentMissing."""
         assert self.name is not None
         component = self.world.robot(self.name)[interface]
         assert isinstance(component, simulated)
@@ -105,7 +105,7 @@ class Target:
 
     @property
     def lift(self) -> LiftCar:
-        """The building's, or ValueError."""
+        """The building's lift. Raises ValueError if there is none."""
         if self.world.building.lift is None:
             raise ValueError("this world has no lift")
         return self.world.building.lift
@@ -113,7 +113,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class FaultRecipe:
-    """``many``: may act several times at once."""
+    """Recipe of a kind; ``many``: several may be active at once."""
 
     begin: Callable[..., Undo]
     of_robot: bool = True
@@ -134,7 +134,7 @@ def _kind(*, of_robot: bool = True, many: bool = False) -> Callable[[Callable[..
 
 
 def _nothing() -> None:
-    """Ends what cannot be undone."""
+    """Do nothing, for faults that cannot be undone."""
 
 
 @_kind()
@@ -308,7 +308,7 @@ def jack_jammed(target: Target) -> Undo:
 
 
 def _switch(part: object, attribute: str, value: object) -> Undo:
-    """Set it now, and what it was later."""
+    """Set an attribute; return a function that restores its value."""
     before = getattr(part, attribute)
     setattr(part, attribute, value)
     return lambda: setattr(part, attribute, before)

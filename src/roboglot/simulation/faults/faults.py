@@ -1,4 +1,4 @@
-"""Fault injection: makes things go wrong on purpose, through the same physics that would make them go wrong by chance.
+"""Fault injection: faults on purpose, through the same physics as real ones.
 
 ``world.faults.inject("low_battery", robot="a", charge=0.08)`` by hand, ``[[faults]]`` in the world's file by time.
 docs/worlds/faults.md lists the kinds, their options and how each shows.
@@ -27,7 +27,7 @@ FAULTS_MAX = 100
 
 
 class Faults:
-    """All faults of one world. A kind acts on a robot once at a time; obstacles may be many."""
+    """All faults of one world. A kind acts once per robot at a time, except obstacles."""
 
     def __init__(self, world: FragileWorld, planned: Sequence[PlannedFault]) -> None:
         self._world = world
@@ -44,16 +44,16 @@ class Faults:
 
     @property
     def active(self) -> list[ActiveFault]:
-        """Oldest first."""
+        """Active faults, oldest first."""
         return [fault for fault, _ in self._active.values()]
 
     def inject(
         self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: object
     ) -> list[ActiveFault]:
-        """Let ``kind`` begin: on one robot, on all that have the part (None), or in the building.
+        """Begin a fault of ``kind``: on one robot, on all that have the part (None), or in the building.
 
         It ends after ``duration`` s of robot time, or with ``clear``. Raises NotFound for an unknown robot, ValueError
-        in plain words for anything else that cannot be.
+        in plain words otherwise.
         """
         if kind not in KINDS:
             raise ValueError(f"no fault is called {kind!r}{nearest(kind, KINDS)}")
@@ -75,13 +75,13 @@ class Faults:
         return begun
 
     def clear(self, number: int | None = None) -> None:
-        """End one fault, or all. What cannot be undone (a robot that was carried off) stays. Raises NotFound."""
+        """End one fault, or all. Irreversible effects (a robot that was carried off) stay. Raises NotFound."""
         if number is not None and number not in self._active:
             raise NotFound(f"no fault {number} is active")
         self._end(list(self._active) if number is None else [number])
 
     def step(self, stamp: float) -> None:
-        """Do what is due until ``stamp`` (robot time)."""
+        """Begin and end the faults that are due until ``stamp`` (robot time, s)."""
         while self._agenda and self._agenda[0][0] <= stamp + 1e-9:
             heapq.heappop(self._agenda)[2]()
 
@@ -128,13 +128,13 @@ class Faults:
 
 
 def _options_of(kind: FaultRecipe) -> dict[str, float | int | str | None]:
-    """Names and defaults of the options that a kind's function takes."""
+    """Return names and defaults of a kind's options."""
     parameters = inspect.signature(kind.begin).parameters.items()
     return {name: parameter.default for name, parameter in parameters if name != "target"}
 
 
 def _check_options(kind: str, options: Mapping[str, object]) -> None:
-    """True if the kind's function takes them: its signature is the schema."""
+    """Raise ValueError for an option that the kind's function does not have."""
     known = [name for name in inspect.signature(KINDS[kind].begin).parameters if name != "target"]
     for name in options:
         if name not in known:
@@ -143,7 +143,7 @@ def _check_options(kind: str, options: Mapping[str, object]) -> None:
 
 
 def problem_of(plan: PlannedFault) -> str | None:
-    """Return the error in a planned fault as such, in plain words; None if there is none."""
+    """Return the error in a planned fault in plain words; None: there is none."""
     if plan.kind not in KINDS:
         return f"no fault is called {plan.kind!r}{nearest(plan.kind, KINDS)}"
     try:

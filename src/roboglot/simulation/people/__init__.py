@@ -1,1 +1,1 @@
-"""People in the world: what they do, how they walk, and how their bodies are posed."""
+"""People in the world: their routines, walks and postures."""

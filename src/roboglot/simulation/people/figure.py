@@ -1,4 +1,4 @@
-"""Joints of a person's body while it stands, walks, makes a gesture or does sport.
+"""Joints of a person who stands, walks, makes a gesture or does sport.
 
 In the person's own frame: x ahead, y left, z up from the floor, m. A stick figure; knows no world and no camera.
 """
@@ -63,7 +63,7 @@ _PLANKING: _Places = {
 
 
 def _arranged(places: _Places) -> Floats:
-    """The joints in their order, right ones mirrored; what is not given is as in an upright body."""
+    """Return the joints (n, 3) in the order of JOINTS, right ones mirrored; missing ones as in an upright body."""
     whole = np.empty((len(JOINTS), 3))
     for name, row in _INDEX.items():
         side, _, part = name.rpartition("_")
@@ -100,7 +100,7 @@ _ARMS: dict[Gesture, tuple[tuple[float, float, float], tuple[float, float, float
 
 
 def walking(way: float) -> Floats:
-    """``way``: m walked so far."""
+    """Return the joints (n, 3; m) of a walking person after ``way`` m."""
     joints = UPRIGHT.copy()
     swing = SWING * math.sin(math.pi * way / STRIDE)
     for side, ahead in (("left", swing), ("right", -swing)):
@@ -111,7 +111,7 @@ def walking(way: float) -> Floats:
 
 
 def gesturing(gesture: Gesture, elapsed: float) -> Floats:
-    """With the right hand; a PHOTO takes both."""
+    """Return the joints (n, 3; m) ``elapsed`` s into a gesture of the right hand; PHOTO takes both hands."""
     joints = UPRIGHT.copy()
     elbow, begin, end = (np.array(place) for place in _ARMS[gesture])
     wrist = begin + (end - begin) * _there_and_back(elapsed)
@@ -122,7 +122,7 @@ def gesturing(gesture: Gesture, elapsed: float) -> Floats:
 
 
 def exercising(sport: Sport, part: float) -> Floats:
-    """``part``: repetitions so far, 0.5 is half of the first one."""
+    """Return the joints (n, 3; m) after ``part`` repetitions; 0.5: half of the first one."""
     if sport is not Sport.HIGH_KNEES:
         begin, end = _ENDS[sport]
         return begin + (end - begin) * _there_and_back(part)
@@ -135,7 +135,7 @@ def exercising(sport: Sport, part: float) -> Floats:
 
 
 def extent(joints: Floats) -> tuple[Floats, Floats]:
-    """The lowest and the highest corner of the block that holds the body."""
+    """Return the lowest and highest corner of the block around the body, m."""
     low, high = joints.min(axis=0) - PAD_LOW, joints.max(axis=0) + PAD_HIGH
     low[2] = max(0.0, low[2])
     return low, high
@@ -143,7 +143,7 @@ def extent(joints: Floats) -> tuple[Floats, Floats]:
 
 @lru_cache(maxsize=64)
 def size(height: float, radius: float) -> Floats:
-    """Return by how much a person of that size is larger than the places above (x, y, z)."""
+    """Return the scale (x, y, z) from the places above to a person of this size (m)."""
     return np.array((radius / WIDE, radius / WIDE, height / TALL))
 
 

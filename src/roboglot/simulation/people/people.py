@@ -1,5 +1,5 @@
-"""People: they walk their paths, follow scripts, stop when a robot is right in front of them, and go around it when it
-does not move. Knows no physics.
+"""People: walk their paths, follow scripts, stop before a robot right in front of them, and step aside if it does not
+move. Knows no physics.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ AHEAD_MAX = 500  # ticks of a wait that are counted ahead
 
 
 class Placed(Protocol):
-    """Something at a place of the floor, m."""
+    """An object at a place of the floor, m."""
 
     @property
     def x(self) -> float: ...
@@ -52,9 +52,9 @@ Free = Callable[["Walker", Point], bool]  # whether they can walk straight to th
 
 
 class Walker:
-    """One person: where they are, what they do and feel. ``body`` is the physics' name for them.
+    """One person: pose, present step and emotion. ``body``: the person's name in the physics.
 
-    It names them if the description does not. ``look`` chooses their clothes.
+    It also names a person without a name. ``look``: number of the clothes.
     """
 
     def __init__(self, person: Person, floor: int, body: str = "", look: int = 0) -> None:
@@ -103,7 +103,7 @@ class Walker:
 
     @property
     def showing(self) -> tuple[Show, float] | None:
-        """The gesture they make and for how long they have made it, s."""
+        """Present gesture, and its time so far, s; None: there is none."""
         return (self.doing, self._elapsed) if isinstance(self.doing, Show) else None
 
     def fetch(self) -> Sequence[Say | Clap]:
@@ -114,7 +114,7 @@ class Walker:
     # -- orders --------------------------------------------------------------------------------------------------------
 
     def order(self, step: Step) -> None:
-        """Leave the script and do this, after earlier orders. Raises ValueError if that is too much."""
+        """Leave the script, and queue a step after earlier orders. Raises ValueError for too many."""
         if self._orders is None:
             self.drop()
         assert self._orders is not None
@@ -123,15 +123,15 @@ class Walker:
         self._orders.append(step)
 
     def drop(self) -> None:
-        """Stop doing anything and stand."""
+        """Drop all orders, and stand."""
         self._orders, self.doing, self._dodging, self._idle = deque(), None, None, 0
 
     def resume(self) -> None:
-        """Go on with the script."""
+        """Continue the script."""
         self._orders, self.doing, self._idle = None, None, 0
 
     def place(self, pose: Pose) -> None:
-        """Be there at once."""
+        """Set the pose (world) at once."""
         self.pose = pose
         self.displaced = True
 
@@ -143,7 +143,7 @@ class Walker:
     # -- time ----------------------------------------------------------------------------------------------------------
 
     def walk(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
-        """Go on for ``seconds`` among the ``robots`` of the floor; whether the pose changed."""
+        """Continue for ``seconds`` among the ``robots`` of the floor; return whether the pose changed."""
         self.walking, moved, self.displaced = False, self.displaced, False
         if self._idle:
             self._idle -= 1
@@ -166,7 +166,7 @@ class Walker:
         return moved or after.x != before.x or after.y != before.y or after.yaw != before.yaw
 
     def _begin(self) -> bool:
-        """Take up the next step, if there is any."""
+        """Begin the next step; return whether there is one."""
         if self._orders is not None:
             if not self._orders:
                 return False
@@ -183,7 +183,7 @@ class Walker:
         return self.doing is not None
 
     def _wait(self, span: float, seconds: float) -> bool:
-        """Wait for ``span`` s; True if that is over. Counts the ticks of ``seconds`` ahead in which nothing happens."""
+        """Wait for ``span`` s; return whether it is over. Counts further ticks of ``seconds`` to skip."""
         elapsed, idle = self._elapsed, 0
         if elapsed >= span:
             return True
@@ -194,7 +194,7 @@ class Walker:
         return False
 
     def _do(self, seconds: float) -> bool:
-        """Do anything but walk and wait; True if the step is over."""
+        """Continue a step other than Walk and Wait; return whether it is over."""
         match self.doing:
             case Look(at=at):
                 return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
@@ -210,7 +210,7 @@ class Walker:
                 return True
 
     def _walk_on(self, walk: Walk, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
-        """A step of the way, unless a robot is in it; whether they are there."""
+        """Walk on, unless a robot is in the way; return whether the goal is reached."""
         if self._dodging is not None:
             self._dodge(self._dodging, robots, self.person.speed * seconds)
             return False
@@ -228,14 +228,14 @@ class Walker:
         return self._stride(x, y, (walk.speed or self.person.speed) * seconds, left, (heading, c, s))
 
     def _let_pass(self, heading: float, beside: float, seconds: float, free: Free) -> None:
-        """Wait for a robot that is close and in the way, or make up to step aside for one that does not move."""
+        """Wait for a robot in the way; after a while, choose a place to step aside."""
         self._waited += seconds
         if self._waited >= PATIENCE:
             self._waited = 0.0
             self._dodging = self._way_out(heading, beside, free)
 
     def _way_out(self, heading: float, beside: float, free: Free) -> Point | None:
-        """Return a step to the side with more room, else to the other one, else back; None if all is closed."""
+        """Return a place to the side with more room, else to the other, else behind; None: all are blocked."""
         side = -1.0 if beside >= 0.0 else 1.0
         for turn, way in ((side * math.pi / 2, ASIDE), (-side * math.pi / 2, ASIDE), (math.pi, 2.0 * ASIDE)):
             spot = Point(
@@ -247,7 +247,7 @@ class Walker:
         return None
 
     def _dodge(self, spot: Point, robots: Sequence[Placed], step: float) -> None:
-        """Towards ``spot``, unless a robot comes near."""
+        """Step towards ``spot``, and end there or before a robot that is near."""
         before = self.pose
         there = self._step(spot.x, spot.y, step)
         spots = [Point(robot.x, robot.y) for robot in robots]
@@ -257,14 +257,14 @@ class Walker:
             self._dodging = None
 
     def _step(self, x: float, y: float, step: float) -> bool:
-        """A step of so many metres towards (x, y); whether they are there."""
+        """Walk ``step`` m towards (x, y); return whether it is reached."""
         pose = self.pose
         left = math.hypot(x - pose.x, y - pose.y)
         heading = math.atan2(y - pose.y, x - pose.x) if left > 1e-9 else pose.yaw
         return self._stride(x, y, step, left, (heading, math.cos(heading), math.sin(heading)))
 
     def _stride(self, x: float, y: float, step: float, left: float, way: tuple[float, float, float]) -> bool:
-        """The same with ``left`` metres to go; ``way``: the heading (rad), its cosine and its sine."""
+        """Walk ``step`` of ``left`` m to (x, y); return whether it is reached. ``way``: heading (rad), cosine, sine."""
         pose, (heading, c, s) = self.pose, way
         self.walking = True
         self._way += min(step, left)
@@ -282,7 +282,7 @@ class Walker:
 
 
 def _strolling(person: Person) -> Iterator[Step]:
-    """Return a walk there and back along the path."""
+    """Yield the steps of a walk along the path and back."""
     if len(person.path) > 1:
         for spot in (*person.path[1:], *reversed(person.path[:-1])):
             yield Wait(person.pause)
@@ -290,6 +290,6 @@ def _strolling(person: Person) -> Iterator[Step]:
 
 
 def keyed(people: Sequence[Sequence[Person]]) -> list[Walker]:
-    """All people of the floors."""
+    """Return all people of the floors."""
     every = ((person, floor, index) for floor, there in enumerate(people) for index, person in enumerate(there))
     return [Walker(person, floor, f"person {floor} {index}", look) for look, (person, floor, index) in enumerate(every)]

@@ -17,7 +17,7 @@ Seconds = Annotated[float, Meta(ge=0, le=3600)]
 
 
 class Walk(Struct, frozen=True, forbid_unknown_fields=True, tag="walk", tag_field="do"):
-    """Go there in a straight line, waiting for robots in the way; ``speed`` if not the person's own (m/s)."""
+    """Walk to a place in a straight line, waiting for robots in the way; ``speed``: m/s, None: the person's own."""
 
     to: Spot
     speed: Annotated[float, Meta(gt=0, le=3)] | None = None
@@ -30,20 +30,20 @@ class Look(Struct, frozen=True, forbid_unknown_fields=True, tag="look", tag_fiel
 
 
 class Wait(Struct, frozen=True, forbid_unknown_fields=True, tag="wait", tag_field="do"):
-    """Stand there."""
+    """Stand for ``seconds``."""
 
     seconds: Seconds = 2.0
 
 
 class Show(Struct, frozen=True, forbid_unknown_fields=True, tag="gesture", tag_field="do"):
-    """Make a gesture for so long."""
+    """Make a gesture for ``seconds``."""
 
     gesture: Gesture
     seconds: Seconds = 3.0
 
 
 class Say(Struct, frozen=True, forbid_unknown_fields=True, tag="say", tag_field="do"):
-    """Say something aloud; takes as long as it takes."""
+    """Say a text aloud, for as long as that takes."""
 
     text: Annotated[str, Meta(min_length=1, max_length=TEXT_MAX)]
 

@@ -1,4 +1,4 @@
-"""The people of a world by name, for tests and consoles to direct."""
+"""The people of a world by name, directed by tests and consoles."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ S = TypeVar("S", bound=msgspec.Struct)
 class Actor(StagePerson):
     """One person. Orders are carried out one after the other; then the person stands, until ``resume``.
 
-    Every method raises ValueError for what a world's file could not say either.
+    All methods raise ValueError for values that a world's file may not have.
     """
 
     def __init__(self, walker: Walker) -> None:
@@ -99,5 +99,5 @@ class Actor(StagePerson):
 
 
 def _checked(step: S) -> S:
-    """The same step, held to what its type allows."""
+    """Return the step, validated by its type. Raises ValueError."""
     return msgspec.convert(msgspec.to_builtins(step), type(step))

@@ -1,1 +1,1 @@
-"""Radio in the world: path loss, and Bluetooth devices that robots can hear."""
+"""Radio in the world: path loss, and Bluetooth devices in range of robots."""

@@ -1,4 +1,4 @@
-"""Things with a Bluetooth radio in the world: bracelets, docks. Where they are and how they are; no robot's view."""
+"""Things with a Bluetooth radio in the world, like bracelets and docks: places and states; no robot's view."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roboglot.simulation.world.description import Gadget, WorldDescription
 
 @dataclass(slots=True)
 class GadgetInWorld:
-    """One of them now; ``on``: its radio is. ``stick``: where a remote control's stick is held, each axis -1..1."""
+    """Present state of a gadget; ``on``: its radio; ``stick``: position of a remote control's stick, axes -1..1."""
 
     gadget: Gadget
     floor: int
@@ -27,28 +27,28 @@ class GadgetInWorld:
     presses: int = 0  # of the gear button so far
 
     def steer(self, forward: float = 0.0, left: float = 0.0, turn: float = 0.0) -> None:
-        """Hold the stick there from now on; without values it springs back. Raises ValueError beyond -1..1."""
+        """Hold the stick at this position; without values, release it. Raises ValueError beyond -1..1."""
         if not all(-1.0 <= axis <= 1.0 for axis in (forward, left, turn)):
             raise ValueError("a stick's axes go from -1 to 1")
         self.stick = Twist(forward, left, turn)
 
     def press_gear(self) -> None:
-        """Shift up a gear; after the highest comes the lowest."""
+        """Press the gear button: one gear up, from the highest to the lowest."""
         self.presses += 1
 
     @property
     def at(self) -> Point:
-        """Place of the gadget, world frame: with its wearer."""
+        """Place of the gadget or its wearer (world, m)."""
         return self.wearer.pose.point if self.wearer else self.place
 
     @property
     def heard(self) -> bool:
-        """True if it sends at all."""
+        """True if the radio sends."""
         return self.on and self.battery > 0.0
 
 
 class Gadgets:
-    """All of a world, by address."""
+    """All gadgets of a world, by address."""
 
     def __init__(self, world: WorldDescription, walkers: Sequence[Walker], radio: Radio) -> None:
         self.radio = radio
@@ -62,18 +62,18 @@ class Gadgets:
                 )
 
     def all(self) -> Sequence[GadgetInWorld]:
-        """Gadgets that are on and off."""
+        """Return all gadgets, on or off."""
         return tuple(self._all.values())
 
     def get(self, address: str) -> GadgetInWorld:
-        """Raises NotFound."""
+        """Return a gadget by its address. Raises NotFound."""
         try:
             return self._all[address]
         except KeyError:
             raise NotFound(f"no gadget has the address {address}") from None
 
     def signal(self, gadget: GadgetInWorld, at: Point, floor: int) -> float:
-        """dBm of it there; far below all radios when it is off."""
+        """Return a gadget's signal at a place, dBm; -200 if it is off."""
         if not gadget.heard:
             return -200.0
         return self.radio.heard(gadget.at, gadget.gadget.power, gadget.floor, at, floor)

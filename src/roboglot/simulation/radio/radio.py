@@ -1,4 +1,4 @@
-"""Propagation of radio waves in a world: they fade with distance, through walls and through slabs."""
+"""Propagation of radio waves in a world: loss by distance, walls and slabs."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ HOSTS_MAX = 154
 
 
 class Claimant(Protocol):
-    """A robot's traffic radio, as the others hear it."""
+    """Part of a robot's traffic radio that the others receive."""
 
     @property
     def claims(self) -> frozenset[str]:
-        """The places that it claims."""
+        """Names of the places that the robot claims."""
 
     @property
     def announced(self) -> Announcement | None:
@@ -40,7 +40,7 @@ class Claimant(Protocol):
 
 
 class Radio:
-    """All access points of a world, and the addresses that they gave out."""
+    """All access points of a world, and their assigned addresses."""
 
     def __init__(self, world: WorldDescription) -> None:
         self.points = tuple(
@@ -54,11 +54,11 @@ class Radio:
         self._leases: dict[str, list[str]] = {}
 
     def network(self, ssid: str) -> AccessPoint | None:
-        """The first access point of the network."""
+        """Return the first access point of a network; None: there is none."""
         return next((point for _, point in self.points if point.ssid == ssid), None)
 
     def levels(self, at: Point, floor: int) -> dict[str, float]:
-        """dBm of every network at a place: of the strongest of its access points."""
+        """Return each network's signal at a place, dBm: that of its strongest access point."""
         found: dict[str, float] = {}
         if not self._aerials:
             return found
@@ -68,7 +68,7 @@ class Radio:
         return found
 
     def lease(self, ssid: str, mac: str) -> str:
-        """The address that the network gives the card: always the same, as long as the world lives."""
+        """Return the IP address that a network assigns to a card, always the same in a world."""
         point = self.network(ssid)
         assert point is not None
         cards = self._leases.setdefault(ssid, [])
@@ -81,7 +81,7 @@ class Radio:
         return crossed(self._walls[floor], a, b)
 
     def heard(self, point: Point, power: float, point_floor: int, at: Point, floor: int) -> float:
-        """dBm at a place of a sender whose ``power`` is what one receives a metre away."""
+        """Return a sender's signal at a place, dBm; ``power``: its signal at 1 m, dBm."""
         return self._faded(point, power, point_floor, at, floor, crossed(self._walls[floor], point, at))
 
     @staticmethod
@@ -93,7 +93,7 @@ class Radio:
 
 
 def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
-    """Per floor, the middle lines of its walls: rows of x and y of one end, of the other and of the way between."""
+    """Return the walls' middle lines by floor: rows x, y of both ends, then of their difference (6, n; m)."""
     floors = []
     for floor in world.floors:
         ends = []
@@ -108,12 +108,12 @@ def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
 
 
 def crossed(walls: NDArray[np.float64], a: Point, b: Point) -> int:
-    """Return the number of walls, as ``walls_of`` has them, between two points."""
+    """Return the number of walls (from ``walls_of``) between two points."""
     return int(crossings(walls, np.array(((a.x, a.y),)), b)[0])
 
 
 def crossings(walls: NDArray[np.float64], ends: NDArray[np.float64], b: Point) -> NDArray[np.intp]:
-    """Return the number of walls, as ``walls_of`` has them, between each of ``ends`` (n, 2) and one point."""
+    """Return the number of walls (from ``walls_of``) between each of ``ends`` (n, 2) and one point."""
     x1, y1, x2, y2, wall_x, wall_y = walls
     x, y = ends[:, :1], ends[:, 1:]
     way_x, way_y = b.x - x, b.y - y

@@ -1,1 +1,1 @@
-"""Draws what cameras see: scenes as coloured quads, turned into pictures by the raster kernels."""
+"""Drawing for cameras: scenes of coloured quads, turned into pictures by the raster kernels."""

@@ -61,13 +61,13 @@ CLOTHS = tuple(int(cloth) for cloth in RADII[:, 2].repeat(3)) + (0,) * 5 + (2,) 
 
 
 def person(index: int, joints: Floats) -> Mesh:
-    """A person whose JOINTS are there, in their own frame (x ahead); ``index`` chooses clothes, hair and skin."""
+    """Return a person with these JOINTS (own frame, x ahead; m); ``index`` chooses clothes, hair and skin."""
     return posing(index, np.asarray(joints, np.float64).tobytes())
 
 
 @lru_cache(maxsize=16)
 def posing(index: int, packed: bytes) -> Mesh:
-    """The same for the bytes of the joints: one who stands looks the same in the next picture."""
+    """Return the same by the bytes of the joints, cached: a standing person looks the same in the next picture."""
     joints = np.frombuffer(packed).reshape(-1, 3)
     wrists, ankles, elbows = (joints[[LEFT[part], RIGHT[part]]] for part in range(3))
     shoulders, hips, ears = (_between(joints, part) for part in ("shoulder", "hip", "ear"))
@@ -89,7 +89,7 @@ def posing(index: int, packed: bytes) -> Mesh:
 
 
 def _skin(pieces: Floats) -> Floats:
-    """Quads, SIDES around each piece; a piece (6 x 3): middle, across and depth of the ring at either end."""
+    """Return quads, SIDES around each piece (6 x 3): middle, across and depth of the ring at each end."""
     angles = np.arange(SIDES + 1) * (math.tau / SIDES)
     c, s = np.cos(angles)[None, :, None], np.sin(angles)[None, :, None]
     low, high = (pieces[:, None, i] + c * pieces[:, None, i + 1] + s * pieces[:, None, i + 2] for i in (0, 3))
@@ -98,7 +98,7 @@ def _skin(pieces: Floats) -> Floats:
 
 
 def _tapering(starts: Floats, ends: Floats) -> Floats:
-    """The pieces of limbs with closed ends, three a limb."""
+    """Return the pieces of limbs with closed ends, three per limb."""
     axes = unit(ends - starts)
     aside = np.where(np.abs(axes[:, :1]) < 0.8, (1.0, 0.3, 0.1), (0.0, 1.0, 0.2))
     across = unit(cross(axes, aside))
@@ -111,7 +111,7 @@ def _tapering(starts: Floats, ends: Floats) -> Floats:
 
 
 def _tube(foot: Floats, axis: Floats, left: Floats, profile: Floats) -> Floats:
-    """The pieces of a tube along ``axis`` from ``foot`` on, its width to the ``left``."""
+    """Return the pieces of a tube along ``axis`` from ``foot`` on, its width to the ``left``."""
     ahead = unit(cross(left, axis))
     across = unit(cross(axis, ahead))
     rings = np.stack((foot + profile[:, :1] * axis, profile[:, 2:] * ahead, profile[:, 1:2] * across), axis=1)
@@ -124,7 +124,7 @@ def _between(joints: Floats, part: str) -> Floats:
 
 
 def _eyes(joints: Floats, face: Floats, ear: Floats, up: Floats) -> Floats:
-    """Two dark squares that look ahead, before the skin."""
+    """Return two dark squares in front of the skin, facing ahead."""
     ahead, left = unit(face), unit(ear)
     quads = []
     for side in ("left_eye", "right_eye"):
@@ -147,7 +147,7 @@ def _look(index: int, count: int) -> tuple[Floats, NDArray[np.float32], NDArray[
 
 @lru_cache(maxsize=64)
 def can(index: int, diameter: float, height: float) -> Mesh:
-    """A small can with a bright rim."""
+    """Return a small can with a bright rim."""
     radius, label, tin = diameter / 2, Paint(SHIRTS[index % len(SHIRTS)]), Paint((190, 194, 198))
     profile = [(radius, 0.0, tin), (radius, 0.1 * height, label), (radius, 0.9 * height, tin), (radius, height, tin)]
     return turned(profile, 12)
@@ -155,7 +155,7 @@ def can(index: int, diameter: float, height: float) -> Mesh:
 
 @lru_cache(maxsize=64)
 def robot(index: int, hull: HullSection, belly: float, walks: bool = False) -> Mesh:
-    """A robot with its torso's underside ``belly`` m above the floor; the legs of one that walks are its fittings."""
+    """Return a robot with its torso's underside ``belly`` m above the floor; legs for walking are fittings."""
     skin, dark = Paint(ROBOTS[index % len(ROBOTS)]), Paint((52, 54, 60))
     light, eye = Paint((232, 234, 236)), Paint((90, 240, 255), glows=True)
     radius, top = hull.radius, belly + hull.torso_height

@@ -1,6 +1,6 @@
 """Moving details for cameras: gimbals, arms, jaws, lamps, beads, lift cars.
 
-State comes from the parts; meshes are around a robot's origin on the floor, +x ahead.
+States come from the parts; meshes are in the robot's frame on the floor, +x ahead.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ Make = Callable[[], Mesh]
 
 
 def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
-    """Yield makers of the robot's fittings as it holds them now. Quick: meshes are made later."""
+    """Yield functions that make the robot's fittings in their present state. Quick: meshes are made later."""
     body, belly = hull.body, hull.belly
     gimbal_colours: tuple[Colour, ...] = ()
     if Light in robot:
@@ -93,7 +93,7 @@ def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
 
 
 def _mean(lamps: Sequence[Colour]) -> Colour:
-    """Return the colour of a zone from afar."""
+    """Return the mean colour of a zone's lamps."""
     if lamps.count(lamps[0]) == len(lamps):
         return lamps[0]
     return Colour(
@@ -115,14 +115,14 @@ def _lamp(zone: str, colour: Colour, radius: float, belly: float, torso: float) 
 def _gimbal(
     at: tuple[float, float, float], pitch: float, yaw: float, muzzle: float, colours: tuple[Colour, ...]
 ) -> Mesh:
-    """A yoke that turns, and a head between its arms that nods."""
+    """Return a turned yoke, with a nodding head between its arms."""
     nodding = _head(muzzle).moved(rotation((0.0, pitch), 0.0), (0.0, 0.0, 0.0))
     return joined([_yoke(colours), nodding]).placed(*at, yaw)
 
 
 @lru_cache(maxsize=64)
 def _yoke(colours: tuple[Colour, ...]) -> Mesh:
-    """With its lamps at both sides, where they shine."""
+    """Return the yoke, with its lit lamps at both sides."""
     lamps = [
         card((0.0, side * 0.062, 0.0), side * math.pi / 2, (0.05, 0.05), Paint((c.red, c.green, c.blue), glows=True))
         for side, c in zip((1, -1), colours, strict=False)
@@ -134,7 +134,7 @@ def _yoke(colours: tuple[Colour, ...]) -> Mesh:
 
 @lru_cache(maxsize=8)
 def _head(muzzle: float) -> Mesh:
-    """The camera, and the barrel under it, if any."""
+    """Return the camera, and the barrel under it, if any."""
     parts = [box((0.09, 0.09, 0.06), STEEL, STEEL, -0.03), card((0.0461, 0.0, 0.008), 0.0, (0.03, 0.026), DARK)]
     if muzzle:
         parts.append(_bar(np.array((0.02, 0.0, -0.02)), np.array((muzzle, 0.0, -0.02)), 0.012, DARK))
@@ -143,7 +143,7 @@ def _head(muzzle: float) -> Mesh:
 
 @lru_cache(maxsize=64)
 def _arm(shoulder: tuple[float, float], end: tuple[float, float], reach: float, opening: float, fingers: float) -> Mesh:
-    """Two bars of one length with the elbow above, and jaws. Only the end point is simulated: the rest follows."""
+    """Return two bars of equal length with the elbow above, and jaws; only the end point is simulated."""
     x, z = shoulder
     tip = np.array((x + end[0], 0.0, z + end[1]))
     root = np.array((x, 0.0, z))
@@ -157,7 +157,7 @@ def _arm(shoulder: tuple[float, float], end: tuple[float, float], reach: float, 
 
 @lru_cache(maxsize=1024)
 def _leg(hip: tuple[float, float, float], foot: tuple[float, float, float]) -> Mesh:
-    """A thigh and a shank with the knee behind, and a paw."""
+    """Return a thigh and a shank with the knee behind, and a paw."""
     x, y, z = foot[0], foot[1], foot[2] + PAW
     tip = np.array((x, y, z))
     paw = turned([(0.5 * PAW, -PAW, DARK), (PAW, 0.0, DARK), (0.5 * PAW, PAW, DARK)], 6).placed(x, y, z, 0.0)
@@ -167,7 +167,7 @@ def _leg(hip: tuple[float, float, float], foot: tuple[float, float, float]) -> M
 def _bent(
     root: Floats, tip: Floats, bar: float, towards: tuple[float, float, float], half: float, paint: Paint
 ) -> list[Mesh]:
-    """Two bars of one length between two points, the joint to one side; as long as they must be at least."""
+    """Return two bars of equal length between two points, bent ``towards`` one side, at least ``bar`` m long."""
     way = tip - root
     away = max(float(np.linalg.norm(way)), 1e-6)
     aside = np.array(towards) - way * float(way @ towards) / away**2
@@ -179,7 +179,7 @@ def _bent(
 
 
 def _bar(start: Floats, end: Floats, half: float, paint: Paint) -> Mesh:
-    """A square bar between two points."""
+    """Return a square bar between two points."""
     way = end - start
     along = way / max(1e-9, float(np.linalg.norm(way)))
     aside = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < 0.9 else (0.0, 1.0, 0.0))
@@ -193,13 +193,13 @@ def _bar(start: Floats, end: Floats, half: float, paint: Paint) -> Mesh:
 
 @lru_cache(maxsize=1)
 def bead() -> Mesh:
-    """A gel bead."""
+    """Return a gel bead."""
     return turned([(0.001, -0.004, BEAD), (0.004, 0.0, BEAD), (0.001, 0.004, BEAD)], 6)
 
 
 @lru_cache(maxsize=4)
 def car(deep: float, wide: float) -> Mesh:
-    """A lift car from inside, open to +x: floor, three walls with a rail, a ceiling that shines."""
+    """Return a lift car from inside, open to +x: floor, three walls with a rail, a lit ceiling."""
     x, y = deep / 2 - SKIN, wide / 2 - SKIN
     low, high = 0.005, CAR_HEIGHT
     quads = [

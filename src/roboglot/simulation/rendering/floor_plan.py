@@ -1,4 +1,4 @@
-"""A floor's plan in cells, for cameras: its rooms, what blocks a view, how dark the floor is beside things."""
+"""A floor's plan in cells, for cameras: rooms, walls that block the view, shadows beside things."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ class Plan:
     shadows: Cells
 
     def room_at(self, x: float, y: float) -> int:
-        """The room of a place; 0 outside."""
+        """Return the room number of a place (world, m); 0: outside."""
         column, row = math.floor((x - self.x) / self.cell), math.floor((y - self.y) / self.cell)
         if not (0 <= row < self.rooms.shape[0] and 0 <= column < self.rooms.shape[1]):
             return 0
         return int(self.rooms[row, column])
 
     def seen_from(self, x: float, y: float, yaw: float, spread: float) -> Cells:
-        """Return for each room number whether some of it can be seen."""
+        """Return for each room number whether a part of the room is visible (1 or 0)."""
         visible = np.zeros(ROOMS_MAX + 1, dtype=np.uint8)
         visible[0] = 1
         look(self.solid, self.rooms, (x - self.x) / self.cell, (y - self.y) / self.cell, yaw, spread, visible)
         return visible
 
     def shadows_with(self, discs: Iterable[tuple[float, float, float]]) -> Cells:
-        """``shadows``, and soft ones under what stands at (x, y) with a radius."""
+        """Return ``shadows`` with soft ones under ``discs`` (x, y, radius; m)."""
         shadows = self.shadows.copy()
         under = np.array(list(discs), dtype=np.float64).reshape(-1, 3)
         darken(shadows, under, self.x, self.y, self.cell, SOFTNESS * self.cell)
@@ -67,7 +67,7 @@ class Plan:
 
 
 def plan_of(floor: Floor, solids: Iterable[Solid]) -> Plan:
-    """The plan of one floor whose solids are given."""
+    """Return the plan of a floor with these solids."""
     cell = max(CELL, max(floor.size) / CELLS_MAX)
     shape = tuple(max(2, math.ceil(size / cell)) for size in reversed(floor.size))
     blank = Plan(*floor.origin, cell, *(np.zeros(shape, dtype=np.uint8) for _ in range(3)))
@@ -90,14 +90,14 @@ def plan_of(floor: Floor, solids: Iterable[Solid]) -> Plan:
 
 
 def whole(wall: Wall, height: float) -> Solid:
-    """The wall as if it had no doors."""
+    """Return the wall without its doors."""
     (x0, y0), (x1, y1) = wall.start, wall.end
     pose = Pose((x0 + x1) / 2, (y0 + y1) / 2, math.atan2(y1 - y0, x1 - x0))
     return Solid(SolidKind.WALL, pose, (wall.length, wall.thickness, height))
 
 
 def _stamp(plan: Plan, solid: Solid, cells: NDArray[np.uint8] | NDArray[np.float64]) -> None:
-    """Mark the cells whose middle lies in the solid's footprint, or nearly: no wall is thinner than a cell."""
+    """Mark the cells in the solid's footprint, which is widened to at least a cell."""
     half_x, half_y = (max(size, plan.cell * 1.01) / 2 for size in solid.size[:2])
     reach = math.hypot(half_x, half_y)
     x, y = solid.pose.x, solid.pose.y
@@ -115,7 +115,7 @@ def _stamp(plan: Plan, solid: Solid, cells: NDArray[np.uint8] | NDArray[np.float
 
 
 def _blurred(values: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """The mean over SOFTNESS cells to both sides."""
+    """Return the mean over SOFTNESS cells to both sides."""
     widths = [(0, 0), (0, 0)]
     widths[axis] = (SOFTNESS + 1, SOFTNESS)
     sums = np.pad(values, widths, mode="edge").cumsum(axis)

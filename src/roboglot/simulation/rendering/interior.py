@@ -1,4 +1,4 @@
-"""Looks of a floor's still things: walls by room, windows, door frames, furniture, docks, markers, lines."""
+"""Meshes of a floor's still things: walls by room, windows, door frames, furniture, docks, markers, lines."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ PAPER = 1.3  # of a printed code's size: its white margin included
 
 
 def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) -> Iterator[Mesh]:
-    """All of it, floor and ceiling excepted."""
+    """Yield all still things of a floor, except floor and ceiling."""
     for number, solid in enumerate(solids):
         if solid.kind is SolidKind.WALL:
             yield from _wall(solid, plan, floor)
@@ -94,12 +94,12 @@ def interior(floor: Floor, solids: Sequence[Solid], plan: Plan, masks: Masks) ->
 
 
 def wall_paint(room: int, height: float) -> Paint:
-    """Plaster in the room's colour with a skirting board."""
+    """Return plaster in the room's colour with a skirting board."""
     return Paint(WALLS[room % len(WALLS)], (84, 76, 70), Texture.WALL, (height, height))
 
 
 def _plain(room: int) -> Rgb:
-    """Roughly what plaster in that room looks like from afar."""
+    """Return the mean colour of a room's plaster."""
     r, g, b = WALLS[room % len(WALLS)]
     return round(r * 0.96), round(g * 0.96), round(b * 0.96)
 
@@ -128,7 +128,7 @@ def _wall(solid: Solid, plan: Plan, floor: Floor) -> Iterator[Mesh]:
 
 
 def _rooms_along(facing: Pose, span: float, plan: Plan) -> Iterator[tuple[float, float, int]]:
-    """(begin, end, room) along the side of a wall (its local y), as the room in front of it has it."""
+    """Yield (begin, end, room) along the side of a wall (its local y, m), by the rooms in front of it."""
     steps = max(1, round(span / plan.cell))
     begin, last = -span / 2, None
     for step in range(steps):
@@ -160,7 +160,7 @@ def _windows(facing: Pose, begin: float, end: float, room: int) -> Iterator[Mesh
 
 
 def _door_frames(wall: Wall, height: float, plan: Plan) -> Iterator[Mesh]:
-    """Two posts and a closed top for each doorway."""
+    """Yield two posts and a closed top for each doorway."""
     (x0, y0), (x1, y1) = wall.start, wall.end
     start = Pose(x0, y0, math.atan2(y1 - y0, x1 - x0))
     frame, deep = Paint((122, 92, 66)), wall.thickness + 0.03
@@ -181,7 +181,7 @@ def _door_frames(wall: Wall, height: float, plan: Plan) -> Iterator[Mesh]:
 
 
 def furniture(solid: Solid, number: int, room: int) -> Mesh:
-    """Return the mesh of a box or cylinder as the office furniture of that size."""
+    """Return a box or cylinder as office furniture of its size."""
     width, depth, height = solid.size
     wood = Paint(WOOD, WOOD_DARK, Texture.WOOD, (1.0, 1.0))
     if solid.round:
@@ -200,7 +200,7 @@ def furniture(solid: Solid, number: int, room: int) -> Mesh:
 
 @lru_cache(maxsize=128)
 def movable(solid: Solid) -> Mesh:
-    """A box that can be moved, whose pose is the origin, as high above the floor as it is."""
+    """Return a movable box at the origin, at its height above the floor."""
     match solid.kind:
         case SolidKind.DOCK:
             return joined(_dock(solid))
@@ -216,7 +216,7 @@ def movable(solid: Solid) -> Mesh:
 
 
 def _carton(solid: Solid) -> Mesh:
-    """A cardboard box, for obstacles."""
+    """Return a cardboard box, for obstacles."""
     side = Paint((196, 158, 110), (226, 204, 160), Texture.BOX, solid.size[1:])
     top = Paint((206, 170, 122), (226, 204, 160), Texture.BOX, solid.size[:2])
     return box(solid.size, side, top, solid.base)
@@ -244,7 +244,7 @@ def _round(solid: Solid, number: int, room: int) -> Mesh:
 
 
 def _dock(solid: Solid) -> Iterator[Mesh]:
-    """Dark, with a green lamp and a bright plate towards the room."""
+    """Yield a dark dock, with a green lamp and a bright plate towards the room."""
     pose, (depth, width, height) = solid.pose, solid.size
     yield _block(solid, Paint(DARK), Paint(GREY), EVERYWHERE)
     front = pose.compose(Pose(depth / 2 + PROUD))
@@ -254,7 +254,7 @@ def _dock(solid: Solid) -> Iterator[Mesh]:
 
 
 def _marker(marker: Marker, masks: Masks) -> Iterator[Mesh]:
-    """A black rim, and the symbol on white within."""
+    """Yield a black rim, and the symbol on white within."""
     yaw = math.radians(marker.facing)
     inner = 0.86 * marker.size
     paint = Paint((246, 246, 244), COLOURS[marker.colour], masks.symbol(marker.symbol), (inner, inner))
@@ -265,7 +265,7 @@ def _marker(marker: Marker, masks: Masks) -> Iterator[Mesh]:
 
 
 def symbols_of(world: WorldDescription) -> list[str]:
-    """All that markers and tags show."""
+    """Return the names of all symbols on markers and tags."""
     names = [marker.symbol for floor in world.floors for marker in floor.markers]
     for floor in world.floors:
         names += [code_symbol(tag.kind, tag.text) for tag in floor.tags]
@@ -275,7 +275,7 @@ def symbols_of(world: WorldDescription) -> list[str]:
 
 
 def printed(tag: PrintedTag, masks: Masks) -> Mesh:
-    """A code on white paper."""
+    """Return a code on white paper."""
     pose, height, size = tag.card.pose, tag.card.height, tag.card.size
     squares = Paint((246, 246, 244), (18, 18, 18), masks.symbol(code_symbol(tag.kind, tag.text)), (size, size))
     back, front = pose.compose(Pose(2 * PROUD)), pose.compose(Pose(3 * PROUD))
@@ -289,14 +289,14 @@ def printed(tag: PrintedTag, masks: Masks) -> Mesh:
 
 
 def _foil(foil: Reflector) -> Mesh:
-    """A strip so bright that it seems to glow."""
+    """Return a very bright strip, which seems to glow."""
     yaw, height = math.radians(foil.facing), foil.top - foil.base
     at = Pose(*foil.at, yaw).compose(Pose(2 * PROUD))
     return card((at.x, at.y, foil.base + height / 2), yaw, (foil.width, height), Paint((236, 240, 244), glows=True))
 
 
 def _slope(terrain: Terrain) -> Mesh:
-    """The tops and sides of a ramp or bump; ice is bright."""
+    """Return the tops and sides of a ramp or bump; ice is bright."""
     frame, half = Pose(*terrain.at, math.radians(terrain.facing)), terrain.width / 2
     first, second = ((206, 232, 244), (236, 246, 250)) if terrain.grip < 0.5 else ((168, 160, 146), (140, 132, 120))
     paint, side = Paint(first, second, Texture.CARPET), Paint(second)
@@ -322,13 +322,13 @@ def _slope(terrain: Terrain) -> Mesh:
 
 
 def _pit(hole: Rectangle) -> Mesh:
-    """Darkness where there is no floor."""
+    """Return a dark area in place of a hole."""
     x0, y0, x1, y1, z = hole.x, hole.y, hole.x + hole.width, hole.y + hole.depth, 0.001
     return mesh_of([[(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]], [Paint((12, 12, 14))])
 
 
 def _tape(line: Line) -> Mesh:
-    """Flat on the floor, with rounded bends."""
+    """Return a flat tape on the floor, with rounded bends."""
     quads, half, z = [], line.width / 2, 0.002
     for (ax, ay), (bx, by) in pairwise(line.points):
         yaw = math.atan2(by - ay, bx - ax)

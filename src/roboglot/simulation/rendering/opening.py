@@ -24,7 +24,7 @@ def stage_of(
     things: Iterable[Thing],
     life: tuple[Mapping[str, Robot], Beads, LiftCar | None],
 ) -> Callable[[], Scenery]:
-    """Return what opens the stage of this world when the first camera asks for it."""
+    """Return a function that opens the world's stage, to be called for the first camera."""
 
     def open_stage() -> Scenery:
         with loading():

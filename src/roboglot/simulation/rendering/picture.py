@@ -29,7 +29,7 @@ class Renderer:
         self._sources = np.empty(FIRST + POLYGONS_MAX, dtype=np.int32)
 
     def render(self, scene: Scene, eye: Eye, gain: float) -> NDArray[np.uint8]:
-        """The picture as YUV 4:2:0 planes one below the other, (3/2 height, width)."""
+        """Return the picture as YUV 4:2:0 planes, one below the other (3/2 height, width)."""
         ground, plan = scene.ground, scene.plan
         rotation = np.ascontiguousarray(eye.rotation)
         visible = plan.seen_from(eye.x, eye.y, eye.yaw, eye.spread)
@@ -58,7 +58,7 @@ class Renderer:
         return picture
 
     def _lay_ground(self, scene: Scene, eye: Eye, rotation: NDArray[np.float64]) -> None:
-        """The planes of floor and ceiling."""
+        """Set the planes of floor and ceiling."""
         focal, cx, cy = self._lens.tolist()
         ground = scene.ground
         below, above = max(LOWEST, eye.z - ground.floor), max(LOWEST, ground.ceiling - eye.z)

@@ -1,4 +1,4 @@
-"""A camera's view at an instant: where places of the world appear in its picture. Plain geometry, no occlusion."""
+"""A camera's view at an instant: projects places of the world into its picture. Plain geometry, no occlusion."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class View:
     aspect: float  # width / height
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return where points (n, 3) appear (n, 2; 0..1 within the picture) and how far ahead they lie, m.
+        """Return the points' (n, 3; world) places in the picture (n, 2; 0..1 inside) and depths, m.
 
-        Points behind the lens appear nowhere (nan).
+        Places of points behind the lens are NaN.
         """
         seen = (points - self.at) @ self.rotation.T
         ahead = np.where(seen[:, 2] > NEAREST, seen[:, 2], np.nan)
@@ -43,7 +43,7 @@ class View:
         return within
 
     def box(self, corners: Floats) -> Box | None:
-        """Return the part of the picture that a body with these corners (n, 3) covers; None if not wholly ahead."""
+        """Return the picture's part covered by a body with these corners (n, 3; world); None if not wholly ahead."""
         places, _ = self.project(corners)
         if np.isnan(places).any():
             return None
@@ -54,7 +54,7 @@ class View:
 
     @staticmethod
     def corners(low: Floats, high: Floats) -> Floats:
-        """The eight corners of a block."""
+        """Return the eight corners of a block (8, 3)."""
         return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 

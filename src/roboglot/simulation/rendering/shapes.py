@@ -24,7 +24,7 @@ EVERYWHERE = 0  # the room of shapes drawn regardless of the visible rooms
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """Two colours mixed by a texture's mask (FLAT: the first alone). ``tile``: metres a texture; ``glows``: a lamp."""
+    """Two colours mixed by a texture's mask (FLAT: only the first). ``tile``: m per texture; ``glows``: a lamp."""
 
     first: Rgb
     second: Rgb = (0, 0, 0)
@@ -37,7 +37,7 @@ class Paint:
 class Mesh:
     """n quads: corners (n, 4, 3), texture origin and axes (n, 3, 3), paints (n, 8), textures (n), rooms (n).
 
-    Equal to itself alone, so that caches know one again.
+    Equality is identity, for caches.
     """
 
     corners: Floats
@@ -47,23 +47,23 @@ class Mesh:
     rooms: NDArray[np.int32]
 
     def placed(self, x: float, y: float, z: float, yaw: float) -> Mesh:
-        """Turned by ``yaw``, then moved, and lit anew."""
+        """Return the mesh turned by ``yaw`` (rad), then moved (m), and lit anew."""
         c, s = math.cos(yaw), math.sin(yaw)
         return self.moved(np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))), (x, y, z))
 
     def moved(self, rotation: Floats, to: tuple[float, float, float]) -> Mesh:
-        """Turned by a rotation matrix, then moved, and lit anew."""
+        """Return the mesh turned by a rotation matrix, then moved (m), and lit anew."""
         return posed([(self, rotation, to)])
 
 
 def joined(meshes: Iterable[Mesh]) -> Mesh:
-    """All in one."""
+    """Return one mesh of all."""
     parts = list(meshes) or [mesh_of([], [])]
     return Mesh(*(np.concatenate([getattr(part, name) for part in parts]) for name in Mesh.__dataclass_fields__))
 
 
 def posed(parts: Sequence[tuple[Mesh, Floats, tuple[float, float, float]]]) -> Mesh:
-    """All in one, each turned by its rotation matrix, then moved, and lit anew; most of it without the lock."""
+    """Return one mesh of all, each turned by its matrix, moved, and lit anew; mostly without the GIL."""
     whole = joined(mesh for mesh, _, _ in parts)
     counts = [len(mesh.textures) for mesh, _, _ in parts]
     owners = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
@@ -73,20 +73,20 @@ def posed(parts: Sequence[tuple[Mesh, Floats, tuple[float, float, float]]]) -> M
 
 
 def colour(rgb: Rgb) -> tuple[float, float, float]:
-    """Luma 0..219 and chroma -112..112, BT.601."""
+    """Return luma 0..219 and chroma -112..112, BT.601."""
     r, g, b = (channel / 255 for channel in rgb)
     luma = 0.299 * r + 0.587 * g + 0.114 * b
     return 219 * luma, 224 * (b - luma) / 1.772, 224 * (r - luma) / 1.402
 
 
 def paint_row(paint: Paint, light: float) -> list[float]:
-    """Return a paint as the shading kernel takes it."""
+    """Return a paint in the shading kernel's form."""
     first, second = colour(paint.first), colour(paint.second)
     return [*first, *((b - a) / 255 for a, b in zip(first, second, strict=True)), light, 0.0 if paint.glows else 1.0]
 
 
 def mesh_of(quads: Sequence[Sequence[Sequence[float]]], paints: Sequence[Paint], room: int = EVERYWHERE) -> Mesh:
-    """Quads (four corners each) with a paint each; textures run along the first edge and up the last one."""
+    """Return a mesh of quads (four corners each) with paints; textures run along the first edge and up the last."""
     corners = np.array(quads, dtype=np.float64).reshape(-1, 4, 3)
     along, up = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
     rows = [paint_row(paint, 1.0) for paint in paints]
@@ -106,19 +106,19 @@ def mesh_of(quads: Sequence[Sequence[Sequence[float]]], paints: Sequence[Paint],
 
 
 def unit(vectors: Floats) -> Floats:
-    """Along the last axis, of length 1."""
+    """Return the vectors along the last axis, scaled to length 1."""
     scaled: Floats = vectors / np.maximum(1e-12, np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True)))
     return scaled
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """The cross product; numpy's takes thrice as long for a few vectors."""
+    """Return the cross product; numpy's takes three times as long for a few vectors."""
     product: Floats = a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
     return product
 
 
 def box(size: Sequence[float], side: Paint, top: Paint, base: float = 0.0, room: int = EVERYWHERE) -> Mesh:
-    """An upright box around the origin: width along x, depth along y, height."""
+    """Return an upright box around the origin: width along x, depth along y, height."""
     half_x, half_y, low, high = size[0] / 2, size[1] / 2, base, base + size[2]
     feet = [(half_x, -half_y), (half_x, half_y), (-half_x, half_y), (-half_x, -half_y)]
     quads = [
@@ -132,7 +132,7 @@ def box(size: Sequence[float], side: Paint, top: Paint, base: float = 0.0, room:
 def turned(
     profile: Sequence[tuple[float, float, Paint]], sides: int, flat: float = 1.0, room: int = EVERYWHERE
 ) -> Mesh:
-    """A shape turned around z: (radius, height, paint of the ring above) from the bottom up, closed at the top.
+    """Return a shape turned around z: (radius, height, paint of the ring above) from the bottom up, closed at the top.
 
     ``flat`` squeezes it along x.
     """
@@ -155,7 +155,7 @@ def turned(
 
 
 def card(at: tuple[float, float, float], yaw: float, size: tuple[float, float], paint: Paint, room: int = 0) -> Mesh:
-    """An upright rectangle (width, height) around ``at`` that faces ``yaw``; textures run to the viewer's right."""
+    """Return an upright rectangle (width, height) around ``at``, facing ``yaw``; textures run to the viewer's right."""
     (x, y, z), (width, height) = at, size
     dx, dy = -math.sin(yaw) * width / 2, math.cos(yaw) * width / 2
     low, high = z - height / 2, z + height / 2

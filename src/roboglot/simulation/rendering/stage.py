@@ -52,7 +52,7 @@ SLACK = 0.1  # rad around an eye's view: one that nods or leans sees slightly mo
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """Other visible things: robots' parts as they hold them, beads in the air, the lift's car."""
+    """Other visible things: robots' parts in their present state, beads in the air, the lift's car."""
 
     robots: Mapping[str, Robot]
     beads: Beads
@@ -60,7 +60,7 @@ class Life:
 
 
 class Stage:
-    """Scenery of one world for its cameras. ``props`` and ``walkers`` are looked at anew each time."""
+    """Scenery of one world for its cameras, always with the present ``props`` and ``walkers``."""
 
     def __init__(
         self,
@@ -83,7 +83,7 @@ class Stage:
         return Instant(number, figures)
 
     def scene(self, instant: Instant) -> Scene:
-        """All there is to draw; may run in any thread."""
+        """Return everything to draw; may run in any thread."""
         plan, still, ground = self._floor(instant.floor)
         figures = instant.figures
         moving = [(figure.make(), figure.rotation, (figure.x, figure.y, figure.z)) for figure in figures]
@@ -103,7 +103,7 @@ class Stage:
         return self._floors[number]
 
     def _figures(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:
-        """All objects in the sector, and possibly more; testing robots with their fittings takes long."""
+        """Yield all objects in the sector, and possibly more; only robots are tested, as their fittings take long."""
         yield from self._people(number)
         yield from self._robots(number, viewer, sector)
         yield from self._loose(number)
@@ -127,7 +127,7 @@ class Stage:
                 yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
 
     def _loose(self, number: int) -> Iterator[Figure]:
-        """Things that can be carried, beads and the lift's car: what may be on this floor or on another."""
+        """Yield things that may change floors: small things, beads and the lift's car."""
         elevation, storey = self._world.elevation(number), self._world.floors[number].height
         for index, thing in enumerate(self._things):
             x, y, z = thing.position.tolist()
@@ -161,7 +161,7 @@ def _together(makes: tuple[Callable[[], Mesh], ...]) -> Mesh:
 
 @lru_cache(maxsize=256)
 def _joined(meshes: tuple[Mesh, ...]) -> Mesh:
-    """A robot with its fittings: it is the same in the next picture, unless it moved an arm or a leg."""
+    """Return a robot with its fittings, cached until an arm or a leg moves."""
     return joined(meshes)
 
 
@@ -179,11 +179,11 @@ class _Sector:
     spread: float
 
     def meets(self, figure: Figure) -> bool:
-        """True if it could be seen."""
+        """True if the figure may be visible."""
         return self.has(figure.x, figure.y, figure.radius + figure.reach)
 
     def has(self, x: float, y: float, reach: float) -> bool:
-        """True if some of what lies within ``reach`` m of a place could be seen."""
+        """True if anything within ``reach`` m of a place may be visible."""
         dx, dy = x - self.x, y - self.y
         away = math.hypot(dx, dy)
         if away <= reach or away > FAR_AWAY:

@@ -1,4 +1,4 @@
-"""Renderer of a world's cameras: loads kernels when the first one is needed, works in threads in real time.
+"""Renderers of a world's cameras: kernels are loaded for the first one; real time works in threads.
 
 In lockstep everything runs in place, so that the same seed gives the same pictures at the same instants.
 """
@@ -21,7 +21,7 @@ R = TypeVar("R")
 
 
 class Studio:
-    """One per world; costs nothing until ``stage`` is asked for."""
+    """Studio of one world, without cost until the first ``stage``."""
 
     def __init__(self, open_stage: Callable[[], Scenery], clock: Clock) -> None:
         self._open_stage = open_stage
@@ -37,7 +37,7 @@ class Studio:
         return self._stage
 
     async def renderer(self, width: int, height: int, fov: float) -> Renderer:
-        """Buffers for one camera."""
+        """Return the buffers for one camera."""
 
         def make() -> Renderer:
             with loading():
@@ -48,5 +48,5 @@ class Studio:
         return await self.work(make)
 
     async def work(self, job: Callable[[], R]) -> R:
-        """The result of ``job``, done beside the loop in real time."""
+        """Return the result of ``job``, which runs in a thread in real time."""
         return await beside(job) if self._threaded else job()

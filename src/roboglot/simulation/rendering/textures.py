@@ -23,12 +23,12 @@ Mask = NDArray[np.uint32]
 
 
 def code_symbol(kind: TagKind, text: str) -> str:
-    """The name under which ``Masks`` has a printed code."""
+    """Return the name of a printed code in ``Masks``."""
     return f"{CODE}{kind} {text}"
 
 
 class Texture(IntEnum):
-    """The surfaces; what comes after them are symbols, by ``Masks.symbol``."""
+    """The surfaces; further numbers are symbols, from ``Masks.symbol``."""
 
     TILES = 0
     CARPET = 1
@@ -42,7 +42,7 @@ class Texture(IntEnum):
 
 
 class Masks:
-    """All masks with their smaller copies, one row each, as the shading kernel takes them."""
+    """All masks with their smaller copies, one row each, in the shading kernel's form."""
 
     def __init__(self, symbols: Sequence[str] = ()) -> None:
         names = list(dict.fromkeys(symbols))
@@ -53,7 +53,7 @@ class Masks:
         self.rows: Mask = np.stack([*(_surface(painter) for painter in surfaces), *(_symbol(name) for name in names)])
 
     def symbol(self, name: str) -> int:
-        """Return the texture that shows a marker's symbol; one that was not asked for at the start gets a spare row."""
+        """Return the texture of a symbol; one unknown at the start gets a spare row."""
         known = self._symbols.get(name)
         return self._spare_row(name) if known is None else known
 
@@ -95,7 +95,7 @@ def _symbol(name: str) -> Mask:
 
 
 def _with_copies(mask: NDArray[np.float64]) -> Mask:
-    """256 x 256 in 0..255, then halved until SMALLEST, in one row; a texel holds its three neighbours too."""
+    """Return a mask (256 x 256, 0..255) and its halves down to SMALLEST as one row; a texel holds neighbours, too."""
     parts = []
     while len(mask) >= SMALLEST:
         texels = np.clip(mask + 0.5, 0, 255).astype(np.uint32)
@@ -111,7 +111,7 @@ def _grid() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _noise(cells: int, seed: int, strength: float) -> NDArray[np.float64]:
-    """Smooth random hills that fit together at the edges, around 0."""
+    """Return smooth random hills around 0 that match at the edges."""
     random = np.random.Generator(np.random.PCG64(seed)).standard_normal((cells, cells))
     random = np.concatenate((random, random[:1]))
     random = np.concatenate((random, random[:, :1]), axis=1)
@@ -226,7 +226,7 @@ def _code(kind: str, text: str) -> NDArray[np.float64]:
 
 
 def _arrow() -> NDArray[np.float64]:
-    """Upwards (row 0 is below)."""
+    """Return an arrow that points up (row 0 is at the bottom)."""
     rows, columns = _grid()
     off = np.abs(columns - 0.5)
     head = (rows > 0.5) & (off < (0.9 - rows) * 0.95)

@@ -1,4 +1,4 @@
-"""Values between the world and its pictures: an eye, what moves before it at an instant, a scene that can be drawn."""
+"""Values between the world and its pictures: an eye, moving figures at an instant, a scene to draw."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ class Eye:
 
     @property
     def level(self) -> bool:
-        """True if it looks neither steeply up or down nor askew."""
+        """True if the eye looks neither steeply up or down nor askew."""
         return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
 
     @property
     def spread(self) -> float:
-        """Horizontal angle that may be visible, rad: all of it if looking steeply; else the middle ``fov`` and some."""
+        """Horizontal angle that may be visible, rad: a full turn for a steep view, else ``fov`` and a margin."""
         return min(math.tau, 1.25 * self.fov) if self.level else math.tau
 
 
@@ -59,7 +59,7 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A person or thing that may move: how to make its mesh around the origin, where it is, its shadow's radius."""
+    """A person or thing that may move: function for its mesh at the origin, pose (world, m), shadow's radius (m)."""
 
     make: Callable[[], Mesh]
     x: float
@@ -80,7 +80,7 @@ class Instant:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """One instant of one floor, complete in itself: it can be drawn in another thread."""
+    """One instant of one floor, complete for drawing in another thread."""
 
     meshes: tuple[Mesh, ...]
     ground: Ground
@@ -90,10 +90,10 @@ class Scene:
 
 
 class Scenery(Protocol):
-    """All that cameras may see of one world."""
+    """Scenery of one world for its cameras."""
 
     def instant(self, number: int, viewer: Hull, eye: Eye, /) -> Instant:
-        """Freeze what is before the eye on a floor now, the viewer itself left out."""
+        """Return the figures before the eye on a floor now, without the viewer."""
 
     def scene(self, instant: Instant, /) -> Scene:
-        """Make all there is to draw; may run in any thread."""
+        """Return everything to draw; may run in any thread."""

@@ -1,1 +1,1 @@
-"""Sound in the world: how it fades with distance and walls, and voices for texts."""
+"""Sound in the world: propagation, and voices for texts."""

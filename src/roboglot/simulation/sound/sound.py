@@ -1,4 +1,4 @@
-"""Sounds on their way through the world: fading with the distance, behind walls and slabs, late by the speed of sound.
+"""Propagation of sounds in the world: loss by distance, walls and slabs, delay by the speed of sound.
 
 Truth, world frame; knows no microphone and no clock. No echoes.
 """
@@ -27,7 +27,7 @@ LINGER = 2.0  # s after its end for which a sound may still arrive somewhere
 
 @dataclass(frozen=True, slots=True)
 class Speech:
-    """The words in a sound, and whose voice it is."""
+    """The words in a sound, and the voiceprint of the speaker."""
 
     text: str
     voice: bytes
@@ -35,7 +35,7 @@ class Speech:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Source:
-    """A sound that began at ``start`` (s) at a place, ``loudness`` times as loud as it was taken down."""
+    """A sound from ``start`` (s) on at a place; ``loudness``: factor of its amplitude at 1 m."""
 
     sound: Sound
     at: Point
@@ -47,7 +47,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """An utterance that has arrived whole: ``level`` and ``noise`` of it and of other sounds (int16 units, RMS)."""
+    """An utterance that has fully arrived; ``level``: its RMS, ``noise``: that of other sounds (int16 units)."""
 
     source: Source
     level: float
@@ -62,7 +62,7 @@ class Air:
         self._sources: list[Source] = []
 
     def emit(self, source: Source) -> None:
-        """Let it be heard. Raises ValueError when there are SOURCES_MAX at once."""
+        """Add a sound. Raises ValueError for more than SOURCES_MAX at once."""
         over = source.start - LINGER
         self._sources = [other for other in self._sources if other.start + other.sound.seconds > over]
         if len(self._sources) >= SOURCES_MAX:
@@ -75,7 +75,7 @@ class Air:
             self._sources.remove(source)
 
     def heard(self, at: Point, floor: int, start: float, count: int) -> NDArray[np.float64]:
-        """``count`` samples from ``start`` s on, as they arrive at a place, in int16 units."""
+        """Return ``count`` samples that arrive at a place from ``start`` s on, in int16 units."""
         mixed = np.zeros(count)
         for source in self._sources:
             distance = source.at.distance_to(at) + STOREY * abs(source.floor - floor)
@@ -87,7 +87,7 @@ class Air:
         return mixed
 
     def utterances(self, at: Point, floor: int, since: float, until: float) -> list[Heard]:
-        """Speech whose end arrives at a place after ``since`` and not after ``until`` (s), in that order."""
+        """Return speech whose end arrives at a place after ``since`` and until ``until`` (s), in order of arrival."""
         found = []
         for source in self._sources:
             distance = source.at.distance_to(at) + STOREY * abs(source.floor - floor)

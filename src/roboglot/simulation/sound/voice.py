@@ -1,4 +1,4 @@
-"""Voices for texts: a robot's is espeak-ng if that program is installed; without it there is none.
+"""Voices for texts: robots use espeak-ng, if it is installed, and are silent without it.
 
 People hum: syllables without words, the same on every machine.
 """
@@ -28,7 +28,7 @@ CJK = ("\u3400", "\u9fff")
 
 
 def speaking_time(text: str) -> float:
-    """Return the time that a person takes to say ``text``, s."""
+    """Return the time to say ``text``, s."""
     chinese = sum(CJK[0] <= letter <= CJK[1] for letter in text)
     return max(SHORTEST, chinese / SYLLABLES_PER_SECOND + (len(text) - chinese) / LETTERS_PER_SECOND)
 
@@ -43,7 +43,7 @@ def hummed(text: str, pitch: float) -> Sound:
 
 
 def spoken(text: str) -> Sound | None:
-    """``text`` as the installed program says it; None if there is none or it fails. Blocks meanwhile."""
+    """Return ``text`` spoken by the installed program; None if it is missing or fails. Blocks meanwhile."""
     program = shutil.which(PROGRAM)
     if program is None:
         return None
