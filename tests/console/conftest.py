@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, replace
+from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
@@ -20,8 +20,10 @@ from roboglot.console.desk import Desk
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 
-ADDRESS = f"127.0.92.{1 + int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])}"  # one per process
+ADDRESS = free_addresses(2)
+OTHER_ADDRESS = str(IPv4Address(ADDRESS) + 1)
 
 
 @dataclass(frozen=True, slots=True)

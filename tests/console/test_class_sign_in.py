@@ -19,7 +19,7 @@ from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig
 from roboglot.operations import Right
 from roboglot.shards.classes import FleetClasses
-from tests.console.conftest import ADDRESS, Shown
+from tests.console.conftest import ADDRESS, OTHER_ADDRESS, Shown
 from tests.console.test_classes import asked, grid, opened, world
 from tests.console.test_studio_socket import SAVE, Page
 
@@ -54,14 +54,13 @@ async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path, monkeypatch:
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     classes, asking = FleetClasses(tmp_path), AccessConfig(on=True, local=False)
     await classes.open()
-    other = ADDRESS.replace(".92.", ".93.")
     (tmp_path / "w1").mkdir()
     store = open_store(tmp_path / "w1")
     store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
     store.close()
     async with (
         world(tmp_path, "w1", ADDRESS, access=asking) as first,
-        world(tmp_path, "w2", other, access=asking) as second,
+        world(tmp_path, "w2", OTHER_ADDRESS, access=asking) as second,
     ):
         _, _, cookie = await signed(first, name="mx", password=PASSWORD)
         async with paged(first, cookie) as teacher:

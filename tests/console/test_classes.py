@@ -22,7 +22,7 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import Pose
 from roboglot.runtime import Runtime
 from roboglot.shards.classes import FleetClasses
-from tests.console.conftest import ADDRESS, Shown
+from tests.console.conftest import ADDRESS, OTHER_ADDRESS, Shown
 from tests.console.test_studio_socket import SAVE, Page, page
 
 OPEN = AccessConfig()
@@ -52,8 +52,7 @@ async def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterato
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     classes = FleetClasses(tmp_path)
     await classes.open()
-    address = ADDRESS.replace("127.0.92.", "127.0.93.")
-    async with world(tmp_path, "w1", ADDRESS) as first, world(tmp_path, "w2", address) as second:
+    async with world(tmp_path, "w1", ADDRESS) as first, world(tmp_path, "w2", OTHER_ADDRESS) as second:
         yield [first, second]
     await classes.close()
 
@@ -143,7 +142,7 @@ async def test_a_world_that_ends_leaves_the_class(tmp_path: Path, monkeypatch: p
     await classes.open()
     async with world(tmp_path, "w1", ADDRESS) as first, page(first) as teacher:
         code = await opened(teacher)
-        async with world(tmp_path, "w2", ADDRESS.replace(".92.", ".93.")) as second, page(second) as ben:
+        async with world(tmp_path, "w2", OTHER_ADDRESS) as second, page(second) as ben:
             await asked(teacher, do="join", code=code, name="Anna")
             await teacher.kind("joined")
             await asked(teacher, do="open", code=code)
