@@ -104,7 +104,7 @@ class Watched:
             self._halt()
 
     def _stepped(self, order: int, here: FrameType) -> bool:
-        """Return whether the step is done: OVER ends outside of calls, OUT also outside of its first function."""
+        """Return whether the step is done: OVER skips calls, OUT also the rest of the current function."""
         if order != self._order:
             self._order, self._origin = order, self._frame
         step = order & max(Step)

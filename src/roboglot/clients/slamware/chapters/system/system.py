@@ -33,7 +33,7 @@ class System(Chapter):
 
     @call("POST /api/core/system/v1/power/:hibernate")
     async def hibernate(self) -> None:
-        """Put the robot to sleep: lidar and motors are off until ``wakeup``."""
+        """Put the robot to sleep: the lidar rests and no motion is possible until ``wakeup``."""
 
     @call("POST /api/core/system/v1/power/:wakeup")
     async def wakeup(self) -> None:
