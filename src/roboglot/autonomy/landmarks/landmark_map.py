@@ -21,7 +21,7 @@ from roboglot.model.robot import Robot
 
 KEY = "laser_landmarks.updating"
 SURE = 0.5  # quality of localization from which strips are placed
-LOST_QUALITY, LOST_SECONDS = 0.2, 3.0  # quality below which known landmarks are searched, after so long
+LOST_QUALITY, LOST_SECONDS = 0.2, 3.0  # quality below which to search for known landmarks, after these s
 TURNING_MAX = 0.4  # rad/s beyond which directions are vague
 SIGHTINGS = 12  # at one place before it becomes a landmark
 NEAR = 0.3  # m between two sightings of one strip

@@ -38,7 +38,7 @@ class LowSight:
         from roboglot.kernels.depth import sort_out, sort_out_all  # it needs Numba
 
         self._robot, self._height, self._radius = robot, robot.description.height, robot.description.radius
-        self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # the newest image and what it showed
+        self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # the newest image and its points
         self._eyes: list[tuple[object, object]] = []  # rays and places of the zones' sensors at the last look
         self._rays, self._places = np.empty((0, 0, 0, 3)), np.empty((0, 3))  # … the same as arrays
         self._sort_out: Sorting = sort_out

@@ -181,7 +181,7 @@ def _alike(candidates: list[Candidate]) -> list[Candidate]:
     """Return the ``candidates`` (best first) that explain the scan about as well as the best one."""
     if not candidates:
         return []
-    first = candidates[0].said  # what distinguishes it from a rival may lie on unknown ground
+    first = candidates[0].said  # differences from a rival may lie on unknown ground
     least = first.agreement - RIVAL_SUPPORTED - (1.0 - first.known)
     alike = [one for one in candidates if one.match.fit >= RIVAL_FIT * candidates[0].match.fit]
     alike = [one for one in alike if one.said.agreement >= least]

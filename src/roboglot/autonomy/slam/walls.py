@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-WIDE = 0.9  # m; what is narrower may be a robot, or a person
+WIDE = 0.9  # m; anything narrower may be a robot or a person
 STRAIGHT = 0.06  # m off a line at most, noise included: the hull of a robot bends more over its width
 LINK, LINK_SHARE = 0.25, 0.1  # m, share of the distance, between neighbouring echoes of one surface
 

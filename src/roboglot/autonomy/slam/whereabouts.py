@@ -15,8 +15,8 @@ from roboglot.model.events import (
     RecoveryMeans,
 )
 
-DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # contradiction by the map: agreement below, in so many of the points
-DENIED_HIDDEN = 0.2  # … or so many rays pass through walls, which no crowd of people explains
+DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # contradiction by the map: agreement below, share of points above
+DENIED_HIDDEN = 0.2  # … or share of rays through walls, which no crowd explains
 GOOD_AGREEMENT, GOOD_SHARE = 0.8, 0.6  # confirmation by the map
 DOUBTS_MAX, DOUBT_SECONDS = 3, 1.5  # contradictions in a row, and their duration, before the pose is lost
 CONFIRMED = 5  # confirmations in a row before the pose is known again

@@ -14,9 +14,9 @@ from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.obstacles import without_things
 from roboglot.model.geometry import Point
 
-THING_CELLS = 20  # the size up to which what stands alone may be a person, or a robot
+THING_CELLS = 20  # largest single thing that may be a person or a robot
 FREE = np.int16(-1)
-GONE_NEAR = 0.1  # m around where a leg stood that is taken away: what the map shows there counts no more
+GONE_NEAR = 0.1  # m around the former place of a removed leg in which the map no longer counts
 
 
 def without_doubtful(grid: EvidenceGrid) -> NDArray[np.int16]:

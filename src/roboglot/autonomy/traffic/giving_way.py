@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 STANDS = 0.05  # m/s
 RULED_AFTER = 0.6  # s of standing in the way of a robot that goes first: a plan may lead around it meanwhile
-FACED_AFTER, FACED_MORE = 3.0, 4.0  # s of standing face to face with what may want to pass; partly by its name
+FACED_AFTER, FACED_MORE = 3.0, 4.0  # s of standing face to face; the second is scaled by the robot's name
 FACED_MAX = 10  # moves aside per drive for an object that may not want to pass
 ASIDE_MAX = 40  # per drive
 GO_SECONDS, STUCK_SECONDS = 10.0, 2.0

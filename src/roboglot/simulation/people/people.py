@@ -48,7 +48,7 @@ class Placed(Protocol):
     def y(self) -> float: ...
 
 
-Free = Callable[["Walker", Point], bool]  # whether they can walk straight to that place
+Free = Callable[["Walker", Point], bool]  # whether the person can walk straight to that place
 
 
 class Walker:
@@ -62,13 +62,13 @@ class Walker:
         self.emotion = person.emotion
         self.walking = False
         self.displaced = False  # whether they were moved since the last tick
-        self.aloud: list[Say | Clap] = []  # what they began to say or clap since the last fetch
+        self.aloud: list[Say | Clap] = []  # words and claps begun since the last fetch
         self._script = person.script or tuple(_strolling(person))
         self._number = 0
         self._orders: deque[Step] | None = None  # None: their own routine
         self.doing: Step | None = None
         self._elapsed = 0.0
-        self._idle = 0  # ticks to come in which they go on waiting; already part of what elapsed
+        self._idle = 0  # further ticks of a wait, already counted in ``_elapsed``
         self._way = self._waited = 0.0
         self._dodging: Point | None = None  # their destination while they let a robot pass
         path = [Point(*spot) for spot in person.path]
@@ -154,7 +154,7 @@ class Walker:
         doing, before = self.doing, self.pose
         if isinstance(doing, Walk):  # the most frequent step
             over = self._walk_on(doing, robots, seconds, free)
-        elif isinstance(doing, Wait):  # and what else they do much
+        elif isinstance(doing, Wait):  # also frequent
             over = self._wait(doing.seconds, seconds)
         else:
             over = self._do(seconds)

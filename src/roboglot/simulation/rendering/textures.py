@@ -201,7 +201,7 @@ def _cardboard() -> NDArray[np.float64]:
 
 
 def _letters(text: str) -> NDArray[np.float64]:
-    """Up to three characters, as large as fits."""
+    """Return up to three characters, as large as possible."""
     from PIL import Image, ImageDraw, ImageFont
 
     image = Image.new("L", (SIZE, SIZE))

@@ -20,7 +20,7 @@ from roboglot.simulation.world.description import Spot, WorldDescription
 CONTACT_GAP = 0.005  # m between hull and dock at start
 BESIDE = 0.3  # m between robots that start side by side
 SEARCH = 40.0  # m around the first robot
-SAME_ROOM = 5.0  # m around it that are searched for a good place
+SAME_ROOM = 5.0  # m around the first robot that are searched for a good place
 TOGETHER = 6  # robots that start side by side
 DOOR = 0.9  # m around a door's middle that a spread robot leaves free
 ROOM = 0.29, 0.15  # m around a spread robot, while such places exist

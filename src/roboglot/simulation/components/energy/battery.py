@@ -155,7 +155,7 @@ class SimulatedBattery(Battery):
     def sense(self, stamp: float, seconds: float) -> None:
         """Add or draw the energy of ``seconds``, then publish changes."""
         if self._published is None:
-            self._published = self._words()  # not charging yet: a robot that wakes up on its dock begins to charge now
+            self._published = self._words()  # not charging yet: a robot that starts on its dock begins to charge now
         load = self._load()
         docked = self._wire or (self._dock is not None and self._dock.docked)
         self._locked = self._temperature > (UNLOCK if self._locked else LOCK)

@@ -209,5 +209,5 @@ PART = Part(
     section=BaseSection,
     fit=_fit,
     control=SimulatedBase.control,
-    control_after=("legs", "gimbal"),  # they command what the base passes on
+    control_after=("legs", "gimbal"),  # their commands go through the base
 )
