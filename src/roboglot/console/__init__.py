@@ -1,4 +1,4 @@
-"""The console: pages and an interface over which people see, drive and understand robots in a browser.
+"""The console: pages to see, drive and understand robots in a browser, and their interface.
 
-Sees robots, the world's stage and the tap; knows no door's insides and no simulation.
+Knows robots, the world's stage and the tap; no internals of doors, no simulation.
 """

@@ -187,7 +187,7 @@ class Api:
                 raise _nothing_here()
 
     def _made_of(self) -> dict[str, object]:
-        """Return what a copy of the world is made from."""
+        """Return the world's name, seed and bodies, from which a copy can be built."""
         world = self._desk.world
         return {"world": world.name, "seed": world.seed, "bodies": dict(world.bodies)}
 

@@ -42,17 +42,17 @@ GOING_AWAY, BAD_DATA, POLICY, TRY_LATER = 1001, 1003, 1008, 1013
 
 
 class Application:
-    """One console's. ``pages`` and ``sessions`` (of the studio) are those open now."""
+    """Application of one console. ``pages`` and ``sessions`` (of the studio): the open ones."""
 
     def __init__(self, desk: Desk, browsers: Browsers, classroom: Classroom | None, login: Sessions, page: str) -> None:
-        """``classroom``: the one of this program; without it the one of ``desk.studio.home``. ``page``: our address."""
+        """``classroom``: this program's own; None: the one at ``desk.studio.home``. ``page``: our address."""
         self._desk, self._browsers = desk, browsers
         self._assets = Assets()
         self.pages: set[Page] = set()
         self.sessions: set[Session] = set()
         self._ending: set[asyncio.Task[None]] = set()  # classes that are ending
         self._classroom = self._enter_classroom(classroom, page)
-        self._listening: dict[asyncio.Task[None], str] = {}  # and the page's client
+        self._listening: dict[asyncio.Task[None], str] = {}  # by task: the page's client
         self._login = login
         self._classes = Classes(desk, self._classroom, self._stop, self._listening.values, self._put_out)
         for left in login.all():
@@ -65,7 +65,7 @@ class Application:
         self._metrics: Metrics | None = None  # from the first scrape onwards
 
     async def close(self) -> None:
-        """Hang up on the pages' video calls and the classroom, and stop counting."""
+        """Close the pages' video calls, the link to the classroom and the metrics."""
         if isinstance(self._classroom, LinkedRoom):
             await self._classroom.end()
         if self._metrics is not None:
@@ -131,7 +131,7 @@ class Application:
         await answer(send, 200, metrics.content_type, metrics.text(), [(b"cache-control", b"no-store")])
 
     async def metrics(self) -> Metrics:
-        """Return what counts, from the first call on. Raises MissingExtra."""
+        """Return the metrics, which count from the first call on. Raises MissingExtra."""
         if self._metrics is None:
             with explaining("/metrics", "console"):
                 module = await load(lambda: import_module("roboglot.console.metrics"))
@@ -164,7 +164,7 @@ class Application:
         await answer(send, 200, asset.content_type.encode(), body, more)
 
     async def _knows(self, scope: Scope) -> bool:
-        """Return whether the client may come in; else the log-in page comes first."""
+        """Return whether the client is admitted; if not, the log-in page is shown first."""
         try:
             await enter(self._desk, self._login, scope)
         except Unknown:
@@ -193,7 +193,7 @@ class Application:
             await self._talk(page, self.pages, MESSAGE_MAX, receive, send)
 
     async def _talk(self, page: P, pages: set[P], longest: int, receive: Receive, send: Send) -> None:
-        """Keep a page among ``pages`` for as long as its socket is open."""
+        """Serve a page, listed in ``pages`` while its socket is open; ``longest``: bytes of a message."""
         pages.add(page)
         sending = asyncio.get_running_loop().create_task(page.run(), name="console page")
         listening = asyncio.get_running_loop().create_task(_listen(page, longest, receive), name="console wishes")

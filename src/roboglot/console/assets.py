@@ -1,4 +1,4 @@
-"""The pages' files, read once, compressed once, with a tag so that a browser asks for them only once."""
+"""The pages' files, read and compressed once, with a tag so that browsers fetch them only once."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _INLINE = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """One file: what it is, plain and packed."""
+    """One file: its type, plain and compressed content."""
 
     content_type: str
     plain: bytes
@@ -66,7 +66,7 @@ def _tag(plain: bytes) -> str:
 
 @cache
 def _studio_files() -> Asset:
-    """The list of what the studio needs: its files and those it shares with the console, and two answers."""
+    """Return the list of the studio's paths: its files, those shared with the console, and two answers."""
     console = ("/views/", "/app.js", "/index.html", "/studio/index.html", "/fleet/")
     paths = [path for path in _paths() if path not in ("/", "/studio") and not path.startswith(console)]
     plain = json.dumps([*paths, "/api/blocks", "/api/lessons"]).encode()
@@ -74,22 +74,22 @@ def _studio_files() -> Asset:
 
 
 class Assets:
-    """All files below ``web``, by path ("/app.js"); "/" is the page itself. Each is read when it is first asked for."""
+    """All files below ``web``, by path ("/app.js"); "/" is the page itself. Each is read at its first use."""
 
     def find(self, path: str) -> Asset | None:
-        """The file at ``path``."""
+        """Return the file at ``path``; None if there is none."""
         if path == STUDIO_FILES:
             return _studio_files()
         found = _paths().get(path)
         return None if found is None else _read(found)
 
     def all(self) -> Iterator[tuple[str, Asset]]:
-        """Every path and its file."""
+        """Yield every path with its file."""
         return ((path, _read(file)) for path, file in _paths().items())
 
     @cached_property
     def policy(self) -> bytes:
-        """The Content-Security-Policy: nothing from elsewhere, no inline script but the import map, by its hash."""
+        """The Content-Security-Policy: no foreign content, no inline script but the import map, by its hash."""
         inline = _INLINE.search(_read(_paths()["/"]).plain)
         digest = base64.b64encode(hashlib.sha256(inline[1] if inline else b"").digest()).decode()
         return (

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 BOUNDARY = b"roboglot-frame"
-SIZE_UNKNOWN = 0xFFFFFFFF  # of a WAV file: players read on to the end
+SIZE_UNKNOWN = 0xFFFFFFFF  # length of an endless WAV file
 ENDLESS_WAV = struct.pack(  # one channel of 16 bits
     "<4sI4s4sIHHIIHH4sI",
     *(b"RIFF", SIZE_UNKNOWN, b"WAVE", b"fmt ", 16, 1, 1, SAMPLE_RATE, 2 * SAMPLE_RATE, 2, 16, b"data", SIZE_UNKNOWN),
@@ -42,14 +42,14 @@ ENDED = ("failed", "closed", "blind")  # states of a finished call
 
 
 async def send_photo(robot: Robot, send: Send) -> None:
-    """Answer with a picture of this moment."""
+    """Answer with a new photo."""
     frame = await robot[Camera].capture()
     picture = await background.beside(partial(jpeg, frame, JPEG_QUALITY))
     await answer(send, 200, b"image/jpeg", picture, [(b"cache-control", b"no-store")])
 
 
 async def send_film(robot: Robot, receive: Receive, send: Send) -> None:
-    """Send motion JPEG until the client goes; one that reads slowly misses pictures."""
+    """Send motion JPEG until the client disconnects; a slow reader misses pictures."""
     camera = robot[Camera]
     kind = b"multipart/x-mixed-replace; boundary=" + BOUNDARY
     headers = [(b"content-type", kind), (b"cache-control", b"no-store")]
@@ -70,7 +70,7 @@ async def send_film(robot: Robot, receive: Receive, send: Send) -> None:
 
 
 async def send_sound(robot: Robot, receive: Receive, send: Send) -> None:
-    """Send what the microphone hears as a WAV file without an end, until the client goes."""
+    """Send the microphone's sound as an endless WAV file, until the client disconnects."""
     gone = asyncio.ensure_future(_left(receive))
     with robot[Microphone].subscribe() as viewer:
         gone.add_done_callback(lambda _: viewer.close())
@@ -100,7 +100,7 @@ class Calls:
         self._closing: set[asyncio.Task[None]] = set()
 
     async def answer(self, robot: Robot, offer: str) -> str:
-        """Return the SDP that answers a page's ``offer`` of video and sound. Raises Problem, Busy, ComponentMissing."""
+        """Return the SDP answer to a page's ``offer`` of video and sound. Raises Problem, Busy, ComponentMissing."""
         stream = robot[VideoStream]
         if len(self._calls) >= CALLS_MAX:
             raise Busy(f"{CALLS_MAX} pages show live video already")
@@ -120,7 +120,7 @@ class Calls:
             raise Problem(400, f"the offer cannot be answered: {bad}") from None
 
     def _look_after(self, robot: Robot, call: VideoCall) -> None:
-        """Hang up once the client that called may not see the robot any more; runs in that client's context."""
+        """Hang up when the caller loses the right to see the robot; runs in the caller's context."""
         if call not in self._calls:
             return
         if robot.admission.may(Right.SEE):
@@ -157,7 +157,7 @@ class Sightings:
         self._viewers: list[Viewer[Any]] = []
 
     def open(self) -> None:
-        """Switch the detectors on."""
+        """Switch the detectors on; no effect if they are on."""
         if Vision not in self._robot or self._viewers:
             return
         vision = self._robot[Vision]
@@ -168,14 +168,14 @@ class Sightings:
                 self._viewers.append(detector.subscribe())
 
     def close(self) -> None:
-        """Switch them off, unless another client looks."""
+        """Release the detectors, which go off unless another client uses them."""
         for viewer in self._viewers:
             viewer.close()
         self._viewers = []
 
     @property
     def boxes(self) -> list[list[object]]:
-        """[kind, label, x, y, width, height] of each, as shares of the picture; x, y: the middle."""
+        """[kind, label, x, y, width, height] of each detection, in fractions of the picture; x, y: centre."""
         if not self._viewers:
             return []
         return [[kind, label, *_rounded(box)] for kind, label, box in _seen(self._robot[Vision])]

@@ -1,4 +1,4 @@
-"""An exchange as a line for a terminal or as Python: what a client would send to have the same done again."""
+"""An exchange as a line for a terminal or as Python code that repeats it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FORMS = {
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A REST request as the tap keeps it: method, path with its query, body."""
+    """A REST request from the tap: method, path with query, body."""
 
     method: str
     path: str
@@ -36,9 +36,9 @@ class Request:
 
 
 def copy(exchange: Exchange, form: str, endpoint: Endpoint) -> str:
-    """``exchange`` for a client of the door at ``endpoint``.
+    """Return ``exchange`` in ``form`` for a client of the door at ``endpoint``.
 
-    Raises InvalidGoal for what is no request, and for a form that the door has not.
+    Raises InvalidGoal for an exchange that is no request, and for a form that the door lacks.
     """
     if exchange.direction is not Direction.REQUEST:
         raise InvalidGoal("only a request can be sent again")
@@ -65,7 +65,7 @@ def copy(exchange: Exchange, form: str, endpoint: Endpoint) -> str:
 
 
 def rest(payload: bytes) -> Request:
-    """Take a REST request apart."""
+    """Split a REST request."""
     head, _, body = payload.partition(b"\n\n")
     method, _, path = head.decode("utf-8", "replace").partition(" ")
     return Request(method, path, body)
@@ -91,7 +91,7 @@ def _rest_python(request: Request, address: str) -> str:
 
 
 def _sdk(exchange: Exchange) -> str:
-    """The command, in SDK mode: the robot hears no other before ``command;``."""
+    """Return the command, preceded by ``command;``, which enters SDK mode."""
     text = readable(exchange.payload).strip().rstrip(";")
     return "command;" if text == "command" else f"command;{text};"
 

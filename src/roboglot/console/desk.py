@@ -1,4 +1,4 @@
-"""Desk: the parts that the console is given, and the way of every request of a page or a script."""
+"""Desk: the console's parts, and the common path of all requests of pages and scripts."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 
 CLIENT = "console"
 COMMAND = "command"  # the kind of recorded inputs for commands
-TAKE = "take_control"  # handled apart because it concerns the caller
+TAKE = "take_control"  # handled separately because it concerns the caller
 assert map_verbs  # importing it registers its verbs
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """World of the robots: name, version of roboglot, clock, the seed that it was built with, their bodies."""
+    """World of the robots: name, version of roboglot, clock, initial seed, bodies."""
 
     name: str
     version: str
@@ -47,7 +47,7 @@ class World:
 
 @dataclass(slots=True)
 class Desk:
-    """One console's. ``doors``: where each robot's doors listen. ``running``: how many programs run now."""
+    """Desk of one console. ``doors``: endpoints of each robot's doors. ``running``: number of running programs."""
 
     world: World
     robots: Mapping[str, Robot]
@@ -56,7 +56,7 @@ class Desk:
     studio: Studio = field(default_factory=Studio)
     running: Callable[[], int] = lambda: 0
     recordings: Recordings | None = None
-    sessions: Path | None = None  # the file of signed-in browsers, where names are asked for
+    sessions: Path | None = None  # file of signed-in browsers, with access control
     views: dict[str, RobotView] = field(init=False)
     pupils: set[str] = field(default_factory=set)  # identities of the pupils in the open class
     locked: set[str] = field(default_factory=set)  # robots that only a teacher may move
@@ -66,7 +66,7 @@ class Desk:
 
     @property
     def visible(self) -> dict[str, RobotView]:
-        """The robots that the client who is asked for may see, by name."""
+        """Views of the robots that the current client may see, by name."""
         return {name: view for name, view in self.views.items() if view.robot.admission.may(Right.SEE)}
 
     def view(self, name: str, verb: str = "look") -> RobotView:
@@ -79,23 +79,23 @@ class Desk:
 
     @property
     def may_teach(self) -> bool:
-        """True if the current client may do everything with every robot, and is no pupil."""
+        """True if the current client has ADMIN on every robot and is no pupil."""
         return identity() not in self.pupils and self.may_change_world
 
     @property
     def may_change_world(self) -> bool:
-        """True if the current client may do everything with every robot."""
+        """True if the current client has ADMIN on every robot."""
         return all(robot.admission.may(Right.ADMIN) for robot in self.robots.values())
 
     def check(self, robot: Robot, verb: str, right: Right | None) -> None:
-        """Raise Forbidden unless the client who is asked for may do ``verb`` with a robot now."""
+        """Raise Forbidden unless the current client may do ``verb`` with the robot now."""
         robot.admission.check(CLIENT, verb, right)
         if robot.id in self.locked and right is not Right.SEE and not self.may_teach:
             raise Forbidden(f"the teacher has locked robot {robot.id}")
 
     @property
     def pace(self) -> dict[str, object]:
-        """Pace of time: ``speed``, ``paused``, ``lockstep`` if a program moves the clock; the world's ``seed``."""
+        """Pace of time: ``speed``, ``paused``, ``lockstep`` (True if a program advances the clock), and ``seed``."""
         clock, seed = self.world.clock, self.stage.seed
         if not isinstance(clock, RealClock):
             return {"lockstep": True, "speed": 1.0, "paused": False, "seed": seed}
@@ -139,7 +139,7 @@ class Desk:
         return [right for right in Right if robot.admission.may(right)]
 
     async def command(self, name: str, verb: str, values: Mapping[str, object], client: str) -> Any:
-        """Have a robot do something. Raises NotFound, BadParameters and what the robot raises."""
+        """Call a robot's verb and return its result. Raises NotFound, BadParameters and the robot's errors."""
         robot = self.view(name, verb).robot
         if verb == TAKE:
             self.check(robot, verb, Right.DRIVE)
@@ -161,14 +161,14 @@ class Desk:
 
     @contextlib.contextmanager
     def noting(self, what: str) -> Iterator[None]:
-        """Keep what becomes of something that concerns all robots."""
+        """Context that audits the outcome of an operation on all robots."""
         with contextlib.ExitStack() as stack:
             for robot in self.robots.values():
                 stack.enter_context(robot.admission.noting(CLIENT, what))
             yield
 
     def world_file(self) -> str:
-        """Return the simulated world as it stands now, as a file. Raises Forbidden."""
+        """Return the current state of the simulated world as a world file. Raises Forbidden."""
         for robot in self.robots.values():
             robot.admission.check(CLIENT, "save the world", Right.SEE)
         return self.stage.world_file()

@@ -16,7 +16,7 @@ NAMES = ("display_name", "name", "title")  # metadata keys under which doors kee
 
 
 def drawings_of(robot: Robot) -> dict[str, object]:
-    """Places, walls, tracks, areas and docks of the map in use."""
+    """Return places, walls, tracks, areas and docks of the map in use."""
     places = robot[Places].all() if Places in robot else ()
     drawn = robot[MapAnnotations].current if MapAnnotations in robot else Annotations()
     return {
@@ -28,12 +28,12 @@ def drawings_of(robot: Robot) -> dict[str, object]:
 
 
 def name_of(id: str, metadata: dict[str, str]) -> str:
-    """Return people's name for a place; its id if it has none."""
+    """Return the name of a place; its id if it has none."""
     return next((metadata[key] for key in NAMES if metadata.get(key)), id)
 
 
 def plans_of(stage: Stage) -> list[dict[str, object]]:
-    """The building's floors, in the world's frame."""
+    """Return the building's floors, in the world's frame."""
     return [
         {
             "number": plan.number,
@@ -61,7 +61,7 @@ def truth_of(stage: Stage) -> dict[str, object]:
 
 
 def anchor_of(robot: Robot, stage: Stage) -> Pose | None:
-    """Return the map's pose in the world, if the robot stands where it believes; None for real robots."""
+    """Return the map's pose in the world, assuming a correct pose estimate; None for real robots."""
     true = next((r.pose for r in stage.robots if r.name == robot.id), None)
     believed = whereabouts(robot)
     if true is None or believed is None:
@@ -70,9 +70,9 @@ def anchor_of(robot: Robot, stage: Stage) -> Pose | None:
 
 
 def whereabouts(robot: Robot) -> Pose | None:
-    """Return the pose that the robot believes in; None if it knows none, or was never heard.
+    """Return the robot's estimated pose; None if it has none, or was never connected.
 
-    A robot that cannot localize itself reckons from where it woke up, which is where its map would begin.
+    A robot without localization uses odometry from its start, the origin of its map.
     """
     if not was_heard(robot):
         return None

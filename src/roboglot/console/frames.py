@@ -1,4 +1,4 @@
-"""Binary messages to pages: a scan, a map, a path. A head in JSON says what follows it.
+"""Binary messages to pages: a scan, a map, a path, each after a head in JSON.
 
 Layout: the head's length (u16, little endian), the head, the payload. Heads carry ``kind`` and ``robot``.
 """
@@ -28,7 +28,7 @@ def framed(head: dict[str, object], payload: bytes) -> bytes:
 
 
 def scan_frame(robot: str, scan: LaserScan, base: Pose) -> bytes:
-    """A turn of the lidar; ``base`` is base_link in map at that moment. Payload: ranges in mm, u16."""
+    """Return a frame of one scan; ``base``: pose of base_link in map at its time. Payload: ranges in mm, u16."""
     near = np.isfinite(scan.ranges) & (scan.ranges < SCAN_MAX_METERS)
     millimeters = np.where(near, np.nan_to_num(scan.ranges, posinf=0.0, neginf=0.0) * 1000.0, FAR).astype("<u2")
     head = {
@@ -49,7 +49,7 @@ def path_frame(robot: str, path: Path) -> bytes:
 
 
 def map_frame(robot: str, revision: int, grid: OccupancyGrid) -> bytes:
-    """The map. Payload: a byte a cell (UNKNOWN, FREE, OCCUPIED), rows from the smallest y, deflated (zlib)."""
+    """Return a frame of the map. Payload: bytes UNKNOWN, FREE or OCCUPIED, rows from the smallest y on, zlib."""
     cells = np.where(grid.log_odds > 0, OCCUPIED, np.where(grid.log_odds < 0, FREE, UNKNOWN)).astype(np.uint8)
     head = {
         "kind": "map",

@@ -1,4 +1,4 @@
-"""The few words of ASGI that the console needs: a request's body, an answer, a problem."""
+"""The parts of ASGI that the console needs: a request's body, an answer, a problem."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SAFETY: Rows = [
 
 
 class Problem(Exception):
-    """A request that is not done: the status, and why in plain words."""
+    """A refused or failed request: the status, and the reason in plain words."""
 
     def __init__(self, status: int, why: str) -> None:
         super().__init__(why)
@@ -32,7 +32,7 @@ class Problem(Exception):
 
 
 async def read_json(receive: Receive) -> Mapping[str, object]:
-    """The body as a JSON object; empty for none. Raises Problem."""
+    """Return the body as a JSON object; empty without a body. Raises Problem."""
     body = b""
     while True:
         message = await receive()

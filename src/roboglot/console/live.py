@@ -1,6 +1,6 @@
-"""The socket of one page: what it shows goes out, newest first and never twice; what the person wishes comes in.
+"""The socket of one page: sends changed data, the newest only, and receives the person's requests.
 
-A page that reads too slowly loses frames: each kind of message waits in one place, where the next one replaces it.
+A slow page misses frames: each kind of message has one slot, in which the next one replaces it.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ class Hello(msgspec.Struct, tag="hello", tag_field="type"):
 
 
 class Watch(msgspec.Struct, tag="watch", tag_field="type"):
-    """Robot that the page shows; with its wire, with the truth, and with its camera's detections.
+    """Robot that the page shows; flags for its wire, the truth, and its camera's detections.
 
-    ``moving``: the page draws the robot: it gets scan, path and map, and poses at each beat instead of each second.
+    ``moving``: the page draws the robot, so it gets scan, path and map, and poses at each beat instead of each second.
     """
 
     robot: str
@@ -54,7 +54,7 @@ class Watch(msgspec.Struct, tag="watch", tag_field="type"):
 
 
 class Wish(msgspec.Struct, tag="do", tag_field="type"):
-    """A command; ``robot`` empty: about the world. It is answered under ``id``."""
+    """A command; ``robot`` empty: to the world. The answer carries ``id``."""
 
     id: int
     verb: str
@@ -72,7 +72,7 @@ Message = Hello | Watch | Wish | Ping | Velocity
 
 
 def milliseconds() -> float:
-    """The server's time for stamps."""
+    """Return the server's time for stamps, ms."""
     return round(time.monotonic() * 1000.0, 1)
 
 
@@ -80,7 +80,7 @@ class Page:
     """One open page."""
 
     def __init__(self, desk: Desk, send: Send, named: str) -> None:
-        """``named``: the client's proven identity; if it is empty, the client may choose any name."""
+        """``named``: the client's proven identity; empty: the client may choose a name."""
         self._desk, self._send, self._named = desk, send, named
         self._source = f"{CLIENT} page {next(_numbers)}"
         self._client = client()
@@ -116,16 +116,16 @@ class Page:
 
     @property
     def moving(self) -> bool:
-        """Draws a robot that moves: it is to look again as often as possible."""
+        """True if the page draws a robot and needs updates as often as possible."""
         return self._watch.moving
 
     def beat(self, number: int) -> None:
-        """Look again for news; a page that still sends skips this one."""
+        """Trigger an update; a page that is still sending skips it."""
         self._beat = number
         self._due.set()
 
     async def _show(self, before: int, beat: int) -> None:
-        """Send what changed; ``before``: the beat that was shown last."""
+        """Send changed data; ``before``: number of the last shown beat."""
 
         def due(beats: int) -> bool:
             return before // beats != beat // beats
@@ -172,7 +172,7 @@ class Page:
                 await self._send(frame)
 
     async def _show_wire(self, view: RobotView) -> None:
-        first = not self._wire_at  # a page that is opened late gets the whole history
+        first = not self._wire_at  # a new page gets the whole history
         new = view.wire.after(self._wire_at, WIRE_MAX if first else BATCH_MAX)
         for batch in (new[start : start + BATCH_MAX] for start in range(0, len(new), BATCH_MAX)):
             if view is not self._watched:
@@ -187,7 +187,7 @@ class Page:
     # -- in ------------------------------------------------------------------------------------------------------------
 
     def receive(self, text: str | bytes) -> None:
-        """Do what the page says. Raises ValueError for what is no message, or for too many."""
+        """Handle a message of the page. Raises ValueError for a bad message, or for too many."""
         now = time.monotonic()
         self._allowance += (now - self._counted_at) * MESSAGES_PER_SECOND_MAX
         self._allowance, self._counted_at = min(self._allowance, 2.0 * MESSAGES_PER_SECOND_MAX) - 1.0, now
@@ -276,7 +276,7 @@ class Page:
         self._due.set()
 
     def close(self) -> None:
-        """The page is gone: what it drives stops; commands that were accepted go on."""
+        """Close the page: its manual driving stops; accepted commands go on."""
         for pad in self._pads.values():
             pad.let_go("the page that drove is gone")
         self._look_at(Watch(""))

@@ -1,7 +1,7 @@
-"""``/metrics``: what robots and their doors do, in Prometheus's text format (docs/metrics.md lists every name).
+"""``/metrics``: figures of robots and their doors, in Prometheus's text format (docs/metrics.md lists every name).
 
-Requests are counted from the first scrape on: until someone scrapes, the tap costs nothing. Labels come from robots,
-doors and contracts, never from what a client sends.
+Requests are counted from the first scrape on; before, the tap costs nothing. Labels come from robots, doors and
+contracts, never from clients' data.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ disable_created_metrics()  # type: ignore[no-untyped-call]  # a second series fo
 
 
 class Metrics:
-    """Counts what all robots of one desk do."""
+    """Metrics of all robots of one desk."""
 
     content_type = CONTENT_TYPE_PLAIN_0_0_4.encode()
 
@@ -64,7 +64,7 @@ class Metrics:
         return generate_latest(self._registry)
 
     def families(self) -> Iterator[Metric]:
-        """Return all values, as they are now."""
+        """Return all current values."""
         return iter(self._registry.collect())
 
     def close(self) -> None:
@@ -136,7 +136,7 @@ class _Now(Collector):
         yield from (running, battery, up, age)
 
     def _pace(self) -> float:
-        """Robot time over real time since the last scrape."""
+        """Return robot time over real time since the last scrape."""
         now = (self._desk.world.clock.time(), time.perf_counter())
         robot, real = now[0] - self._last[0], now[1] - self._last[1]
         if real > 0:

@@ -71,7 +71,7 @@ def _verb(operation: Operation[str], parameters: list[dict[str, object]]) -> dic
 
 
 def _inlined(schema: object, components: dict[str, object]) -> object:
-    """The schema without references."""
+    """Return the schema with its references inlined."""
     if isinstance(schema, dict):
         if "$ref" in schema:
             return _inlined(components[schema["$ref"].rpartition("/")[2]], components)

@@ -1,4 +1,4 @@
-"""Metrics pushed to a collector by OTLP over HTTP, as protobuf: the same values that ``/metrics`` has.
+"""Metrics pushed to a collector by OTLP over HTTP, as protobuf: the same values as in ``/metrics``.
 
 Chapter "OTLP/HTTP" of https://opentelemetry.io/docs/specs/otlp/. The messages are those of opentelemetry-proto.
 """
@@ -27,7 +27,7 @@ from roboglot.console.metrics import Metrics
 from roboglot.transport.seldom import Seldom
 
 log = logging.getLogger(__name__)
-SECONDS = 5.0  # for the collector's answer
+SECONDS = 5.0  # s for the collector's answer
 
 
 class Pusher:
@@ -40,7 +40,7 @@ class Pusher:
         self._seldom = Seldom(log)
 
     async def run(self) -> None:
-        """Push until cancelled; a collector that does not answer costs one line in the log now and then."""
+        """Push until cancelled; failures of the collector are logged now and then."""
         while True:
             await asyncio.sleep(self._period)
             data = encode(self._metrics.families(), self._began, time.time_ns())
@@ -97,7 +97,7 @@ def _number(sample: Sample, began: int, now: int) -> NumberDataPoint:
 
 
 def _histograms(samples: Iterable[Sample], began: int, now: int) -> list[HistogramDataPoint]:
-    """Return a point for each set of labels; Prometheus counts its buckets up, OTLP each by itself."""
+    """Return a point for each set of labels; Prometheus's buckets are cumulative, OTLP's are not."""
     points: dict[tuple[tuple[str, str], ...], HistogramDataPoint] = {}
     below: dict[tuple[tuple[str, str], ...], float] = {}
     for sample in samples:

@@ -1,4 +1,4 @@
-"""One program for each robot that scripts and agents run: a task like any other, with its own id."""
+"""The program that scripts and agents run, one per robot: an ordinary task with its own id."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LINES_MAX = 200  # newest log lines in an answer
 
 
 async def start(desk: Desk, name: str, source: str) -> dict[str, object]:
-    """Save ``source`` and run it now; what ran before must have ended. Raises NotFound, Forbidden, ProgramError."""
+    """Save ``source`` and run it now; the former run must have ended. Raises NotFound, Forbidden, ProgramError."""
     programs = _programs(desk, name, Right.PROGRAM)
     if not 0 < len(source) <= SOURCE_MAX:
         raise ValueError(f"a program has 1 to {SOURCE_MAX} characters")
@@ -47,7 +47,7 @@ async def debug(programs: Programs, text: str) -> str:
 
 
 async def program(desk: Desk, name: str) -> dict[str, object]:
-    """Return its state and the end of its log. Raises NotFound, Forbidden."""
+    """Return the program's state and the end of its log. Raises NotFound, Forbidden."""
     service = _programs(desk, name, Right.SEE).service
     tasks = await service.tasks([TASK])
     log = await service.log(TASK) if tasks else []

@@ -1,4 +1,4 @@
-"""The recording of the running program: begun, marked and ended from a page, into the data folder alone."""
+"""The recording of the running program: begun, marked and ended from a page, only in the data folder."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ FOLDER = "recordings"  # in the data folder
 
 
 class RecordingWish(msgspec.Struct, forbid_unknown_fields=True):
-    """Request of a person; ``text``: a mark's words."""
+    """Request of a person; ``text``: text of a mark."""
 
     do: Literal["start", "stop", "mark"]
     text: Annotated[str, msgspec.Meta(max_length=500)] = ""
 
 
 class Recordings:
-    """Recordings of all robots of one program; so they need the right to admin on all robots."""
+    """Recordings of all robots of one program, which need the right ADMIN on all robots."""
 
     def __init__(self, data: Path, recorder: Callable[[], Recorder]) -> None:
         self._folder, self._recorder = data / FOLDER, recorder
 
     @property
     def on(self) -> bool:
-        """True while everything that robots say, hear, see and do is being written to a file."""
+        """True while all robots are being recorded to a file."""
         return self._recorder().status.on
 
     def look(self) -> dict[str, object]:
-        """Return the progress; files by their names, not by where they are."""
+        """Return the progress; files by name, without their folders."""
         status = self._recorder().status
         return {
             "on": status.on,
@@ -47,7 +47,7 @@ class Recordings:
         }
 
     async def do(self, wish: RecordingWish) -> dict[str, object]:
-        """Begin, mark or end it. Raises Refused."""
+        """Begin, mark or end the recording. Raises Refused."""
         recorder = self._recorder()
         match wish.do:
             case "start":

@@ -1,4 +1,4 @@
-"""Sends a request that was seen on the wire to its door again, as a client of its own over a real socket."""
+"""Sends a recorded request to its door again, as a separate client over a real socket."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _holding: set[asyncio.Task[None]] = set()
 
 
 async def resend(exchange: Exchange, endpoint: Endpoint) -> Sequence[tuple[str, str]]:
-    """Return (status, answer) of each answer to ``exchange``, sent to ``endpoint`` again.
+    """Send ``exchange`` to ``endpoint`` again; return (status, answer) of each answer.
 
-    The connection stays for ``RESEND_HOLD`` s: what it had the robot do ends with it. Raises InvalidGoal for what
-    cannot be sent, Busy for too many at a time, Unconnected where the door gave no answer.
+    The connection stays open for ``RESEND_HOLD`` s, as its actions end with it. Raises InvalidGoal for an exchange that
+    cannot be sent, Busy for too many at a time, Unconnected without an answer.
     """
     if exchange.direction is not Direction.REQUEST:
         raise InvalidGoal("only a request can be sent again")

@@ -39,7 +39,7 @@ LIBRARIES = ("uvicorn.protocols.http.httptools_impl", "uvicorn.protocols.websock
 
 
 class Console:
-    """Console of all robots of one program. ``port`` is the one it got, 0 while it is closed."""
+    """Console of all robots of one program. ``port``: the bound one, 0 while closed."""
 
     def __init__(self, desk: Desk, config: ConsoleConfig, tls: Tls | None = None) -> None:
         self._desk, self._config, self._tls = desk, config, tls
@@ -61,7 +61,7 @@ class Console:
     def open(self) -> None:
         """Bind the port, or the next free one, and get ready in the background. No console is no reason to fail.
 
-        Raises MissingExtra where metrics are to be pushed and cannot.
+        Raises MissingExtra if metrics are to be pushed and their package is missing.
         """
         if self._config.otlp and not is_there("opentelemetry.proto"):
             raise MissingExtra(in_words("[console] otlp", ["opentelemetry-proto"], "otlp"))
@@ -76,7 +76,7 @@ class Console:
         self._tasks.append(asyncio.get_running_loop().create_task(self._serve(self._socket), name="console"))
 
     async def ready(self) -> None:
-        """Wait until it answers."""
+        """Wait until the console answers."""
         await self._tasks[0]
 
     async def _serve(self, listening: socket.socket) -> None:
@@ -124,7 +124,7 @@ class Console:
         return Classroom(ClassFiles(folder)) if folder is not None and self._desk.studio.home is None else None
 
     def _open_sessions(self) -> Sessions:
-        """Return the sessions that a former program left, or none if they cannot be read."""
+        """Return the stored sessions; an empty set, with a log line, if they cannot be read."""
         from roboglot.console.people.session_file import SessionFile
         from roboglot.console.people.sessions import Sessions
 
@@ -147,7 +147,7 @@ class Console:
         await otlp.Pusher(await application.metrics(), self._config.otlp, self._config.otlp_period).run()
 
     async def _beat(self, application: Application) -> None:
-        """Have the pages look again, many in turns; robots are read only while a page is open."""
+        """Trigger the pages' updates, many pages in turns; robots are read only while a page is open."""
         number = 0
         while True:
             await asyncio.sleep(BEAT)
@@ -188,7 +188,7 @@ class Console:
 
 
 def those_due(pages: Sequence[Page], number: int) -> list[Page]:
-    """Pages that look again at a beat: of those that draw a moving robot at most BEAT_PAGES, in turns."""
+    """Return the pages to update at a beat: at most BEAT_PAGES, in turns, of those that draw a moving robot."""
     drawing = [page for page in pages if page.moving]
     turns = math.ceil(len(drawing) / BEAT_PAGES)
     taken = [page for place, page in enumerate(drawing) if (number + place) % turns == 0]
@@ -196,13 +196,13 @@ def those_due(pages: Sequence[Page], number: int) -> list[Page]:
 
 
 def _load() -> None:
-    """Import what takes a while, off the loop."""
+    """Import slow libraries; call it off the loop."""
     for library in LIBRARIES:
         importlib.import_module(library)
 
 
 def bound(address: str, first: int) -> socket.socket:
-    """A socket that listens on ``first``, or on the next free port. Raises OSError."""
+    """Return a socket bound to port ``first`` or the next free one. Raises OSError."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     for port in range(first, first + (PORTS_TRIED_MAX if first else 1)):
         listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)  # asyncio then sets TCP_NODELAY

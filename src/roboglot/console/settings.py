@@ -1,4 +1,4 @@
-"""Limits of the console. What comes from outside is hostile: each length, rate and count has an end."""
+"""Limits of the console. Input is treated as hostile: each length, rate and count is limited."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ JOIN_TRIES = 10  # wrong class codes per minute from one address
 JOIN_BURST = 60  # wrong codes at once on pages: a whole class may return at the same moment
 WISHES_MAX = 32  # commands of one page in progress
 CALLS_MAX = 8  # pages that show live video by WebRTC
-CALL_SECONDS = 20.0  # for such a call to connect
+CALL_SECONDS = 20.0  # s for such a call to connect
 REVOKED_SECONDS = 0.5  # between two checks whether a caller may still see the robot
 OFFER_MAX = 64 * 1024  # characters in a page's call offer
 JPEG_QUALITY = 75
@@ -26,11 +26,11 @@ MAP_SECONDS = 1.0  # minimum between two maps
 DEAD_MAN = 0.3  # s of silence after which the robot brakes
 STALE = 0.25  # s: older velocities are ignored
 
-WIRE_SECONDS = 600.0  # for which exchanges are kept
+WIRE_SECONDS = 600.0  # s for which exchanges are kept
 WIRE_MAX = 20_000  # exchanges kept
 WIRE_BYTES_MAX = 16 * 1024 * 1024  # of payload per direction
 PAYLOAD_MAX = 64 * 1024  # bytes kept of one payload
-RESEND_SECONDS = 20.0  # for the answer to a request that is sent again
+RESEND_SECONDS = 20.0  # s for the answer to a request that is sent again
 RESENDS_MAX = 16  # such connections at the same time
 RESEND_HOLD = 10.0  # s for which its connection stays open, so that the action it started continues
 EXCERPT_MAX = 2_000  # characters of a payload shown in a list

@@ -1,4 +1,4 @@
-"""State of a robot for pages, as plain values: read from the components at one moment."""
+"""Snapshot of a robot's state for pages, as plain values from its components."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ PARTS = {  # by which a page chooses its panels
 
 
 def state_of(robot: Robot) -> dict[str, object]:
-    """Return all but what changes many times a second; each key is sent again when it changed."""
+    """Return the slowly changing state; each key is sent again when its value changes."""
     return {
         "about": _about(robot),
         "parts": [name for name, interface in PARTS.items() if interface in robot],
@@ -148,7 +148,7 @@ def _safety(robot: Robot) -> dict[str, object]:
 
 
 def _body(robot: Robot) -> dict[str, object]:
-    """Return the state of parts that only some bodies have."""
+    """Return the state of optional parts."""
     body: dict[str, object] = {}
     if Legs in robot:
         body["posture"] = str(robot[Legs].posture)

@@ -1,4 +1,4 @@
-"""Driving by hand from a page: velocities with a number and a stamp, decided and timed out here, never by the page."""
+"""Driving by hand from a page: numbered and stamped velocities, checked and timed out here, never by the page."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Share = Annotated[float, msgspec.Meta(ge=-1, le=1)]
 class Velocity(msgspec.Struct, tag="drive", tag_field="type"):
     """Shares (-1 to 1) of the base's top speeds: forward, left, counter-clockwise.
 
-    ``seq`` counts up. ``stamp``: the server's time in ms that the page saw last, plus what has passed since.
+    ``seq`` counts up. ``stamp``: the server's last time known to the page (ms), plus the time passed since.
     """
 
     robot: str
@@ -32,7 +32,7 @@ class Velocity(msgspec.Struct, tag="drive", tag_field="type"):
 
 
 class Pad:
-    """One page's hand on one robot. It brakes when the page falls silent for ``DEAD_MAN`` s, stops or goes away."""
+    """One page's manual control of one robot, which brakes after ``DEAD_MAN`` s of silence or with the page's end."""
 
     def __init__(self, robot: Robot, source: str) -> None:
         self._robot, self._source = robot, source
@@ -42,7 +42,7 @@ class Pad:
     def drive(self, wish: Velocity, now: float) -> bool:
         """Drive so for ``DEAD_MAN`` s; ``now``: the server's time in ms. False: it was old and is ignored.
 
-        Raises what driving raises (Busy, EmergencyStopped, …).
+        Raises the errors of driving (Busy, EmergencyStopped, …).
         """
         if wish.seq <= self._seq or not 0.0 <= now - wish.stamp + 50.0 <= STALE * 1000.0 + 50.0:
             self.late += 1
@@ -55,7 +55,7 @@ class Pad:
         return True
 
     def move(self, x: float, y: float, yaw: float) -> None:
-        """Drive with these shares of the base's top speeds. Raises what driving raises."""
+        """Drive with these shares of the base's top speeds. Raises the errors of driving."""
         limits = self._robot[Base].limits
         top = limits.twist
         twist = Twist(x * top.x, y * top.x if limits.holonomic else 0.0, yaw * top.yaw).clamped(top)
@@ -63,7 +63,7 @@ class Pad:
             self._robot[Driving].drive(twist, lifetime=DEAD_MAN * self._pace, source=self._source)
 
     def let_go(self, why: str) -> None:
-        """End what this page drives."""
+        """End this page's driving."""
         with self._robot.outside.noting(PAD, "let_go", {"source": self._source, "why": why}):
             for action in self._robot.actions.running():
                 if action.source == self._source:
@@ -71,6 +71,6 @@ class Pad:
 
     @property
     def _pace(self) -> float:
-        """Robot seconds in a second of the person's."""
+        """Robot seconds per real second."""
         clock = self._robot.clock
         return clock.speed if isinstance(clock, RealClock) else 1.0

@@ -12,13 +12,13 @@ from roboglot.model.maps import OccupancyGrid
 
 UNKNOWN, FREE, OCCUPIED, ROBOT = (0, 0, 0, 0), (226, 232, 240, 255), (30, 41, 59, 255), (37, 99, 235, 255)
 MARK = 3  # pixels from the robot marker's centre to its edge
-MARKED_MIN = 4 * MARK  # pixels along the shorter side of a map; on a smaller one the marker would be all there is
+MARKED_MIN = 4 * MARK  # pixels along the shorter side of a map; on a smaller one the marker would cover everything
 
 
 def thumbnail(grid: OccupancyGrid, robot: Pose) -> bytes:
-    """Return ``grid`` as a PNG of at most ``THUMBNAIL_SIDE`` pixels a side, x to the right, y up; walls stay visible.
+    """Return ``grid`` as a PNG of at most ``THUMBNAIL_SIDE`` pixels per side, x to the right, y up; walls stay visible.
 
-    Takes some milliseconds: call it beside the loop.
+    Takes some milliseconds: call it off the loop.
     """
     from PIL import Image
 

@@ -1,4 +1,4 @@
-"""View of one robot for all pages, made once however many look: state, scan, map, path, drawings."""
+"""View of one robot, shared by all pages: state, scan, map, path, drawings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NO_PATH = Path()
 
 
 class RobotView:
-    """One robot's. ``scan``, ``map`` and ``path`` are the newest messages, None before the first."""
+    """View of one robot. ``scan``, ``map`` and ``path`` are the newest messages, None before the first."""
 
     def __init__(self, robot: Robot, stage: Stage) -> None:
         self.robot, self._stage = robot, stage
@@ -46,35 +46,35 @@ class RobotView:
         self._replaced = robot.events.listen(MapReplaced, lambda _: self.settle())
 
     def settle(self) -> None:
-        """The map is new: find out where it lies in the world."""
+        """Determine a new map's pose in the world."""
         self.anchor = drawings.anchor_of(self.robot, self._stage)
 
     def open(self) -> None:
-        """A page shows this robot."""
+        """Add a page that shows this robot."""
         self._viewers += 1
         if self._viewers == 1:
             listen = self.robot.events.listen
             self._leaving = [listen(ScanTaken, self._note_scan), listen(ControlRefused, self._note_refusal)]
 
     def close(self) -> None:
-        """A page shows it no more."""
+        """Remove a page that showed this robot."""
         self._viewers -= 1
         if not self._viewers:
             self._let_go()
 
     def start_looking(self) -> None:
-        """Show what the camera makes out, to one page more."""
+        """Add a page that shows the camera's detections."""
         self._looking += 1
         self.sightings.open()
 
     def stop_looking(self) -> None:
-        """Show it to one page less."""
+        """Remove a page that showed the camera's detections."""
         self._looking -= 1
         if not self._looking:
             self.sightings.close()
 
     def end(self) -> None:
-        """The console closes."""
+        """End the view with the console."""
         self.sightings.close()
         self._replaced()
         self._let_go()
@@ -104,7 +104,7 @@ class RobotView:
         return [*words.pose(where), *rates]
 
     def state(self) -> dict[str, object]:
-        """State that changes seldom, by key."""
+        """Return the slowly changing state, by key."""
         return state_of(self.robot) | {
             "drawings": drawings.drawings_of(self.robot),
             "anchor": words.pose(self.anchor) if self.anchor else None,
@@ -112,13 +112,13 @@ class RobotView:
         }
 
     def state_at(self, beat: int) -> dict[str, object]:
-        """The state, looked up once for all pages that are shown it at one beat."""
+        """Return the state, read once per beat for all pages."""
         if self._state_beat != beat:
             self._state_beat, self._state = beat, self.state()
         return self._state
 
     def look(self, now: float) -> None:
-        """Renew path and map where they changed; ``now``: the machine's time, s."""
+        """Update path and map if they have changed; ``now``: the machine's time, s."""
         path = next((p for a in self.robot.actions.running() if (p := _path_of(a.feedback)) is not None), NO_PATH)
         if path is not self._path:
             self._path, self.path = path, path_frame(self.robot.id, path)

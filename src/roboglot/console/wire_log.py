@@ -1,4 +1,4 @@
-"""Log of a robot's exchanges over the last ten minutes. Costs nothing until a page looks, and ends after a while."""
+"""Log of a robot's exchanges over the last ten minutes. Runs only while pages show it, and ten minutes longer."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from roboglot.model.tap import Exchange
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An exchange and its number, which counts up."""
+    """An exchange and its serial number."""
 
     number: int
     exchange: Exchange
 
 
 class WireLog:
-    """One robot's."""
+    """Log of one robot."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -40,7 +40,7 @@ class WireLog:
         return self._last
 
     def open(self) -> None:
-        """A viewer comes."""
+        """Add a viewer; start listening with the first."""
         self._viewers += 1
         if self._ending is not None:
             self._ending.cancel()
@@ -49,13 +49,13 @@ class WireLog:
             self._leave = self._robot.tap.listen(self._note)
 
     def close(self) -> None:
-        """A viewer goes; what was heard stays for ten minutes in case one comes back."""
+        """Remove a viewer; after the last one, the log goes on for ten minutes in case one returns."""
         self._viewers -= 1
         if not self._viewers:
             self._ending = asyncio.get_running_loop().call_later(WIRE_SECONDS, self.end)
 
     def end(self) -> None:
-        """Listen no more and forget."""
+        """Stop listening and clear the log."""
         if self._ending is not None:
             self._ending.cancel()
             self._ending = None
@@ -66,7 +66,7 @@ class WireLog:
         self._bytes = 0
 
     def after(self, number: int, most: int) -> list[Entry]:
-        """The newest ``most`` that came after ``number``, oldest first."""
+        """Return the newest ``most`` entries after ``number``, oldest first."""
         found: list[Entry] = []
         for entry in reversed(self._entries):
             if entry.number <= number or len(found) >= most:
@@ -75,7 +75,7 @@ class WireLog:
         return found[::-1]
 
     def get(self, number: int) -> Exchange:
-        """Return one, or NotFound."""
+        """Return an exchange by number. Raises NotFound."""
         if self._entries and (index := number - self._entries[0].number) >= 0 and index < len(self._entries):
             return self._entries[index].exchange
         raise NotFound(f"exchange {number} is not kept any more")
@@ -96,7 +96,7 @@ class WireLog:
 
 
 def rows(entries: Iterable[Entry]) -> list[list[Any]]:
-    """[number, stamp s, door, connection, client, direction, operation, status, refusal, ms, bytes, excerpt]."""
+    """Return [number, stamp s, door, connection, client, direction, operation, status, refusal, ms, bytes, excerpt]."""
     return [
         [
             entry.number,
@@ -118,7 +118,7 @@ def rows(entries: Iterable[Entry]) -> list[list[Any]]:
 
 
 def readable(payload: bytes) -> str:
-    """Text as text; anything else as hexadecimal bytes."""
+    """Return text as it is, other bytes in hexadecimal."""
     try:
         text = payload.decode("utf-8")
     except UnicodeDecodeError:

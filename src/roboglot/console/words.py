@@ -1,4 +1,4 @@
-"""The model's values as plain JSON values: numbers, words, lists. One place, so that all views say the same."""
+"""The model's values as plain JSON values: numbers, words, lists; one place, so that all views are consistent."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ ENTRIES_MAX = 50  # entries shown of a list
 
 
 def number(value: float) -> float | None:
-    """``value`` to three places; None for what JSON cannot say."""
+    """Return ``value`` to three places; None for infinity and NaN."""
     return round(float(value), 3) if math.isfinite(value) else None
 
 
 def pose(value: Pose) -> list[float | None]:
-    """[x m, y m, yaw rad]."""
+    """Return [x m, y m, yaw rad]."""
     return [number(value.x), number(value.y), number(value.yaw)]
 
 
 def points(values: Sequence[Point]) -> list[list[float | None]]:
-    """[[x, y], …] in m."""
+    """Return [[x, y], …] in m."""
     return [[number(p.x), number(p.y)] for p in values]
 
 
 def action(value: Action, now: float) -> dict[str, object]:
-    """One action: what, for whom, how far, and why it ended."""
+    """Return an action: name, client, progress, and reason of its end."""
     status = "PAUSED" if value.paused else ActionStatus(value.status).name
     seconds = (value.ended_at if value.status.ended else now) - value.started_at
     return {
@@ -49,7 +49,7 @@ def action(value: Action, now: float) -> dict[str, object]:
 
 
 def feedback(value: object) -> object:
-    """An action's progress; of navigation: the stage, m and s to go."""
+    """Return an action's progress; for navigation, stage, m and s to go."""
     if isinstance(value, NavigationFeedback):
         left = {"meters": number(value.remaining.length), "seconds": number(value.time_to_goal)}
         return {"stage": value.stage, **left, "goals": points(value.milestones)}
@@ -57,7 +57,7 @@ def feedback(value: object) -> object:
 
 
 def plain(value: object) -> object:
-    """A value of the model as JSON; what is too long is cut."""
+    """Return a value of the model as JSON, shortened if too long."""
     match value:
         case None | bool() | int():
             return value

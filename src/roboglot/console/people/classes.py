@@ -1,8 +1,8 @@
 """Classes: a teacher opens one for the robots here, pupils join by its code and get a robot each.
 
-A pupil is a guest of the admission where one is configured: with the right to program that robot, for the lesson, and
-no other. What the teacher locks, only the teacher moves. A class lives as long as the program; after a restart its
-pupils, as those of the studio's classes, are in the studio's class of its code, with their robots.
+With access control, a pupil is a guest with the right to program only that robot, for the lesson. A locked robot moves
+only for the teacher. A class ends with the program; after a restart its pupils, like those of the studio's classes, are
+in the studio's class with its code, with their robots.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ class Wish(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """A pupil's: ``identity`` is the name by which the robots know them."""
+    """Seat of a pupil: ``identity`` is the name by which the robots know the pupil."""
 
     identity: str
     robot: str
     code: str
     proof: Proof | None
-    studio: bool  # whether the class was opened in the studio
+    studio: bool  # True if the class was opened in the studio
 
 
 @dataclass(frozen=True, slots=True)
 class Elsewhere:
-    """Console of the pupil's own world, where to sign in."""
+    """Console of the pupil's own world, at which to sign in."""
 
     page: str
     code: str
@@ -72,7 +72,7 @@ class Lesson:
 
 
 class Classes:
-    """The one class of a console. ``present``: who has a page open; ``put_out`` ends the sessions and pages of one.
+    """The class of a console. ``present``: people with an open page; ``put_out`` ends a person's sessions and pages.
 
     ``stop`` ends all programs and motion of a robot.
     """
@@ -94,7 +94,7 @@ class Classes:
     # -- pupils --------------------------------------------------------------------------------------------------------
 
     async def join(self, code: str, name: str) -> Seat | Elsewhere:
-        """Give a pupil a robot: the same as before, else a free one, else the one that the fewest share.
+        """Give a pupil a robot: the same as before, else a free one, else the least shared one.
 
         Raises Problem.
         """
@@ -140,14 +140,14 @@ class Classes:
         return min(self._desk.robots, key=taken.count)
 
     def restore(self, session: Session) -> None:
-        """Have a pupil whose session outlived the program in the class again, with the robot of before."""
+        """Return a pupil, whose session outlived the program, to the class with the same robot."""
         if session.code and session.robot in self._desk.robots:
             lesson = self._studio.setdefault(session.code, Lesson(session.code, "", 0.0))
             lesson.seats[session.name] = Seat(session.name, session.robot, session.code, None, studio=True)
             self._desk.pupils.add(session.name)
 
     async def end(self, code: str) -> None:
-        """A class of the studio is over: its pupils have robots no more."""
+        """End a class of the studio: release its pupils' robots."""
         if (lesson := self._studio.pop(code, None)) is not None:
             for seat in list(lesson.seats.values()):
                 await self._give_back(lesson, seat)
@@ -155,7 +155,7 @@ class Classes:
     # -- the teacher ---------------------------------------------------------------------------------------------------
 
     def look(self) -> dict[str, object]:
-        """The class as its teacher sees it; empty if none is open. Raises Forbidden."""
+        """Return the class for its teacher; empty if none is open. Raises Forbidden."""
         self._check_teacher()
         lesson = self._lesson
         if lesson is None:
@@ -175,7 +175,7 @@ class Classes:
         return {"code": lesson.code, "name": lesson.name, "minutes": minutes, "pupils": pupils}
 
     async def do(self, wish: Wish) -> dict[str, object]:
-        """Do what a teacher wants, and show the class. Raises Forbidden, NotFound, Refused."""
+        """Carry out a teacher's request, and return the class. Raises Forbidden, NotFound, Refused."""
         with self._desk.noting(f"class {wish.do}"):
             return await self._do(wish)
 
@@ -226,7 +226,7 @@ class Classes:
             self._desk.stage.reset(name)
 
     async def _give_back(self, lesson: Lesson, seat: Seat) -> None:
-        """The pupil has the robot no more and must join again."""
+        """Release a pupil's robot; the pupil must join again."""
         del lesson.seats[seat.identity]
         self._desk.pupils.discard(seat.identity)
         if seat.robot in self._desk.locked and seat.robot not in {left.robot for left in lesson.seats.values()}:
@@ -242,6 +242,6 @@ class Classes:
 
 
 async def _release(robot: Robot) -> None:
-    """Have no one control it alone any more. Raises RobotError."""
+    """Release exclusive control of a robot. Raises RobotError."""
     with robot.outside.noting(LEASE, "release", {"who": ""}):
         await robot[Lease].release()

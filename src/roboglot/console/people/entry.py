@@ -1,4 +1,4 @@
-"""Entry of clients: a browser or a script authenticates where access is configured; else local programs come in."""
+"""Admission of clients: browsers and scripts authenticate if access is configured; else local programs are admitted."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ CHALLENGE = (b"www-authenticate", b'Bearer realm="roboglot"')  # not Basic: brow
 
 
 def admission_of(desk: Desk) -> Admission | None:
-    """Return what decides who comes in; None: all who reach the console come in."""
+    """Return the admission that authenticates clients; None: all clients are admitted."""
     return next((robot.admission for robot in desk.robots.values() if robot.admission.asks), None)
 
 
 def address_of(scope: Scope) -> str:
-    """The client's end of the connection."""
+    """Return the client's "host:port"."""
     host, port = scope.get("client") or ("", 0)
     return f"{host}:{port}"
 
 
 def cookie_of(scope: Scope) -> str:
-    """The cookie that this console set; empty if there is none."""
+    """Return this console's cookie; empty if there is none."""
     return read_cookie(scope["headers"], cookie_name((scope.get("server") or ("", 0))[1] or 0))
 
 
 async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
-    """From here on it is asked for who the client is; returns a name that it showed, empty if it needed none.
+    """Authenticate the client for the current context; return its proven name, empty if none was needed.
 
     Raises Unknown.
     """

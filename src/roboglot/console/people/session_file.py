@@ -1,6 +1,6 @@
-"""Sessions of browsers on the disk: no one has to sign in again because the program was started again.
+"""Sessions of browsers on the disk, so that people stay signed in over restarts of the program.
 
-The file lets no one in: of a cookie it has a hash, and what its owner showed is sealed by the cookie itself.
+The file grants no access: it holds a hash of each cookie, and the owner's proof, encrypted with the cookie.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class SessionFile:
         self._database = open_private(path, SCHEMA)
 
     def load(self, now: float) -> list[KeptSession]:
-        """Return what lasts at ``now``, the oldest first, and delete the others. Raises DatabaseError."""
+        """Return sessions valid at ``now`` (Unix s), the oldest first, and delete the others. Raises DatabaseError."""
 
         def work(connection: Connection) -> list[KeptSession]:
             connection.execute("DELETE FROM session WHERE until<=?", (now,))
@@ -50,7 +50,7 @@ class SessionFile:
         return self._database.run_now(work)
 
     async def keep(self, session: KeptSession) -> None:
-        """Write a session; one that cannot be written lasts until the program ends."""
+        """Write a session; after a failure it lasts only until the program ends."""
         values = (session.key, session.name, session.sealed, session.until, session.robot, session.code)
         insert = "INSERT OR REPLACE INTO session (key, name, proof, until, robot, code) VALUES (?, ?, ?, ?, ?, ?)"
         try:
@@ -76,7 +76,7 @@ class SessionFile:
 
 
 def seal(proof: Proof, token: str) -> bytes:
-    """Return a proof that only who has the cookie can read."""
+    """Return a proof, encrypted so that only the cookie decrypts it."""
     from cryptography.hazmat.primitives.ciphers.aead import ChaCha20Poly1305
 
     nonce = os.urandom(NONCE_BYTES)
@@ -85,7 +85,7 @@ def seal(proof: Proof, token: str) -> bytes:
 
 
 def unseal(sealed: bytes, token: str) -> Proof | None:
-    """Return the proof; None if the cookie is another, or the row was changed."""
+    """Return the decrypted proof; None for another cookie or a changed row."""
     from cryptography.exceptions import InvalidTag
     from cryptography.hazmat.primitives.ciphers.aead import ChaCha20Poly1305
 
@@ -99,5 +99,5 @@ def unseal(sealed: bytes, token: str) -> Proof | None:
 
 
 def _sealing(token: str) -> bytes:
-    """Return the key; it does not follow from the hash that the file has of the cookie."""
+    """Return the key; it does not follow from the cookie's hash in the file."""
     return hashlib.sha256(b"seal" + token.encode("utf-8", "surrogatepass")).digest()

@@ -1,8 +1,7 @@
-"""Sessions of browsers: a cookie stands for what a person showed at the log-in page, until they log out.
+"""Sessions of browsers: a cookie stands for a person's proof at the log-in page, until they log out.
 
-A session outlives the program, if there is a file for it. It holds the proof and not the verdict: every request asks
-the admission anew, so that a password that was changed or a right that was revoked counts for signed-in browsers as it
-does for everybody else.
+With a file, a session outlives the program. It holds the proof, not the verdict: every request is checked anew, so that
+changed passwords and revoked rights apply to signed-in browsers, too.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ TOKEN_BYTES = 32
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Session behind a cookie. ``name``: the person signed in. ``robot``: the one that a pupil was given."""
+    """Session behind a cookie. ``name``: the signed-in person. ``robot``: a pupil's robot."""
 
     proof: Proof
     name: str
@@ -36,7 +35,7 @@ class Session:
 
 
 class Sessions:
-    """All of one console: only hashes of the cookies are kept. With a ``file`` they outlive the program.
+    """All sessions of one console, by hashes of their cookies. With a ``file`` they outlive the program.
 
     Raises DatabaseError if it cannot be read.
     """
@@ -45,14 +44,14 @@ class Sessions:
         self._file, self._now = file, now
         left = file.load(now()) if file is not None else []
         self._sessions = {kept.key: Session(NO_PROOF, kept.name, kept.until, kept.robot, kept.code) for kept in left}
-        self._sealed = {kept.key: kept.sealed for kept in left}  # proofs of those that have not come back yet
+        self._sealed = {kept.key: kept.sealed for kept in left}  # proofs of sessions not used since the start
 
     def all(self) -> list[Session]:
-        """All that last; the proof of one that has not come back since the program began is unknown."""
+        """Return all valid sessions; the proof of one that was not used since the start is unknown."""
         return [session for session in self._sessions.values() if session.until > self._now()]
 
     async def open(self, proof: Proof, name: str, robot: str = "", code: str = "") -> str:
-        """Begin a session; returns the cookie's value."""
+        """Begin a session; return the cookie's value."""
         now = self._now()
         ended = [key for key, session in self._sessions.items() if session.until <= now]
         own = [key for key, session in self._sessions.items() if session.name == name and key not in ended]
@@ -68,7 +67,7 @@ class Sessions:
         return token
 
     def find(self, token: str) -> Session | None:
-        """The session of a cookie, while it lasts."""
+        """Return the session of a cookie; None if there is no valid one."""
         key = _key(token) if token else ""
         session = self._sessions.get(key)
         if session is None or session.until <= self._now():
@@ -104,12 +103,12 @@ class Sessions:
 
 
 def cookie_name(port: int) -> str:
-    """Cookies are shared by all ports of a host: each console has a name of its own."""
+    """Return the cookie's name, one per console, as all ports of a host share cookies."""
     return f"{COOKIE}-{port}"
 
 
 def read_cookie(rows: list[tuple[bytes, bytes]], name: str) -> str:
-    """The value of one cookie of a request; empty if there is none."""
+    """Return the value of a request's cookie; empty if there is none."""
     for header, value in rows:
         if header == b"cookie":
             for part in value[:COOKIE_MAX].decode("latin-1").split(";"):
@@ -120,7 +119,7 @@ def read_cookie(rows: list[tuple[bytes, bytes]], name: str) -> str:
 
 
 def set_cookie(name: str, token: str, *, secure: bool) -> tuple[bytes, bytes]:
-    """The header that has a browser keep a session's cookie; an empty token has it forgotten."""
+    """Return the header that sets a session's cookie; an empty token deletes it."""
     age = int(LIFETIME) if token else 0
     safe = "; Secure" if secure else ""
     return b"set-cookie", f"{name}={token}; Path=/; Max-Age={age}; HttpOnly; SameSite=Strict{safe}".encode()

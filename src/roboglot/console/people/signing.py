@@ -40,7 +40,7 @@ class Signing:
         self._tries = Limiter(JOIN_TRIES / MINUTE, JOIN_TRIES, time.monotonic)
 
     async def serve(self, scope: Scope, receive: Receive, send: Send) -> bool:
-        """Answer if the path is one of ours; needs no identity. Raises Problem."""
+        """Answer a request to one of our paths, without an identity; return False for other paths. Raises Problem."""
         if scope["path"] not in (SIGN_IN, SIGN_OUT):
             return False
         if scope["method"] != "POST":
@@ -59,7 +59,7 @@ class Signing:
         if not token:  # the pupil belongs to another world
             await answer_json(send, answer)
             return True
-        await self._sessions.end(cookie_of(scope))  # a session that others may know is not continued
+        await self._sessions.end(cookie_of(scope))  # a session that others may know ends
         await answer_json(send, answer, 200, [set_cookie(name, token, secure=secure)])
         return True
 
@@ -94,7 +94,7 @@ class Signing:
 
 
 def _header(shown: Shown) -> str:
-    """Return the proof as a client of HTTP would show it."""
+    """Return the credentials as an Authorization header."""
     if shown.token:
         return f"Bearer {shown.token.strip()}"
     return "Basic " + base64.b64encode(f"{shown.name}:{shown.password}".encode("utf-8", "surrogatepass")).decode()

@@ -1,1 +1,1 @@
-"""The studio: block programs in the browser, run and stepped on a robot, missions, classes. Sees no door's insides."""
+"""The studio: block programs in the browser, run and stepped on a robot, missions, classes. Knows no door."""

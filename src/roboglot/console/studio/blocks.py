@@ -1,6 +1,6 @@
 """Describes every function of robot programs for an editor: names, types, ranges, choices, in two languages.
 
-Made from the functions' own declarations, so that an editor has a block for each of them without writing any by hand.
+Made from the functions' declarations, so that an editor has a block for each function without handwritten ones.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ class Described:
 
 @cache
 def described() -> Described:
-    """All blocks; made once."""
+    """Return the description of all blocks, made once."""
     body = msgspec.json.encode(table())
     return Described(body, f'"{hashlib.sha256(body).hexdigest()[:24]}"')
 
 
 def table() -> dict[str, Any]:
-    """The groups, the functions in the manual's order of groups, enumerations, and what a text editor completes."""
+    """Return groups, functions in the manual's order of groups, enumerations, and completions for a text editor."""
     labels = _labels()
     functions = [_function(operation, labels) for operation in ABILITIES]
     parameters = [parameter for function in functions for parameter in function["parameters"]]
@@ -69,7 +69,7 @@ def _labels() -> dict[str, Any]:
 
 
 def label_of(key: str) -> dict[str, str]:
-    """The words of the block of a function, the first whose key ends so; those of the key where there is none."""
+    """Return the label of a function's block, the first with this key's ending; else the key's own words."""
     name = key.rpartition(".")[2].replace("_", " ")
     chinese = next((words for known, words in _labels()["chinese"].items() if known.endswith(f".{key}")), name)
     return {"en": name, "zh": chinese}
@@ -101,7 +101,7 @@ def _about(operation: Operation[str], labels: Mapping[str, Mapping[str, str]]) -
 
 
 def _member(name: str, words: dict[str, dict[str, str]]) -> dict[str, str]:
-    """Return the words of a drop-down's entry: a colour and an effect, or a name of its own."""
+    """Return the label of a drop-down's entry: a colour and an effect, or a plain name."""
     found = re.sub("^(system_)?effect_(line_)?", "", name)
     colour, _, effect = found.partition("_")
     if found in words:

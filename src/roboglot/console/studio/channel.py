@@ -1,7 +1,7 @@
-"""The studio's socket: frames of block programs as any front end sends them, debugging, checks while typing, the log.
+"""The studio's socket: a front end's frames of block programs, debugging, checks while typing, the log.
 
-The page chooses one robot. Everything it may do, it may do as any client of the doors: frames are answered by the same
-relay, rights are the same, sizes and rates are bounded.
+The page chooses one robot. It has the rights of every client of the doors: the same relay answers its frames, and sizes
+and rates are bounded.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 
 
 class Open(msgspec.Struct, tag="open", tag_field="type"):
-    """Robot that the page programs from now on, and the program shown: of others it hears only begin and end."""
+    """Robot that the page programs from now on, and the program shown; of others, only begin and end are reported."""
 
     robot: str
     program: Id = ""  # in all messages
@@ -66,21 +66,21 @@ class FrameMessage(msgspec.Struct, tag="frame", tag_field="type"):
 
 
 class Debug(msgspec.Struct, tag="debug", tag_field="type"):
-    """A wish as on ``/debug`` of the door, answered under ``id``."""
+    """A request as on ``/debug`` of the door; the answer carries ``id``."""
 
     id: int
     text: str
 
 
 class Check(msgspec.Struct, tag="check", tag_field="type"):
-    """A program's text that is to be judged."""
+    """A program's text to be checked."""
 
     id: int
     body: Annotated[str, msgspec.Meta(max_length=BODY_MAX)]
 
 
 class Fetch(msgspec.Struct, tag="fetch", tag_field="type"):
-    """A stored program, or module, with its text and its log, where they are wished, and where it is."""
+    """Request for a stored program or module and its whereabouts; ``log`` and ``text``: with these, too."""
 
     id: int
     program: Id
@@ -96,7 +96,7 @@ class _Named(msgspec.Struct):
 
 
 def _id_of(text: str) -> str:
-    """Return the id of a frame, "" where it has none that can be read."""
+    """Return the id of a frame; "" if it has no readable one."""
     try:
         return msgspec.json.decode(text, type=_Named).id
     except (msgspec.MsgspecError, ValueError):  # frames may have line breaks in their texts, which JSON has not
@@ -106,7 +106,7 @@ def _id_of(text: str) -> str:
 
 @lru_cache(maxsize=8)
 def _framed(text: str) -> str:
-    """A frame as it goes to pages; the same goes to many of them."""
+    """Return a frame as a message to pages, which many pages share."""
     return msgspec.json.encode({"type": "frame", "text": text}).decode()
 
 
@@ -120,9 +120,9 @@ class Session:
     longest = 0  # bytes of a frame: no limit
 
     def __init__(self, desk: Desk, classroom: Room, send: Send, codes: Limiter) -> None:
-        """``codes``: how many wrong codes of classes an address may try."""
+        """``codes``: limits the tries of class codes per address."""
         self._desk, self._send, self._codes = desk, send, codes
-        self._showed = ""  # the address that sent a code, until the code proves right
+        self._showed = ""  # address of an unverified code
         self._programs: Programs | None = None
         self._shown = ""  # the program shown; empty: all
         self._leaving: list[Callable[[], None]] = []
@@ -175,12 +175,12 @@ class Session:
     # -- a front end of the frames -------------------------------------------------------------------------------------
 
     def answer(self, text: str) -> None:
-        """An answer to a frame; lists that another page asked for are of no use here."""
+        """Send an answer to a frame; lists requested by other pages are dropped."""
         if (found := _LIST.match(text)) is None or found[1] in self._asked:
             self.tell({"type": "frame", "text": text})
 
     def publish(self, text: str) -> None:
-        """A report of a task. Of blocks that begin quickly one after the other only the newest counts."""
+        """Send a report of a task; of blocks that begin in quick succession, only the newest."""
         if (block := _BLOCK.search(text)) is None:
             self.answer(text)
         elif self._shown and f'"target_id": "{self._shown}"' not in text:
@@ -192,12 +192,12 @@ class Session:
             self._light["text"] = text
 
     async def room(self) -> None:
-        """Programs wait for no page."""
+        """Return at once: programs wait for no page."""
 
     # -- in ------------------------------------------------------------------------------------------------------------
 
     def receive(self, text: str | bytes) -> None:
-        """Do what the page says. Raises ValueError for what is no message, or for too many."""
+        """Handle a message of the page. Raises ValueError for a bad message, or for too many."""
         now = time.monotonic()
         self._allowance += (now - self._counted_at) * MESSAGES_PER_SECOND_MAX
         self._allowance, self._counted_at = min(self._allowance, 2.0 * MESSAGES_PER_SECOND_MAX) - 1.0, now
@@ -280,7 +280,7 @@ class Session:
                 self._seat.draw(picture)
 
     def _show_code(self) -> None:
-        """Count it as wrong until the class answers. Raises Refused."""
+        """Count a class code as wrong until the class confirms it. Raises Refused."""
         host = connection().rpartition(":")[0]
         if not self._codes.take(host):
             raise Refused("too many wrong codes from your address: wait a minute")
@@ -322,7 +322,7 @@ class Session:
         self._leaving, self._programs = [], None
 
     def close(self) -> None:
-        """The page is gone; actions that it began continue."""
+        """Close the page; its actions continue."""
         self._leave()
         self._trial.close()
         self._seat.leave()

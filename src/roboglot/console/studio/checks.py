@@ -1,6 +1,6 @@
-"""Checks of a mission on a program, and why one is not met, in one sentence in two languages.
+"""Checks of a mission on a program, with the reason of a failure as a sentence in two languages.
 
-A check looks at what the robot did (``Played``) or at the program's text (``uses``, ``calls``, ``short``).
+A check examines the robot's actions (``Played``) or the program's text (``uses``, ``calls``, ``short``).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ CONSTRUCTS: dict[str, tuple[tuple[type[ast.AST], ...], str, str]] = {
 
 
 class Why(msgspec.Struct, frozen=True):
-    """Reason why a check is not met, in two languages."""
+    """Reason of a failed check, in two languages."""
 
     en: str
     zh: str
@@ -56,7 +56,7 @@ class Why(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Work to judge: what was played, the program's syntax tree, closed outlines of what must not be touched."""
+    """Work to check: the play, the program's syntax tree, closed outlines of things that must not be touched."""
 
     played: Played
     tree: ast.Module
@@ -207,7 +207,7 @@ def _move(check: Check, work: Work) -> Why | None:
     way = sum(math.dist((a.x, a.y), (b.x, b.y)) for a, b in itertools.pairwise(path))
     if way >= check.metres:
         return None
-    walked = math.floor(way * 100.0) / 100.0  # never rounded up to what is wanted
+    walked = math.floor(way * 100.0) / 100.0  # rounded down, never up to the required value
     return Why(
         f"The dog walked {walked:.2f} m; at least {check.metres:g} are needed.",
         f"机器狗走了 {walked:.2f} 米，至少要走 {check.metres:g} 米。",
@@ -217,7 +217,7 @@ def _move(check: Check, work: Work) -> Why | None:
 def _within(check: Check, work: Work) -> Why | None:
     if work.played.seconds <= check.seconds and not work.played.late:
         return None
-    took = math.ceil(work.played.seconds * 10.0) / 10.0  # never rounded down to what is allowed
+    took = math.ceil(work.played.seconds * 10.0) / 10.0  # rounded up, never down to the allowed value
     return Why(
         f"It took {took:.1f} s; {check.seconds:g} are allowed.", f"用了 {took:.1f} 秒，只允许 {check.seconds:g} 秒。"
     )
@@ -231,7 +231,7 @@ def _uses(check: Check, work: Work) -> Why | None:
 
 
 def _header(node: ast.AST) -> bool:
-    """Return whether it is a line that the editor writes for each variable: ``x = None`` at the beginning."""
+    """Return whether a statement is the editor's declaration of a variable, ``x = None``."""
     return isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant) and node.value.value is None
 
 
@@ -269,7 +269,7 @@ def _ends(_check: Check, work: Work) -> Why | None:
 
 
 def distance(spot: Spot, walls: Walls) -> float:
-    """Return the distance from the middle of the dog to the nearest outline, m; 0 inside of one that is no room."""
+    """Return the distance (m) from the dog's centre to the nearest outline; 0 inside one that is no room."""
     nearest = math.inf
     for outline in walls:
         for start, end in zip(outline, [*outline[1:], outline[0]], strict=True):

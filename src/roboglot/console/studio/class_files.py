@@ -46,7 +46,7 @@ class ClassFiles:
         self._folder = folder
 
     def load(self) -> list[Sheet]:
-        """Return all classes, the oldest first; what cannot be read is left out with a warning."""
+        """Return all classes, the oldest first; unreadable ones are skipped with a warning."""
         try:
             folders = sorted((f for f in self._folder.iterdir() if f.is_dir()), key=lambda f: f.stat().st_mtime)
         except FileNotFoundError:
@@ -54,13 +54,13 @@ class ClassFiles:
         return [sheet for folder in folders[-CLASSES_MAX:] if (sheet := _read_class(folder)) is not None]
 
     def begin(self, code: str, name: str, only: str, until: float) -> None:
-        """Keep a class, in place of what was there of it. Raises OSError."""
+        """Write a class, replacing its former data. Raises OSError."""
         folder = self._folder / code
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         _write(folder / CLASS, msgspec.json.encode(Sheet(code, name, only, until)))
 
     def keep(self, code: str, bag: Bag) -> None:
-        """Keep what a pupil handed in, in place of what was there. Raises OSError."""
+        """Write a pupil's work, replacing the former. Raises OSError."""
         name = hashlib.sha256(bag.name.encode("utf-8", "surrogatepass")).hexdigest()[:24]
         _write(self._folder / code / f"{name}.json", msgspec.json.encode(bag))
 
@@ -89,7 +89,7 @@ def _read(file: Path, kind: type[T]) -> T:
 
 
 def _write(file: Path, data: bytes) -> None:
-    """Write so that a crash leaves the old file or the new one."""
+    """Write a file; a crash leaves the old or the new one."""
     fresh = file.with_suffix(".new")
     with fresh.open("wb") as opened:
         os.fchmod(opened.fileno(), 0o600)

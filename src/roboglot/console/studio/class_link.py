@@ -1,6 +1,6 @@
-"""A classroom in another process of this machine, which the consoles of several worlds share: lines over a socket.
+"""A classroom in another process of this machine, shared by the consoles of several worlds: lines over a socket.
 
-The words of both ends, and the end of a console: its pages' seats are there as if the classroom were here.
+Contains the messages of both ends, and the console's end, whose seats behave as if the classroom were local.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ AGAIN = 1.0  # s between two attempts to connect
 
 
 class Hello(msgspec.Struct, tag=True, frozen=True):
-    """First message to the classroom: the console's world, and where its pages are."""
+    """First message to the classroom: the console's world, and the URL of its pages."""
 
     world: str
     page: str
@@ -72,7 +72,7 @@ class Closed(msgspec.Struct, tag=True, frozen=True):
 
 
 class Stopped(msgspec.Struct, tag=True, frozen=True):
-    """Answer to the classroom's ``Stop``: why not, or nothing."""
+    """Answer to the classroom's ``Stop``: the reason of a failure, or empty."""
 
     id: int
     why: str = ""
@@ -87,7 +87,7 @@ class Shows(msgspec.Struct, tag=True, frozen=True):
 
 
 class Admitted(msgspec.Struct, tag=True, frozen=True):
-    """Answer of the classroom to ``Shows``: why not, or a ``Place``."""
+    """Answer of the classroom to ``Shows``: a refusal, or a ``Place``."""
 
     id: int
     why: str = ""
@@ -110,7 +110,7 @@ class News(msgspec.Struct, tag=True, frozen=True):
 
 
 class Stop(msgspec.Struct, tag=True, frozen=True):
-    """Message of the classroom: end all that a robot does."""
+    """Message of the classroom: stop all programs and motion of a robot."""
 
     id: int
     robot: str
@@ -122,14 +122,14 @@ _decode = msgspec.json.Decoder(FromRoom).decode
 
 
 def line(message: ToRoom | FromRoom) -> bytes:
-    """Return a message as it is sent."""
+    """Return a message as a line of JSON."""
     return msgspec.json.encode(message) + b"\n"
 
 
 class LinkedRoom:
     """The classroom at ``path``, for the console of one world.
 
-    ``stop`` ends all that a robot does; ``ended`` hears the code of a class that is over.
+    ``stop`` ends all programs and motion of a robot; ``ended`` is called with the code of a class that is over.
     """
 
     def __init__(
@@ -149,11 +149,11 @@ class LinkedRoom:
         return LinkedSeat(self, self._next, tell)
 
     async def open(self, code: str, name: str) -> None:
-        """Have a class for this program's own world. Raises Refused."""
+        """Open a class for this program's own world. Raises Refused."""
         self.send(Opened(code, name))
 
     async def close(self, code: str) -> None:
-        """End it. Raises Refused."""
+        """End a class. Raises Refused."""
         self.send(Closed(code))
 
     async def admit(self, code: str, name: str) -> Place:
@@ -181,7 +181,7 @@ class LinkedRoom:
         await asyncio.gather(self._task, *self._stopping, return_exceptions=True)
 
     def send(self, message: ToRoom, seat: LinkedSeat | None = None) -> None:
-        """Say something to the classroom. Raises Refused if it cannot be reached."""
+        """Send a message to the classroom. Raises Refused if it cannot be reached."""
         if self._writer is None or self._writer.is_closing():
             raise Refused("the class is out of reach")
         if seat is not None:
@@ -241,19 +241,19 @@ class LinkedRoom:
 
 
 class LinkedSeat:
-    """One page's place there; it is taken with the page's first wish."""
+    """One page's seat in the classroom, taken with the page's first request."""
 
     def __init__(self, room: LinkedRoom, number: int, tell: Tell) -> None:
         self._room, self.number, self.tell = room, number, tell
         self._robot = ""
 
     async def take(self, wish: Member, *, may_teach: bool) -> None:
-        """Pass it on; ``tell`` hears what becomes of it. Raises Refused if the classroom is out of reach."""
+        """Pass a request on; ``tell`` gets the result. Raises Refused if the classroom is out of reach."""
         self._room.send(At(self.number, self._robot), self)
         self._room.send(Wished(self.number, wish, may_teach), self)
 
     def at(self, robot: str) -> None:
-        """The page works with this robot from now on: said with its next wish."""
+        """Set the page's robot, reported with its next request."""
         self._robot = robot
 
     def draw(self, picture: str) -> None:
@@ -261,5 +261,5 @@ class LinkedSeat:
         self._room.send(Drawn(self.number, picture), self)
 
     def leave(self) -> None:
-        """The page goes."""
+        """Leave the classroom with the page."""
         self._room.forget(self)

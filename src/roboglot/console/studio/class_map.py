@@ -13,7 +13,7 @@ from roboglot.model.robot import Robot
 
 
 async def draw_map(robot: Robot) -> str:
-    """Return a PNG in base64; nothing for a robot that has no map."""
+    """Return a PNG in base64; empty for a robot without a map."""
     try:
         grid, pose = robot[Mapping].grid, robot[Localization].pose
     except ComponentMissing:

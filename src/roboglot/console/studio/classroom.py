@@ -1,7 +1,7 @@
-"""Classes: a teacher opens one, pupils join by its code, the teacher sees what each one's program does.
+"""Classes: a teacher opens one, pupils join by its code, the teacher watches their programs.
 
-Pupils work in one world, each with a robot of it, or, where several programs share a classroom, each in a world of
-their own. Knows no socket: a page is a seat, wherever its socket is.
+Pupils work in one world, each with a robot of it, or, if several programs share a classroom, each in their own world.
+Knows no socket: a page is a seat.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Tell = Callable[[dict[str, object]], None]
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """A program whose robots pupils work with: where its pages are, how it ends all that a robot does, and a class."""
+    """A program with pupils' robots: the URL of its pages, and functions that stop a robot and end a class."""
 
     name: str
     page: str
@@ -61,12 +61,12 @@ class Pupil:
 
 
 def _idle(pupil: Pupil) -> bool:
-    """Return whether nothing is lost with a pupil: no page, no program, no star."""
+    """Return whether a pupil can be dropped without loss: no page, no program, no star."""
     return pupil.seat is None and not (pupil.bag.style or pupil.bag.handed or pupil.doing.stars)
 
 
 class Class:
-    """A class and its teachers' pages. ``only``: the one world that it is for; empty: all."""
+    """A class and its teachers' pages. ``only``: its only world; empty: all."""
 
     def __init__(self, code: str, name: str, only: str = "") -> None:
         self.code, self.name, self.only = code, name, only
@@ -91,7 +91,7 @@ class Class:
         return self.pupils[name]
 
     def tell_teachers(self) -> None:
-        """Have every teacher's page show the grid anew, soon."""
+        """Schedule an update of the grid on every teacher's page."""
         if self._due is None:
             self._due = asyncio.get_running_loop().call_later(GRID_EVERY, self._send_grid)
 

@@ -1,4 +1,4 @@
-"""Missions as data: a world, words, what is allowed, what is checked; read from TOML files of anyone who teaches."""
+"""Missions as data: a world, texts, allowed blocks, checks; read from teachers' TOML files."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Wrong(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One mission. ``start`` is x, y in m and degrees; ``boxes`` are x, y and two sizes; ``people`` x, y, degrees.
 
-    ``allowed``: the blocks that the toolbox shows, empty for all; ``blocks``: those that are there at the beginning.
+    ``allowed``: the toolbox's blocks, empty for all; ``blocks``: the blocks at the beginning.
     """
 
     title: Words
@@ -111,12 +111,12 @@ class Grade(msgspec.Struct, frozen=True):
 
     @property
     def passed(self) -> bool:
-        """True if everything that is needed was done."""
+        """True if all required checks were met."""
         return self.stars > 0
 
 
 def grade(lesson: Lesson, source: str, played: Played) -> Grade:
-    """Judge what a correct program did."""
+    """Return the grade of a program's play."""
     outlines = [*played.outlines, *(_box(*box) for box in lesson.boxes)]
     work = Work(played, ast.parse(source), outlines, lesson.start[:2])
     rows = [_row(check, failure(check, work)) for check in [Check(kind="ends"), *lesson.check]]
@@ -124,7 +124,7 @@ def grade(lesson: Lesson, source: str, played: Played) -> Grade:
 
 
 def no_program(problems: Sequence[Problem]) -> Grade:
-    """The outcome of what is no program."""
+    """Return the grade of a text that is no program."""
     first = problems[0]
     words = f"line {first.line}: {first.english}", f"第 {first.line} 行：{first.chinese}"
     return Grade(0, [Row("ends", False, False, *words)])
@@ -147,7 +147,7 @@ def _box(x: float, y: float, width: float, depth: float) -> list[Point]:
 
 
 def read(text: str) -> Lesson:
-    """One file's. Raises ValueError that says what is wrong with it."""
+    """Return the lesson of a file's text. Raises ValueError in plain words."""
     try:
         return msgspec.toml.decode(text, type=Lesson)
     except msgspec.ValidationError as error:
@@ -155,7 +155,7 @@ def read(text: str) -> Lesson:
 
 
 def load(folders: Sequence[Path]) -> dict[str, Lesson]:
-    """All missions of these folders by their files' names, in order; what cannot be read is logged and left out."""
+    """Return all missions of these folders by file name, in order; unreadable ones are logged and skipped."""
     found: dict[str, Lesson] = {}
     for folder in folders:
         for path in sorted(folder.glob("*.toml"))[:LESSONS_MAX] if folder.is_dir() else ():

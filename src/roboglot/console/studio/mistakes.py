@@ -1,4 +1,4 @@
-"""Explains how a program failed: the place out of the log's words, and a sentence for pupils in two languages."""
+"""Explains a program's failure: its place from the log, and a sentence for pupils in two languages."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _sentence(kind: str, message: str) -> tuple[str, str]:
 
 
 def _meant(message: str) -> str:
-    """The field that was perhaps meant where a record has none of that name."""
+    """Return the field that was probably meant if a record has none of that name."""
     if guess := _GUESS.search(message):
         return guess[1]
     found = _FIELD.search(message)

@@ -1,4 +1,4 @@
-"""Plans that are tried in a copy of the world before the robot does them, for scripts and agents."""
+"""Plans, tried in a copy of the world before the robot carries them out, for scripts and agents."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _step(step: GoTo | Drive, here: Pose) -> Step:
 
 
 def _answer(tried: Tried, in_map: Any, plan: Plan) -> dict[str, Any]:
-    """Return it in the robot's map."""
+    """Return the result, in the robot's map."""
     stride = max(1, len(tried.path) // PATH_MAX)
     ended = [{"status": status, "reason": why} for status, why in tried.steps]
 

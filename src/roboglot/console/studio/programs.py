@@ -1,4 +1,4 @@
-"""Parts that the studio is given: programs of robots, a copy of the world to rehearse in, missions."""
+"""The studio's parts: programs of robots, a copy of the world to rehearse in, missions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roboglot.wire.visual.relay import FrameRelay
 
 @dataclass(frozen=True, slots=True)
 class Programs:
-    """One robot's: ``frames`` takes front ends' frames, ``service`` is what they reach."""
+    """Programs of one robot: ``frames`` takes front ends' frames for ``service``."""
 
     robot: Robot
     frames: FrameRelay
@@ -32,9 +32,9 @@ class ClassHome:
 
 @dataclass(frozen=True, slots=True)
 class Studio:
-    """One console's. ``folders``: of missions, read at every look, so that a teacher sees a new one at once.
+    """Studio of one console. ``folders``: of missions, read at every use, so that new ones appear at once.
 
-    ``classes``: the folder of what is handed in; ``home``: the classroom is elsewhere, and so is that folder.
+    ``classes``: folder of the hand-ins; ``home``: a classroom elsewhere, which has that folder, too.
     """
 
     programs: Mapping[str, Programs] = field(default_factory=dict)
@@ -45,5 +45,5 @@ class Studio:
     home: ClassHome | None = None
 
     def lessons(self) -> dict[str, Lesson]:
-        """All missions by their names."""
+        """Return all missions by name."""
         return load(self.folders)

@@ -1,6 +1,6 @@
-"""Ranges of a block's fields: from table 4.1 where it says, otherwise the functions' own limits.
+"""Ranges of a block's fields: from table 4.1 if given there, otherwise the functions' own limits.
 
-Numbers only, for editors: what a program asks beyond them is refused by the functions themselves.
+Numbers only, for editors; the functions themselves refuse values out of range.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ STRIDE_MAX, DANCES_MAX = 0.065, 10  # of the choreographer, which clips larger v
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Range of a number; ``start`` is what a new block shows where the function has no default."""
+    """Range of a number; ``start``: value in a new block if the function has no default."""
 
     minimum: float
     maximum: float
@@ -79,14 +79,14 @@ SOUNDS = tuple(str(number) for number in sorted([*BARKS, *PIECES]))
 
 
 def limit_of(function: str, parameter: str) -> Limit | None:
-    """Return the range of a number, None where any will do; ``function`` without its group."""
+    """Return the range of a number; None: unlimited; ``function`` without its group."""
     if (function, parameter) in OWN:
         return OWN[function, parameter]
     return WALK if parameter == "duration" else ANY.get(parameter)
 
 
 def choices_of(function: str, parameter: str) -> tuple[str, tuple[str, ...]] | None:
-    """The enumeration and its members that a value may be, or "" and numbers; None where it is no choice."""
+    """Return a choice's enumeration with its members, or "" with numbers; None for other parameters."""
     if parameter == "effect":
         return "LedConstraint", EFFECTS[function]
     return ("", SOUNDS) if parameter == "audio_id" else CHOICES.get(parameter)

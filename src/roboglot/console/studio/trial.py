@@ -1,6 +1,6 @@
-"""A program tried on a copy of the world before the robot does it, or in a mission's world to be judged.
+"""A program tried in a copy of the world before the robot runs it, or in a mission's world to be graded.
 
-One page tries one program at a time. What happens there is sent as it happens, ten times as fast as life.
+One page tries one program at a time. Events are sent as they happen, at ten times real speed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Tell = Callable[[dict[str, object]], None]
 
 
 class TrialWish(msgspec.Struct, tag="try", tag_field="type"):
-    """Try ``body``: in the world of ``lesson``, or where it is empty in a copy of the robot's own."""
+    """Request to try ``body`` in the world of ``lesson``; empty: in a copy of the robot's own world."""
 
     id: int
     body: Annotated[str, msgspec.Meta(max_length=BODY_MAX)]
@@ -39,20 +39,20 @@ class TrialWish(msgspec.Struct, tag="try", tag_field="type"):
 
 
 class TrialEnd(msgspec.Struct, tag="end_try", tag_field="type"):
-    """Try it no longer."""
+    """Request to end the trial."""
 
 
 class Trial:
-    """One page's."""
+    """Trial of one page."""
 
     def __init__(self, tell: Tell) -> None:
         self._send = tell
-        self._busy = self._ended = False  # from the wish on; while it is checked, too
+        self._busy = self._ended = False  # from the request on, including its check
         self._playing: asyncio.Task[Played] | None = None
         self._origin = Pose()  # of the world, in the frame that the page's map has
 
     async def take(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
-        """Try it and report the result. Raises NotFound, Busy, ValueError, ProgramError."""
+        """Try a program and report the result. Raises NotFound, Busy, ValueError, ProgramError."""
         if self._busy:
             raise Busy("a program is being tried already")
         self._busy, self._ended = True, False
@@ -119,7 +119,7 @@ class Trial:
         self._send(answer)
 
     def close(self) -> None:
-        """End what is being tried."""
+        """End the trial."""
         self._ended = True
         if self._playing is not None:
             self._playing.cancel()
@@ -134,7 +134,7 @@ def _scene(studio: Studio, programs: Programs, lesson: Lesson | None) -> Scene:
 
 
 def map_origin(robot: Robot, scene: Scene) -> Pose:
-    """Origin of the world in the map that the page draws, as the robot believes."""
+    """Return the world's origin in the map that the page draws, by the robot's pose estimate."""
     believed = whereabouts(robot)
     if scene.start is None or believed is None:
         return Pose()
@@ -142,7 +142,7 @@ def map_origin(robot: Robot, scene: Scene) -> Pose:
 
 
 async def _modules(programs: Programs, body: str) -> dict[str, str]:
-    """The modules that a program calls; all that are right, since their functions are few."""
+    """Return the sources of the modules that a program may call, found by their functions' names."""
     library = programs.service.library
     try:
         return await library.sources(library.ids(name for name in library.functions if f"{name}(" in body))
@@ -151,5 +151,5 @@ async def _modules(programs: Programs, body: str) -> dict[str, str]:
 
 
 def _touched(played: Played) -> float | None:
-    """The first second at which the dog stood against a wall or furniture, None for never."""
+    """Return the first time (s) at which the dog touched a wall or furniture; None: never."""
     return next((spot.at for spot in played.path if distance(spot, played.outlines) < HULL), None)
