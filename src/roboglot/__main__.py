@@ -1,4 +1,4 @@
-"""``python -m roboglot``, and the command ``roboglot``: Ctrl-C ends it without a word also while modules are loaded."""
+"""``python -m roboglot``, and the command ``roboglot``; Ctrl-C ends it silently, even while modules are loaded."""
 
 import os
 import signal
@@ -6,13 +6,13 @@ import sys
 
 
 def _look_elsewhere_last() -> None:
-    """Look into PYTHONPATH last: a module of another project must not stand in for a library of ours."""
+    """Search PYTHONPATH last, so that no module of another project shadows a library of ours."""
     others = {os.path.abspath(folder) for folder in os.environ.get("PYTHONPATH", "").split(os.pathsep) if folder}
     sys.path.sort(key=lambda folder: folder in others)
 
 
 def run() -> None:
-    """Load the command line and run it. SIGINT has Python's own meaning again when it is loaded."""
+    """Load the command line and run it; SIGINT has Python's own handler again once it is loaded."""
     _look_elsewhere_last()
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:

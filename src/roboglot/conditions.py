@@ -1,6 +1,6 @@
-"""The grammar of a program's condition: when a task runs ("now", "08:30", cron's five fields), how a module is called.
+"""Grammar of a program's condition: times of a task ("now", "08:30", cron's five fields), signature of a module.
 
-Says what a text means, for programs and for the frames that carry it; computes no times and knows no clock.
+Parses texts, for programs and for their frames; computes no times and knows no clock.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _FIELDS = ((0, 59), (0, 23), (1, 31), (1, 12), (0, 7))  # minute, hour, day, mon
 
 
 class BadCondition(ValueError):
-    """The text is not of its form; the message says what is wrong."""
+    """The text does not fit the grammar; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +38,15 @@ class Moment:
 
     @property
     def immediate(self) -> bool:
-        """True if it means now."""
+        """True for now."""
         return self.clock is None and self.amount == 0
 
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """Again and again: the allowed values per field (Sunday is 0), or at every start of the engine.
+    """Repeatedly: the allowed values per field (Sunday is 0), or at every start of the engine.
 
-    ``any_day`` and ``any_weekday``: the field is "*"; where both are restricted, either may match, as cron has it.
+    ``any_day`` and ``any_weekday``: the field is "*"; if both are restricted, either may match, as in cron.
     """
 
     minutes: frozenset[int] = frozenset()
@@ -68,7 +68,7 @@ class Interface:
 
 
 def parse_moment(text: str) -> Moment:
-    """A ``single`` task's condition: "now", "HH:MM", "HH:MM YYYY-MM-DD", each with an optional "+ N<unit>"."""
+    """Parse a ``single`` task's condition: "now", "HH:MM", "HH:MM YYYY-MM-DD", each with an optional "+ N<unit>"."""
     match = _SINGLE.fullmatch(_bounded(text).strip())
     if match is None:
         raise BadCondition('a single task runs at "now", "HH:MM" or "HH:MM YYYY-MM-DD", then "+ 5minutes" or the like')
@@ -84,7 +84,7 @@ def parse_moment(text: str) -> Moment:
 
 
 def parse_cycle(text: str) -> Cycle:
-    """A ``cycle`` task's condition: "minute hour day month week" as in cron, or "@reboot"."""
+    """Parse a ``cycle`` task's condition: "minute hour day month week" as in cron, or "@reboot"."""
     fields = _bounded(text).replace("，", ",").split()
     if fields == ["@reboot"]:
         return Cycle(at_start=True)
@@ -105,7 +105,7 @@ def parse_cycle(text: str) -> Cycle:
 
 
 def parse_interface(text: str) -> Interface:
-    """A module's interface: "name(parameter, …)"; no defaults, no stars."""
+    """Parse a module's interface: "name(parameter, …)"; no defaults, no stars."""
     match = _INTERFACE.fullmatch(_bounded(text))
     if match is None:
         raise BadCondition('a module is declared as "name(parameter, parameter)"')

@@ -1,4 +1,4 @@
-"""Configuration: dataclasses filled from one TOML file, the environment and the command line.
+"""Configuration: dataclasses, filled from one TOML file, the environment and the command line.
 
 Precedence: command line over ``ROBOGLOT_*`` environment over the file over the defaults here.
 """
@@ -30,7 +30,7 @@ Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any free port
 
 @dataclass(frozen=True, slots=True)
 class StartConfig:
-    """Start of a simulated robot: m and rad of the world's plan, and its floor from 0 on."""
+    """Start of a simulated robot: m and rad in the world's frame, and its floor from 0 on."""
 
     x: float
     y: float
@@ -40,11 +40,11 @@ class StartConfig:
 
 @dataclass(frozen=True, slots=True)
 class RobotConfig:
-    """One robot: its name, its body, the address all its doors bind to (empty: the next one after the robot before).
+    """One robot: name, body, and address of all its doors (empty: the one after the previous robot's).
 
-    A body with "://" in it is no simulated one: it is the URL of a real robot, "slamware://192.168.11.1".
-    ``start`` is for a simulated one; without it the robot starts on a dock, or beside the others. Who has more
-    ``priority`` goes first where robots meet that hear each other.
+    A body with "://" in it is the URL of a real robot, "slamware://192.168.11.1". ``start`` is for simulated robots;
+    without it, they start on a dock or beside the others. Where communicating robots meet, the one with the higher
+    ``priority`` goes first.
     """
 
     name: str = "a"
@@ -55,12 +55,12 @@ class RobotConfig:
 
     @property
     def is_real(self) -> bool:
-        """True for a driver instead of the simulation."""
+        """True for a real robot behind a driver."""
         return "://" in self.body
 
     @property
     def recording(self) -> str:
-        """The file of a robot that answers as it was recorded, "recording:FILE"; empty for any other."""
+        """File of a recorded robot, "recording:FILE"; empty for all others."""
         return self.body.removeprefix(RECORDING) if self.body.startswith(RECORDING) else ""
 
     @property
@@ -71,9 +71,9 @@ class RobotConfig:
 
 @dataclass(frozen=True, slots=True)
 class ProgramsConfig:
-    """Limits of one run of a program: bytes of memory beyond an empty program's, seconds of processor, characters
-    printed, calls inside calls, calls of the robot a second, and seconds of the machine's time (0: as many as it likes;
-    suspended ones do not count). ``memory_together`` is of all programs, in bytes; 0: 2 GiB, or half of the machine's.
+    """Limits of one run of a program: bytes of memory beyond an empty program's, seconds of processor time, printed
+    characters, depth of calls, calls of the robot per second, and seconds of real time (0: unlimited; suspended ones do
+    not count). ``memory_together``: bytes of all programs; 0: 2 GiB, or half of the machine's memory.
     """
 
     memory: Limit = 64 * 1024 * 1024
@@ -89,8 +89,8 @@ class ProgramsConfig:
 class TlsConfig:
     """TLS on the ports of REST, block programs and the console: ``on`` with any [access.tls] in the file.
 
-    ``certificate`` and ``key`` are PEM files; without them roboglot makes its own. ``plain``: the same ports also take
-    connections that are not encrypted, for clients that can do no better.
+    ``certificate`` and ``key`` are PEM files; without them roboglot makes its own. ``plain``: the same ports accept
+    unencrypted connections, too, for clients without TLS.
     """
 
     on: bool = False
@@ -105,11 +105,11 @@ class TlsConfig:
 
 @dataclass(frozen=True, slots=True)
 class AccessConfig:
-    """Access control: ``on`` with any [access] in the file, or with ``--access``. Without it everyone may.
+    """Access control: ``on`` with any [access] in the file, or with ``--access``. Without it, everyone has all rights.
 
-    ``local``: programs on this machine need no name. ``requests`` and ``bytes`` (to and fro) a second of one client,
-    ``connections`` of one address at once to a door of a robot, ``logins``: wrong passwords a minute of one address.
-    ``gateway``: "HOST:PORT" at which `roboglot connect` comes in; empty: nowhere.
+    ``local``: programs on this machine need no credentials. Limits: ``requests`` and ``bytes`` (both directions) per
+    second and client, simultaneous ``connections`` per address and door of a robot, ``logins`` (wrong passwords) per
+    minute and address. ``gateway``: "HOST:PORT" for `roboglot connect`; empty: none.
     """
 
     on: bool = False
@@ -126,7 +126,7 @@ class AccessConfig:
 class ConsoleConfig:
     """The web console, one for all robots: on ``port``, or the next free one. ``origins``, ``hosts``: as in [slamware].
 
-    ``address``: outside loopback only with [access], as for the robots' own addresses. ``otlp``: the URL of an
+    ``address``: outside loopback only with [access], like the robots' own addresses. ``otlp``: the URL of an
     OpenTelemetry collector to which metrics are pushed every ``otlp_period`` s; empty: none.
     """
 
@@ -145,12 +145,12 @@ class ConsoleConfig:
 
 @dataclass(frozen=True, slots=True)
 class RecordConfig:
-    """Recording: ``to`` a file or a folder from the start on; empty: only when asked for.
+    """Recording: ``to`` a file or a folder from the start on; empty: only on request.
 
-    ``ring`` keeps the last ``ring_seconds`` in memory and writes them when a robot has a new fault. A file ends at
-    ``part_bytes`` or ``part_seconds`` and the next one begins; all together keep to ``total_bytes``. ``redact``: more
-    names of fields whose values are left out. ``truth``: with what really is the case; ``video``: with the cameras;
-    ``photos``: with photos and films that are fetched from real robots (those of simulated ones show no one).
+    ``ring`` keeps the last ``ring_seconds`` in memory and writes them at a robot's new fault. A file ends at
+    ``part_bytes`` or ``part_seconds``, and the next one begins; all files together take at most ``total_bytes``.
+    ``redact``: further names of fields to redact. ``truth``: with ground truth; ``video``: with the cameras;
+    ``photos``: with photos and films fetched from real robots (those of simulated ones show no people).
     """
 
     to: str = ""
@@ -169,13 +169,13 @@ class RecordConfig:
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until it is advanced.
 
-    ``patient``: on a machine that is too slow time waits for the world, instead of passing without it.
-    ``doors`` are the doors' own sections by name; the defaults hold for those that are not there.
-    ``database`` is the URL of a PostgreSQL server that keeps what robots remember, for a fleet on several machines;
-    without it, a file in the data folder does.
-    ``registry`` is where programs agree on who runs which robot: a server's URL, or a file that those on one machine
-    share; without it, ``database``, and if that is not given either, programs do not ask each other.
-    ``insecure`` lets robots listen outside loopback, where everyone who reaches them may drive them.
+    ``patient``: on a slow machine, time waits for the world instead of running ahead of it.
+    ``doors``: the doors' own sections by name; missing ones have their defaults.
+    ``database``: URL of a PostgreSQL server for the robots' stored data, for a fleet on several machines; without it,
+    they are in a file of the data folder.
+    ``registry``: where programs agree on who runs which robot: a server's URL, or a file shared on one machine;
+    default: ``database``; without either, programs do not check that.
+    ``insecure``: robots may listen outside loopback without access control, so that all clients there may drive them.
     """
 
     world: str = "office"
@@ -196,7 +196,7 @@ class Config:
 
     @property
     def opened(self) -> tuple[RobotConfig, ...]:
-        """The robots that others than this machine can reach."""
+        """The robots that other machines can reach."""
         return tuple(robot for robot in self.robots if not is_loopback(robot.address))
 
 
@@ -210,7 +210,7 @@ def is_loopback(host: str) -> bool:
 
 
 def refuse_unguarded(config: Config) -> None:
-    """Raise ValueError if a robot listens where others reach it and nothing says who may drive it."""
+    """Raise ValueError if other machines can reach a robot or the console without access control or ``insecure``."""
     guarded = config.insecure or config.access.on
     if config.console.enabled and not is_loopback(config.console.address) and not guarded:
         raise ValueError(
@@ -226,7 +226,7 @@ def refuse_unguarded(config: Config) -> None:
 
 
 def default_data_folder(environment: Mapping[str, str]) -> Path:
-    """Return the user's data folder as the XDG rules have it. Raises ValueError for a user without a home folder."""
+    """Return the user's data folder by the XDG rules. Raises ValueError for a user without a home folder."""
     if share := environment.get("XDG_DATA_HOME"):
         return Path(share) / "roboglot"
     home = environment.get("HOME") or os.path.expanduser("~")  # from the user database, where HOME is not set
@@ -238,7 +238,7 @@ def default_data_folder(environment: Mapping[str, str]) -> Path:
 def load_config(
     path: Path | None, overrides: Mapping[str, object], doors: Mapping[str, type] = MappingProxyType({})
 ) -> Config:
-    """Read the file at ``path`` (or none) with ``overrides`` (those not None) on top. Raises ValueError naming the key.
+    """Read the file at ``path``, if any, and apply ``overrides`` that are not None. Raises ValueError with the key.
 
     The override ``address`` is that of the first robot. ``doors`` are the types of the doors' sections by name
     (``roboglot.protocols.sections()``).
@@ -257,7 +257,7 @@ def config_of(
     *,
     origin: str = "configuration",
 ) -> Config:
-    """Return the configuration of a file with these values; ``origin`` is for errors. Raises ValueError as above."""
+    """Return the configuration with a file's values; ``origin`` is for errors. Raises ValueError with the key."""
     values = dict(values)
     _refuse_unknown(values, Config, "", doors)
     if isinstance(values.get("access"), dict):
@@ -280,7 +280,7 @@ def config_of(
 
 
 def _moved(robots: object, address: object) -> object:
-    """Return rows of robots with the first one at another address; what are no rows is refused later."""
+    """Return rows of robots with the first one at ``address``; other values are unchanged, and refused later."""
     match robots:
         case [dict() as first, *others]:
             return [{**first, "address": address}, *others]
@@ -288,7 +288,7 @@ def _moved(robots: object, address: object) -> object:
 
 
 def _section(name: str, kind: type, values: object, origin: str) -> object:
-    """Return a door's own section. Raises ValueError naming the key."""
+    """Return a door's own section. Raises ValueError with the key."""
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
@@ -296,7 +296,7 @@ def _section(name: str, kind: type, values: object, origin: str) -> object:
 
 
 def zone_of(name: str) -> tzinfo:
-    """The time zone of this IANA name. Raises ValueError."""
+    """Return the time zone with this IANA name. Raises ValueError."""
     try:
         return UTC if name == "UTC" else ZoneInfo(name)
     except (KeyError, ValueError, OSError):
@@ -304,8 +304,8 @@ def zone_of(name: str) -> tzinfo:
 
 
 def parse_robot(text: str) -> RobotConfig:
-    """``name=body``, ``name=body@address``, ``name=body:x,y,yaw,floor@address``; the body may be a real robot's URL, or
-    ``recording:FILE``."""
+    """Parse ``name=body``, ``name=body@address`` or ``name=body:x,y,yaw,floor@address``; ``body`` may be a real robot's
+    URL or ``recording:FILE``. Raises ValueError."""
     name, equals, rest = text.partition("=")
     body, _, address = rest.partition("@")
     start = None
@@ -334,7 +334,7 @@ def _start(text: str, where: str) -> StartConfig:
 
 
 def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
-    """Fill the empty addresses: the first robot gets 127.0.0.1, each other one the address after its neighbour's."""
+    """Fill empty addresses: 127.0.0.1 for the first robot, for each other one the address after the previous one's."""
     if started := [robot.name for robot in robots if robot.is_real and robot.start]:
         raise ValueError(f"robot {started[0]} is a real one: it starts where it stands")
     if not 1 <= len(robots) <= ROBOTS_MAX:
@@ -353,7 +353,7 @@ def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
 def _refuse_unknown(
     values: Mapping[str, object], kind: type, prefix: str, doors: Mapping[str, type] = MappingProxyType({})
 ) -> None:
-    """Raise ValueError for a key that is not a setting: a misspelt one would be ignored in silence."""
+    """Raise ValueError for a key that is not a setting, as a misspelt one would be ignored silently."""
     fields: dict[str, object] = {f.name: f.default_factory for f in dataclasses.fields(kind) if f.name != "doors"}
     fields |= doors
     for key, value in values.items():

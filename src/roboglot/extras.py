@@ -1,4 +1,4 @@
-"""Extras beyond the core: the modules that each brings, and the message when one is missing.
+"""Extras beyond the core: the modules of each, and the message if one is missing.
 
 The core (``pip install roboglot``) holds the clients and the commands that need no robot of our own; everything else
 comes with an extra. Imports nothing outside the standard library.
@@ -67,12 +67,12 @@ MODULES: dict[str, tuple[str, ...]] = {
 
 
 class MissingExtra(ImportError):
-    """A part of roboglot was asked for whose packages are not installed; the text says how to get them."""
+    """The packages of a part of roboglot are not installed; the text says how to install them."""
 
 
 @contextmanager
 def explaining(what: str, extra: str) -> Iterator[None]:
-    """Around imports: a module that is missing becomes MissingExtra, which says that ``what`` needs ``extra``."""
+    """Context for imports: a missing module raises MissingExtra, which says that ``what`` needs ``extra``."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -83,7 +83,7 @@ def explaining(what: str, extra: str) -> Iterator[None]:
 
 
 def explained(error: ImportError, what: str, extra: str = "") -> str | None:
-    """Return one sentence about a module that is missing; None if no extra (or ``extra``, if given) brings it."""
+    """Return a sentence about a missing module; None if no extra (or ``extra``, if given) has it."""
     if isinstance(error, MissingExtra):
         return str(error)
     name = (error.name or "").partition(".")[0]
@@ -92,7 +92,7 @@ def explained(error: ImportError, what: str, extra: str = "") -> str | None:
 
 
 def in_words(what: str, missing: list[str], extra: str) -> str:
-    """Return the one sentence, with the command that mends it."""
+    """Return the sentence about missing modules, with the command that installs them."""
     verb = "is" if len(missing) == 1 else "are"
     return f"{what} needs {' and '.join(missing)}, which {verb} not installed: pip install 'roboglot[{extra}]'"
 
@@ -106,12 +106,12 @@ def is_there(module: str) -> bool:
 
 
 def installed() -> dict[str, bool]:
-    """Return for each extra whether all of it is there."""
+    """Return, by extra, whether all its modules are installed."""
     return {extra: all(map(is_there, modules)) for extra, modules in MODULES.items()}
 
 
 class _Lazy(ModuleType):
-    """Stands for a module until the first of its attributes is used; each attribute is looked up once."""
+    """Stand-in for a module, imported at the first use of an attribute; each attribute is looked up once."""
 
     def __getattr__(self, name: str) -> object:
         if name.startswith("__"):  # Python itself asks modules for these
@@ -127,5 +127,5 @@ class _Lazy(ModuleType):
 
 
 def lazy(module: str) -> object:
-    """Return a module that is imported when it is first used; then MissingExtra if its extra is not installed."""
+    """Return a module that is imported at its first use; that raises MissingExtra if its extra is not installed."""
     return _Lazy(module)

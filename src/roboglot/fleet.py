@@ -66,7 +66,7 @@ BREATH = 0.001  # real s for sockets between two steps
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """One world and the robots by name: simulated ones in it, and real ones behind their drivers."""
+    """One world, and all robots by name: simulated ones in it, real ones behind their drivers."""
 
     world: World
     robots: dict[str, Robot]
@@ -74,7 +74,7 @@ class Fleet:
     _drivers: Sequence[Driver] = ()
 
     async def start(self, *, wait: bool) -> None:
-        """Let the world run. ``wait``: only when every skill is ready (lockstep); otherwise they follow soon after.
+        """Let the world run. ``wait``: only after every skill is ready (lockstep); otherwise skills follow soon after.
 
         Real robots that cannot be reached are connected when they can.
         """
@@ -90,7 +90,7 @@ class Fleet:
             await driver.start(wait=wait)
 
     async def close(self) -> None:
-        """Cancel what the robots do and stop the world."""
+        """Cancel the robots' actions and stop the world."""
         for autonomy in self._autonomies:  # first, or deliveries would continue with the next order
             await autonomy.close()
         clock = next(iter(self.robots.values())).clock
@@ -100,7 +100,7 @@ class Fleet:
 
 
 async def _settled(clock: Clock, *endings: Awaitable[object]) -> None:
-    """Wait for ``endings``, which may take robot time: on a lockstep clock no other task advances it any more."""
+    """Wait for ``endings``, which may take robot time; a lockstep clock is advanced, as no other task does it now."""
     together = asyncio.gather(*endings)
     while isinstance(clock, LockstepClock) and not together.done():
         await clock.advance(STEP)
@@ -109,7 +109,7 @@ async def _settled(clock: Clock, *endings: Awaitable[object]) -> None:
 
 
 def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Transactions) -> Fleet:
-    """Build all robots of the configuration in the named (or given by path) world. Raises ValueError in plain words."""
+    """Build all robots of the configuration in ``world`` (a name or path). Raises ValueError in plain words."""
     placements = [_placement(robot) for robot in robots if robot.is_simulated]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
     built, drivers = dict[str, Robot](), Drivers(own=frozenset(robot.address for robot in robots))
@@ -141,14 +141,14 @@ def _placement(robot: RobotConfig) -> RobotPlacement:
 
 
 def _stand_in(place: str, clock: Clock) -> StandIn:
-    """Return what answers as a recorded robot did. Raises ValueError in plain words."""
+    """Return a stand-in with the answers of a recorded robot. Raises ValueError in plain words."""
     from roboglot.recording.playback import open_playback
 
     return open_playback(place, clock)
 
 
 def origin_of(config: Config, version: str, *, remembers: bool = False) -> Origin:
-    """Return what a recording says about where it comes from: settings, seed, versions, and the files they name.
+    """Return the origin of a recording: settings, seed, versions, and the files that the settings name.
 
     ``remembers``: the robots have stored maps, programs or settings from before.
     """
@@ -174,7 +174,7 @@ def origin_of(config: Config, version: str, *, remembers: bool = False) -> Origi
 
 
 def _public(value: object) -> object:
-    """Return ``value`` as JSON has it, without tokens, passwords and what URLs hold of them."""
+    """Return ``value`` in JSON's types, without tokens and passwords, including those in URLs."""
     match value:
         case Mapping():
             return {
@@ -189,12 +189,12 @@ def _public(value: object) -> object:
 
 
 def _without_secrets(url: str) -> str:
-    """Leave out what may be secret in a URL: its log-in and its options."""
+    """Return a URL without possible secrets: its log-in and its options."""
     return URL_LOGIN.sub(r"\1", url.partition("?")[0])
 
 
 def _add_memory(robot: Robot, clock: Clock, database: Transactions) -> None:
-    """Add the components that are stored on our disk, for any robot."""
+    """Add the components with data stored on our disk, for robots of every kind."""
     if Disk in robot:
         database = database.on(robot[Disk])
     places, files = StoredPlaces(database, robot.id, clock, robot.events), StoredFiles(database, robot.id, clock)

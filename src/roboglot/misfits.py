@@ -1,7 +1,7 @@
-"""Sentences for values that do not fit: the field's path as its sender wrote it, and what is wanted there.
+"""Sentences for invalid values: the field's path as its sender wrote it, and the expected value.
 
-The library's own messages name Python's types and a path that begins with ``$``. Every door, the console and the
-readers of files answer with these instead. Knows no protocol and no robot.
+They replace the library's messages, with Python's types and paths that begin with ``$``, at every door, at the console
+and in readers of files. Knows no protocol and no robot.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ FORMS = frozenset(form.replace("{place}", "{}") for form in _FORMS.values())
 
 
 def misfit(error: Exception, whole: str = "the value", *, field: str = "", kinds: Mapping[str, str] = KINDS) -> str:
-    """Return in plain words why a value did not fit; what any other error says, unchanged.
+    """Return in plain words why a value is invalid; the text of another error unchanged.
 
-    ``field`` is the field that the value was sent in, if it is not the whole; ``whole`` names it where no field is
-    wrong. ``kinds`` has the words for types.
+    ``field``: the field with the value, if it is not the whole; ``whole``: its name if no field is wrong.
+    ``kinds``: the words for types.
     """
     if not isinstance(error, msgspec.ValidationError):
         return str(error)
@@ -63,7 +63,7 @@ def misfit(error: Exception, whole: str = "the value", *, field: str = "", kinds
 
 
 def _in_words(value: str, kinds: Mapping[str, str]) -> str:
-    """A type or several as words, a limit without its zeros."""
+    """Return one or several types in words, or a limit without trailing zeros."""
     if set(value.split(" | ")) <= {*kinds, "null"}:
         return " or ".join(kinds.get(kind, kind) for kind in value.split(" | "))
     return value.removesuffix(".0")

@@ -1,8 +1,8 @@
 """A table from wire names to typed handlers, shared by every protocol that calls operations by name.
 
-The handler's signature is the schema: ``async def move(session, *, x: Metres = 0, ...)``. Its first parameter is what
-the door passes (a robot, a session); the others are read by name from the wire, converted (``"0.5"`` becomes a
-float) and checked against their annotations. Knows no robot, no socket and no vendor.
+The handler's signature is the schema: ``async def move(session, *, x: Metres = 0, ...)``. The door passes its first
+parameter (a robot, a session); the others are read by name from the wire, converted (``"0.5"`` becomes a float) and
+checked against their annotations. Knows no robot, no socket and no vendor.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Handler = TypeVar("Handler", bound=Callable[..., Awaitable[object]])
 class Right(StrEnum):
     """Right of a client on a robot; each operation needs one of them.
 
-    SEE: read values, hear, watch. DRIVE: have it move, act and speak. PROGRAM: keep and run programs. EDIT: change
+    SEE: read values, listen, watch. DRIVE: move it, let it act and speak. PROGRAM: store and run programs. EDIT: change
     maps, places and settings. ADMIN: power, network, firmware, people.
     """
 
@@ -36,16 +36,16 @@ class Right(StrEnum):
 
 
 class BadParameters(ValueError):
-    """The parameters do not fit the handler's signature; the message names the parameter and says what was meant."""
+    """The parameters do not fit the handler's signature; the message names the parameter and the expected value."""
 
 
 @dataclass(frozen=True, slots=True)
 class Operation(Generic[K]):
     """One handler under its wire name.
 
-    ``answer`` is the handler's return type. ``partial`` says in plain words what the operation cannot do yet; empty
-    when it is whole. The coverage page counts only whole ones. ``right`` is what a client needs for it;
-    None, which a test refuses, needs ADMIN. ``needs`` are the robot's components without which the handler refuses.
+    ``answer``: the handler's return type. ``partial``: the missing part in plain words; empty if the operation is
+    complete. The coverage page counts only complete ones. ``right``: the right that a client needs; None, which a test
+    refuses, means ADMIN. ``needs``: components of the robot without which the handler refuses.
     """
 
     key: K
@@ -89,7 +89,7 @@ class Operation(Generic[K]):
 
 
 class OperationTable(Generic[K]):
-    """Every operation of one protocol; a name declared twice fails at import."""
+    """All operations of one protocol; a name declared twice fails at import."""
 
     def __init__(self, name: str, right: Right | None = None) -> None:
         self.name = name
@@ -99,7 +99,7 @@ class OperationTable(Generic[K]):
     def on(
         self, *keys: K, right: Right | None = None, needs: tuple[type, ...] = (), partial: str = ""
     ) -> Callable[[Handler], Handler]:
-        """Register a handler under ``keys``, for clients that have ``right`` and robots that have what it ``needs``."""
+        """Register a handler under ``keys``, for clients with ``right`` and robots with the components in ``needs``."""
 
         def register(handler: Handler) -> Handler:
             signature = inspect.signature(handler, eval_str=True)
@@ -121,15 +121,15 @@ class OperationTable(Generic[K]):
         return register
 
     def implemented(self) -> set[K]:
-        """Keys of the operations that are wholly there."""
+        """Return the keys of complete operations."""
         return {operation.key for operation in self if not operation.partial}
 
     def partly(self) -> dict[K, str]:
-        """Keys of those that are there in part, with what is missing."""
+        """Return the keys of partial operations, each with its missing part."""
         return {operation.key: operation.partial for operation in self if operation.partial}
 
     def get(self, key: K) -> Operation[K] | None:
-        """The operation under ``key``, or None."""
+        """Return the operation under ``key``, or None."""
         return self._operations.get(key)
 
     def __getitem__(self, key: K) -> Operation[K]:
@@ -146,7 +146,7 @@ class OperationTable(Generic[K]):
 
 
 def _parameters_of(name: str, signature: inspect.Signature) -> type[msgspec.Struct]:
-    """A struct with a handler's parameters after the first."""
+    """Return a struct type with a handler's parameters after the first."""
     _, *parameters = signature.parameters.values()
     fields: list[tuple[str, object] | tuple[str, object, object]] = []
     for parameter in parameters:

@@ -1,8 +1,8 @@
-"""Plays a program in a copy of the world before the real robot does it: in lockstep, on a thread of its own.
+"""Plays a program in a copy of the world before the real robot runs it: in lockstep, in a separate thread.
 
-The copy is built anew from the world's file and a ``Scene``: where the robot and people stand, and boxes.
-Maps, charge, faults and random streams are not copied. For the studio's missions, and for agents that want to look
-before they leap. Knows no door and no page.
+The copy is built from the world's file and a ``Scene``: poses of the robot and people, and boxes. Maps, charge, faults
+and random streams are not copied. For the studio's missions, and for agents that try a plan before they act. Knows no
+door and no page.
 """
 
 from __future__ import annotations
@@ -76,10 +76,10 @@ class Rehearsals:
         speed: float = 10.0,
         notice: Notice | None = None,
     ) -> Played:
-        """Play a program to its end, ``speed`` times as fast as life (0: as fast as it goes).
+        """Play a program to its end, at ``speed`` times real speed (0: as fast as possible).
 
-        ``notice`` hears on the caller's loop of blocks, spots and prints as they happen. Raises ValueError for a scene
-        that cannot be, RuntimeError where too many wait.
+        ``notice`` gets blocks, spots and prints as they happen, on the caller's loop. Raises ValueError for an
+        impossible scene, RuntimeError if too many rehearsals wait.
         """
         here = asyncio.get_running_loop()
 
@@ -93,7 +93,7 @@ class Rehearsals:
         return await self._in_turn(scene, program)
 
     async def try_plan(self, steps: Sequence[Step], scene: Scene) -> Tried:
-        """Do a plan's steps in turn, as fast as it goes. Raises as ``play`` does."""
+        """Carry out a plan's steps in turn, as fast as possible. Raises the errors of ``play``."""
 
         async def plan(fleet: Fleet, clock: LockstepClock, _: Engine) -> Tried:
             return await _Trial(fleet, clock, scene).run(steps)
@@ -101,7 +101,7 @@ class Rehearsals:
         return await self._in_turn(scene, plan)
 
     async def _in_turn(self, scene: Scene, act: Callable[[Fleet, LockstepClock, Engine], Awaitable[R]]) -> R:
-        """Do it in a copy of the world, on the thread, after what waits already."""
+        """Run ``act`` in a copy of the world, in the thread, after those already waiting."""
         if self._waiting >= QUEUE_MAX:
             raise RuntimeError("too many rehearsals wait; try again soon")
         self._waiting += 1
@@ -112,7 +112,7 @@ class Rehearsals:
             self._waiting -= 1
 
     async def close(self) -> None:
-        """End what plays, the engine and the thread."""
+        """End the current play, the engine and the thread."""
         if self._loop is None or self._thread is None:
             return
         loop, self._loop = self._loop, None
@@ -172,15 +172,15 @@ class _Play:
     _over: bool = False
 
     def begin_block(self, id: str) -> None:
-        """The program marks a block."""
+        """Record and report the beginning of a block."""
         self.played.blocks.append(id)
         self.tell({"what": "block", "id": id})
 
     async def breakpoint(self) -> None:
-        """A rehearsal halts nowhere."""
+        """Return at once: a rehearsal has no breakpoints."""
 
     def write(self, level: str, text: str) -> None:
-        """Keep nothing of the task's log."""
+        """Discard a line of the task's log."""
 
     async def run(self, engine: Engine, source: str, modules: dict[str, str]) -> Played:
         """Play from start to end."""
@@ -250,7 +250,7 @@ class _Play:
             self.played.refused.append(Refusal(call.name, line, call.unit, words))
 
     async def _pass(self, seconds: float) -> None:
-        """Let robot time pass, no faster than asked for, and note where the robot is."""
+        """Let robot time pass, no faster than the requested speed, and record the robot's pose."""
         now = self.clock.time() - self._began
         while self._coming and now >= self._coming[0].at - 1e-9:
             act(self.fleet.world.hands, self._coming.pop(0))
@@ -287,7 +287,7 @@ class _Trial:
     tried: Tried = field(default_factory=Tried)
 
     async def run(self, steps: Sequence[Step]) -> Tried:
-        """Do the steps until one fails."""
+        """Carry out the steps until one fails."""
         robot = self.fleet.robots[ROBOT]
         began = self.clock.time()
         start = robot[Localization].pose
@@ -314,7 +314,7 @@ class _Trial:
             self.tried.hits.append(Hit(round(now, 2), pose.x, pose.y, self._what(pose)))
 
     def _what(self, pose: Pose) -> str:
-        """Name what is nearest of people and boxes within reach; else it is the building."""
+        """Name the nearest person or box within reach; else the building."""
         reach = self.fleet.robots[ROBOT].description.radius
         near = [(pose.distance_to(at), f"person {name}", 0.4) for name, at in self.scene.people]
         near += [(pose.distance_to(at), "a box", math.hypot(*size[:2]) / 2) for at, size in self.scene.boxes]
@@ -337,7 +337,7 @@ def _words(event: Event) -> str:
 
 
 def set_up(stage: Stage, scene: Scene) -> None:
-    """Make the world look like the scene. Raises ValueError, NotFound."""
+    """Arrange the world as in the scene. Raises ValueError, NotFound."""
     if scene.start is not None:
         stage.place(ROBOT, scene.start)
     for pose, size in scene.boxes:
@@ -349,7 +349,7 @@ def set_up(stage: Stage, scene: Scene) -> None:
 
 
 def act(stage: Stage, given: Act) -> None:
-    """Have something happen in the world. Raises ValueError for what no one can do."""
+    """Carry out an event in the world. Raises ValueError for an unknown or impossible one."""
     match given.kind, given.who:
         case "touch", _:
             stage.touch(ROBOT, TouchKind[given.text.upper() or "SINGLE"])
@@ -366,7 +366,7 @@ def act(stage: Stage, given: Act) -> None:
 
 
 def scene_of(stage: Stage, robot: str, world: str, body: str, others: Sequence[str] = ()) -> Scene:
-    """The scene as it is now: where the robot really is, boxes, people; other robots stand there as boxes."""
+    """Return the current scene: true pose of the robot, boxes, people, and other robots as boxes."""
     placed = {item.name: item for item in stage.robots}
     here = placed[robot]
     boxes = [(box.pose, box.size) for box in stage.obstacles if box.floor == here.floor]

@@ -1,4 +1,4 @@
-"""The only place that joins everything: data folder, clock, fleet, program engine and doors."""
+"""Composition of the program: data folder, clock, fleet, program engine and doors."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ CLOSE_SECONDS = 0.5  # s for one part to close before it is abandoned
 
 
 class RobotDoors:
-    """One robot's doors: opened and closed together, also when the robot itself switches off and comes up again."""
+    """One robot's doors: opened and closed together, and whenever the robot itself switches on or off."""
 
     def __init__(self, robot: Robot, doors: Sequence[Door]) -> None:
         self._robot = robot
@@ -83,14 +83,14 @@ class RobotDoors:
         return [endpoint for door in self._doors for endpoint in door.endpoints]
 
     def door(self, name: str) -> Door:
-        """Return the one of that protocol. Raises LookupError."""
+        """Return the door of a protocol. Raises LookupError."""
         found = next((door for door in self._doors if door.name == name), None)
         if found is None:
             raise LookupError(f"robot {self._robot.id} has no {name} door")
         return found
 
     async def open(self) -> None:
-        """Open those that are closed. Raises OSError naming an address that is taken."""
+        """Open closed doors. Raises OSError with the address if it is taken."""
         async with self._turn:
             if not self._open and not self._ended:
                 self._open = True
@@ -99,7 +99,7 @@ class RobotDoors:
                         await door.start()
 
     async def close(self) -> None:
-        """Close them for good."""
+        """Close the doors for good."""
         for leave in self._leave:
             leave()
         self._ended = True  # a robot coming up at this moment must not open doors that are closed for good
@@ -169,7 +169,7 @@ class Runtime:
         self.console = Console(self.build_desk(), config.console, self._tls) if config.console.enabled else None
 
     def _join_registry(self) -> Residence | None:
-        """Have every robot's lease ask the registry. Raises OSError, ValueError if it cannot be opened."""
+        """Make every robot's lease depend on the registry. Raises OSError, ValueError if it cannot be opened."""
         where = self.config.registry or self.config.database
         if not where:
             return None
@@ -187,7 +187,7 @@ class Runtime:
         return residence
 
     def _build_guard(self) -> Guard:
-        """Return the guard of all doors; its list is stored where the robots' data are. Raises OSError, ValueError."""
+        """Return the guard of all doors; its list is stored with the robots' data. Raises OSError, ValueError."""
         database = self.config.database
         if database and self._registry is not None and self.config.registry in ("", database):
             self._shared = self._registry
@@ -199,7 +199,7 @@ class Runtime:
 
     @property
     def recorder(self) -> Recorder:
-        """Records these robots; made, and its libraries loaded, when it is needed first."""
+        """Recorder of these robots; it and its libraries are loaded at the first use."""
         if self._recorder is None:
             from roboglot.recording.recorder import Recorder
 
@@ -210,7 +210,7 @@ class Runtime:
         return self._recorder
 
     def _begin_recording(self) -> None:
-        """Record what the configuration wants recorded, from the first second on. Raises NotRecording."""
+        """Begin the recording of the configuration, from the first second on. Raises NotRecording."""
         wanted = self.config.record
         if wanted.to:
             self.recorder.start(wanted.to)
@@ -263,7 +263,7 @@ class Runtime:
         return Gateway(guard, robots, host.strip("[]"), int(port), (tls / SERVER_CERT, tls / SERVER_KEY))
 
     def _build_tls(self) -> Tls | None:
-        """Return how REST, programs and pages encrypt; None: not at all. Raises OSError, ValueError."""
+        """Return TLS for REST, programs and pages; None: no encryption. Raises OSError, ValueError."""
         settings = self.config.access.tls
         if not (self.config.access.on and settings.on):
             return None
@@ -280,7 +280,7 @@ class Runtime:
             raise ValueError(f"[access.tls] {pair[0]}: {error}") from None
 
     def build_desk(self) -> Desk:
-        """Return what a console works with."""
+        """Return the desk of a console."""
 
         def listed() -> dict[str, Sequence[Endpoint]]:
             return {name: doors.endpoints for name, doors in self.doors.items()}
@@ -300,7 +300,7 @@ class Runtime:
         return desk
 
     def _scene_of(self, name: str) -> Scene:
-        """Return what a rehearsal of a robot's program needs of the world as it is now."""
+        """Return the current scene for a rehearsal of a robot's program. Raises ValueError for a real robot."""
         robots = {robot.name: robot for robot in self.config.robots}
         if robots[name].is_real:
             raise ValueError(f"robot {name} is no simulated one: there is no copy of its world to try things in")
@@ -308,7 +308,7 @@ class Runtime:
         return scene_of(self.fleet.world.hands, name, self.config.world, robots[name].body, others)
 
     async def start(self) -> None:
-        """Open every door, then let the world run. Raises OSError naming an address that is taken."""
+        """Open every door, then let the world run. Raises OSError with the address if it is taken."""
         if self._residence is not None:
             await self._residence.take()
             self._residence.keep()
@@ -332,7 +332,7 @@ class Runtime:
         gc.freeze()  # everything loaded stays: the collector need not scan it again
 
     async def close(self) -> None:
-        """Stop the robots, close the doors, then the world, the engine and the file, whatever of it takes too long."""
+        """Stop the robots, close doors, world, engine and file; parts that take too long are abandoned."""
         if self.console is not None:
             await _in_time("the console", self.console.close())
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
@@ -365,7 +365,7 @@ class Runtime:
 
 
 async def _in_time(name: str, closing: Awaitable[None]) -> None:
-    """Wait for it, but not for long."""
+    """Wait for ``closing``, at most ``CLOSE_SECONDS`` s; log failures."""
     try:
         await asyncio.wait_for(closing, CLOSE_SECONDS)
     except TimeoutError:
