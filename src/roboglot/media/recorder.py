@@ -90,7 +90,7 @@ class Recorder(Component):
                     await beside(self._clock, _bound(file.add, packet))
                     self._begun.set()
                     if file.seconds >= SECONDS_MAX or file.size >= BYTES_MAX:
-                        log.warning("%s is as long as a recording may be", path.name)
+                        log.warning("recording %s reached its largest length or size", path.name)
                         break
             return await beside(self._clock, file.finish)
         finally:

@@ -174,7 +174,7 @@ class Courier:
                 self.phase = Phase.GOING_HOME
                 await self._do(self._driver.go_home(self._book.policy))
         except Failed as error:
-            log.info("robot %s could not go to rest: %s", robot.id, error)
+            log.info("robot %s cannot drive to its resting place: %s", robot.id, error)
             if error.failure is Failure.NOT_LOCALIZED:
                 readiness.lose()
         finally:

@@ -88,7 +88,7 @@ class Shortfall:
         short = rate < (RECOVERED if self._short else ENOUGH) * self._rate
         if short and not self._short:
             log.warning(
-                "the camera of %s takes %.1f of %g pictures a second: this machine draws and encodes no more",
+                "the camera of %s takes %.1f of %g pictures a second: this machine is too slow for more",
                 self._robot, rate, self._rate,
             )  # fmt: skip
         elif self._short and not short:
