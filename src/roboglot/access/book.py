@@ -52,7 +52,7 @@ class Book:
         return min((end for end in ends if end is not None and end > now), default=float("inf"))
 
     def replaced(self, older: Book) -> set[str]:
-        """Return those with another password or token than in ``older``, or gone: their old proofs count no more."""
+        """Return identities that are gone or have another password or token than in ``older``; their proofs end."""
         return {
             name
             for name, before in older._identities.items()

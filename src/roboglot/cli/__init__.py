@@ -1,4 +1,4 @@
-"""The command line: one file per command, each loaded only when it is called."""
+"""The command line: one file per command, each loaded only when called."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ EXTRAS = {"demo": "demo", "mcp": "mcp", "export": "logs"} | dict.fromkeys(
 def run_process() -> NoReturn:
     """Run ``main`` and end the process as ``sys.exit`` would, but leave its memory to the kernel.
 
-    The interpreter would take it apart object by object: 0.7 s of processor time for a robot's server.
+    The interpreter would free it object by object, which takes 0.7 s of processor time for a robot's server.
     """
     status = 0
     try:
@@ -117,7 +117,7 @@ def _obey(name: str) -> None:
 
 
 def _run_with_extra(name: str, arguments: list[str]) -> None:
-    """Run the command again with its extra where that leaves nothing behind; return where it would."""
+    """Run the command again with its extra if that installs nothing permanently; else return."""
     from roboglot.cli import throwaway
 
     if name in EXTRAS and (command := throwaway.runner()):
@@ -125,7 +125,7 @@ def _run_with_extra(name: str, arguments: list[str]) -> None:
 
 
 def _tolerate_plain_terminals() -> None:
-    """Print ? for characters that a terminal, which is not UTF-8, lacks."""
+    """Print ? for characters that a terminal without UTF-8 lacks."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
@@ -139,7 +139,7 @@ def _print_usage() -> None:
 
 
 def loaded(name: str) -> typer.Typer:
-    """Return the application of one of COMMANDS, and import what it needs."""
+    """Import and return the application of one of COMMANDS."""
     import typer
 
     folder = f".{FOLDERS[name]}" if name in FOLDERS else ""

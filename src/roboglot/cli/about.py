@@ -35,7 +35,7 @@ def _kernels() -> str:
 
 
 def _jail() -> str:
-    """Return what keeps other people's programs in, found out by starting it."""
+    """Return the layers that confine users' programs, found by starting a sandbox."""
     if not is_there("numpy"):
         return "not here: programs need numpy, of roboglot[programs]"
     from roboglot.cli.doctor import examine_sandbox

@@ -137,7 +137,7 @@ def _grants(rights: str, robots: str, until: str, lasts: str) -> list[Grant]:
 
 
 def _end(until: str, lasts: str) -> float | None:
-    """The instant meant, Unix s. Raises ValueError."""
+    """Return the end of a right (Unix s); None: unlimited. Raises ValueError."""
     now = datetime.now().astimezone()
     if until and lasts:
         raise ValueError("either --until or --for")
@@ -159,7 +159,7 @@ def _end(until: str, lasts: str) -> float | None:
 
 
 def _password() -> str:
-    """Asked for on the terminal; from a pipe, its first line."""
+    """Return a password, typed on the terminal or the first line of a pipe. Raises ValueError."""
     if not sys.stdin.isatty():
         return sys.stdin.readline().rstrip("\n")
     first, again = getpass.getpass("password: "), getpass.getpass("the same again: ")
@@ -174,7 +174,7 @@ def _folder(data: Path | None) -> Path:
 
 @contextmanager
 def _store(data: Path | None, database: str) -> Iterator[AccessStore]:
-    """The list; mistakes end the program with one line."""
+    """Context with the list of identities; errors end the program with one line."""
     try:
         store = open_store(_folder(data), database)
         try:

@@ -46,7 +46,7 @@ def command(
 
 
 def _print(trail: Trail, robot: str, after: int) -> int:
-    """The rows behind ``after``; the number of the last."""
+    """Print the rows after number ``after``; return the number of the last."""
     for number, entry in trail.rows(robot=robot, after=after):
         print(_line(number, entry), flush=True)
         after = number

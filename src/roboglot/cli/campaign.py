@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SEEDS_MAX = 100_000
 OUT = Path("campaign")
-KEPT_MAX = 10  # trials of a scenario that keep recordings, maps and messages
+KEPT_MAX = 10  # trials per scenario that keep recordings, maps and messages
 
 
 def command(
@@ -66,7 +66,7 @@ def command(
 
 
 def _player(on: str, folders: Sequence[Path], workers: int, longest: float) -> Player:
-    """Return what plays trials: the cluster that is meant, or this machine. Raises MissingExtra."""
+    """Return the player of trials: the given cluster, or this machine. Raises MissingExtra."""
     if on:
         from roboglot.testing.campaign.cluster import play_on
 
@@ -81,7 +81,7 @@ def _player(on: str, folders: Sequence[Path], workers: int, longest: float) -> P
 
 
 def _play(left: list[Trial], table: Table, player: Player) -> bool:
-    """Play the remaining trials, with a line for each failure; returns whether it was interrupted."""
+    """Play the remaining trials and print a line for each failure; return True if interrupted."""
     from roboglot.testing.campaign.trials import Outcome
 
     kept: Counter[str] = Counter()
@@ -109,7 +109,7 @@ def _play(left: list[Trial], table: Table, player: Player) -> bool:
 
 
 def _write(table: Table, folder: Path, wanted: int) -> None:
-    """Write the report and, where pyarrow is there, the table for data tools."""
+    """Write the report and, if pyarrow is installed, the table for data tools."""
     from roboglot.testing.campaign.report import report
     from roboglot.testing.campaign.table import write_parquet
 

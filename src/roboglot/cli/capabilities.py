@@ -1,6 +1,6 @@
 """``roboglot capabilities``: what each protocol can do on each kind of robot, computed from the code's own tables.
 
-An operation can be done where the robot has all components that its handler declares that it needs.
+A robot supports an operation if it has all components that the handler declares as needed.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ PAGE = Path("docs/capabilities.md")
 
 @dataclass(frozen=True, slots=True)
 class RobotKind:
-    """A kind of robot: its components, and what of them is approximate (in plain words)."""
+    """A kind of robot: its components, and plain descriptions of the approximate ones."""
 
     name: str
     components: frozenset[type[Component]]
     nearly: Mapping[type[Component], str]
 
     def judge(self, needed: frozenset[type[Component]]) -> str:
-        """``exact``, ``nearly`` or ``refused``."""
+        """Return ``exact``, ``nearly`` or ``refused`` for operations that need these components."""
         if needed - self.components:
             return "refused"
         return "nearly" if any(self.nearly.get(interface) for interface in needed) else "exact"
@@ -57,7 +57,7 @@ def command(write: Annotated[bool, typer.Option("--write", help="Write docs/capa
 
 
 def _show_progress(done: int, name: str) -> None:
-    """Progress on a terminal: each kind of robot is built, which takes seconds."""
+    """Show progress on a terminal, as building each kind of robot takes seconds."""
     if sys.stderr.isatty():
         total = len(BODIES) + len(DRIVERS)
         words = f"{done} of {total} kinds of robots; building {name} …" if name else ""
@@ -65,9 +65,9 @@ def _show_progress(done: int, name: str) -> None:
 
 
 def kinds(report: Callable[[int, str], None] = lambda _done, _name: None) -> list[RobotKind]:
-    """Simulated bodies as the office world equips them, and what drivers announce, each with our skills and memory.
+    """Return simulated bodies, as in the office world, and drivers' robots, each with our skills and memory.
 
-    ``report`` hears how many are done and which comes next, "" at the end.
+    ``report`` is called with the number done and the name of the next one, "" at the end.
     """
     return asyncio.run(_kinds(report))
 
@@ -87,7 +87,7 @@ async def _kinds(report: Callable[[int, str], None]) -> list[RobotKind]:
 
 
 def page(report: Callable[[int, str], None] = lambda _done, _name: None) -> str:
-    """The page; ``report`` hears of the progress."""
+    """Return the page; ``report`` as in ``kinds``."""
     columns = kinds(report)
     lines = [
         "# Capabilities",
@@ -135,7 +135,7 @@ def _chapters(door: DoorType, columns: list[RobotKind]) -> list[str]:
 
 
 def _refusals(door: DoorType, drivers: list[RobotKind]) -> list[str]:
-    """A row for all requests that each of the drivers' robots refuses for want of the same parts."""
+    """Return a row for each group of requests that all drivers' robots refuse for lack of the same components."""
     needs, rows = {str(op.key): op.needs for op in door.table()}, door.contracts[0].rows()
     alike: dict[tuple[str, ...], list[str]] = {}
     for row in rows:

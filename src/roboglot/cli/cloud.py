@@ -59,7 +59,7 @@ def command(
 
 
 def _warn_if_open(address: str, insecure: bool) -> None:
-    """End here, unless it stays on this machine or is meant to be open; what is open then is said in red."""
+    """End the program for an address outside loopback without ``insecure``; with it, print a warning in red."""
     from rich.console import Console
 
     from roboglot.config import is_loopback

@@ -110,26 +110,26 @@ def _say(line: str) -> None:
 
 
 class _Registered:
-    """Places by the registry of robots' homes, which knows each gateway's certificate."""
+    """Places from the registry of robots' homes, which has each gateway's certificate."""
 
     def __init__(self, whereabouts: Whereabouts) -> None:
         self._whereabouts = whereabouts
 
     async def of(self, robot: str) -> Place | None:
-        """Return its gateway. Raises OSError."""
+        """Return the robot's gateway, or None. Raises OSError."""
         found = await self._whereabouts.of(robot)
         if found is None:
             return None
         return Place(found.host, found.port, AnnouncedGateway(found.certificate), found.epoch)
 
     async def moved(self, robot: str, place: Place) -> None:
-        """Return when the registry has another one."""
+        """Return when the registry has another gateway of the robot."""
         await self._whereabouts.moved(robot, place.epoch)
 
 
 @contextmanager
 def registered(registry: str) -> Iterator[Places]:
-    """Find robots by a registry: a PostgreSQL server's URL, or a file. Raises OSError, ValueError, sqlite3.Error."""
+    """Context to find robots by a registry: a PostgreSQL URL, or a file. Raises OSError, ValueError, sqlite3.Error."""
     from roboglot.storage.homes import Homes
     from roboglot.storage.opening import read_registry
     from roboglot.storage.whereabouts import Whereabouts
@@ -142,7 +142,7 @@ def registered(registry: str) -> Iterator[Places]:
 
 
 def _one(gateway: str) -> AbstractContextManager[Places]:
-    """Return the one gateway that was named."""
+    """Return the given gateway as the place of all robots."""
     host, _, port = gateway.rpartition(":") if gateway.rpartition(":")[2].isdigit() else (gateway, "", str(PORT))
     known = KnownGateways(_settings() / "gateways.json")
     return nullcontext(OnePlace(Place(host.strip("[]"), int(port), known)))

@@ -1,4 +1,4 @@
-"""``roboglot coverage``: rows done of each protocol, computed from the code against the contract files."""
+"""``roboglot coverage``: implemented rows of each protocol, computed from code and contract files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CONTRACTS = {contract.name: contract for door in DOORS for contract in door.cont
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """One protocol: every row of its contract, which are wholly there, and which in part (with what is missing)."""
+    """One protocol: all rows of its contract, the complete ones, and the partial ones with their missing parts."""
 
     rows: tuple[Row, ...]
     done: frozenset[str]
@@ -27,12 +27,12 @@ class Coverage:
 
     @property
     def missing(self) -> list[str]:
-        """Keys of what is not there, or only in part."""
+        """Keys of missing and partial rows."""
         return [row.key for row in self.rows if row.key not in self.done]
 
 
 def measure(contract: Contract) -> Coverage:
-    """Compare the code with the contract; a key that the contract lacks is a mistake in the code."""
+    """Compare the code with the contract. Raises ValueError for a key that the contract lacks."""
     rows, implementation = tuple(contract.rows()), contract.implementation()
     keys = {row.key for row in rows}
     done = implementation.implemented()
@@ -62,7 +62,7 @@ def _numbers(coverage: Coverage) -> dict[str, object]:
 
 
 def page(measured: dict[str, Coverage]) -> str:
-    """The coverage page."""
+    """Return the coverage page."""
     lines = [
         "# Coverage",
         "",

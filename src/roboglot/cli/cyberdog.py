@@ -81,7 +81,7 @@ def _print_feedback(code: int) -> None:
 
 
 async def _watch(client: CyberDogClient, _: list[str]) -> None:
-    """The heartbeat, live, until interrupted."""
+    """Show the heartbeat, live, until interrupted."""
     await client.found()
     with Live(console=console, auto_refresh=False) as live:
         while True:
@@ -132,7 +132,7 @@ async def _drive(client: CyberDogClient, words: list[str]) -> None:
 
 
 async def _map(client: CyberDogClient, words: list[str]) -> None:
-    """Wait for a line on standard input; drive meanwhile from elsewhere."""
+    """Map until a line on standard input; the dog is driven from elsewhere meanwhile."""
     if len(words) != 1:
         raise ValueError("it takes the map's name")
     await client.found()
@@ -161,7 +161,7 @@ async def _growth(client: CyberDogClient, begun: asyncio.Event) -> None:
 
 
 async def _go(client: CyberDogClient, words: list[str]) -> None:
-    """Localizes first."""
+    """Localize the dog, then navigate to the goal."""
     goal = _numbers(words, 2, 3)
     await client.found()
     with contextlib.suppress(CyberDogRefused):  # already localized, or navigation will report the problem

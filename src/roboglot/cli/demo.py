@@ -43,7 +43,7 @@ def command(
 
 
 def _compile_kernels() -> None:
-    """Compile what is not compiled yet, after an installation: the tour does not wait for it on its way."""
+    """Compile missing kernels before the tour, so that it does not wait for them on its way."""
     from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead
 
     def report(name: str, done: int, total: int) -> None:
@@ -56,7 +56,7 @@ def _compile_kernels() -> None:
 
 
 def _obstacle(address: str, out: Path) -> str:
-    """Return what would stop the tour, before it begins; empty if nothing would."""
+    """Return what would prevent the tour; empty: nothing."""
     try:
         existed = out.exists()
         out.open("ab").close()

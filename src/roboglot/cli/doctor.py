@@ -49,7 +49,7 @@ def command(
 
 
 def examine(config: Config) -> Iterator[Finding]:
-    """All checks, in the order of a start."""
+    """Yield all checks, in the order of a start."""
     version = platform.python_version()
     yield Finding("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")
     yield Finding("Linux", sys.platform == "linux", sys.platform, "programs need Linux (seccomp); the rest may work")
@@ -73,7 +73,7 @@ def _data_folder(folder: Path) -> Finding:
 
 
 def examine_ports(config: Config) -> Iterator[Finding]:
-    """Check that the first robot's ports are free, or held by a roboglot that is up."""
+    """Check that the first robot's ports are free, or held by a running roboglot."""
     address = config.robots[0].address
     for door in DOORS:
         for label, number in door.numbers(config).items():
@@ -97,7 +97,7 @@ def _port(name: str, address: str, port: int) -> Finding:
 
 
 def examine_sandbox() -> Finding:
-    """Examine whether users' programs can be confined."""
+    """Check that users' programs can be confined."""
     from roboglot.programs.engine.engine import Engine, SandboxUnavailable
 
     async def layers() -> str:
@@ -116,7 +116,7 @@ def examine_sandbox() -> Finding:
 
 
 def _kernels() -> Finding:
-    """Load the numeric kernels; compile those that are not compiled yet."""
+    """Load the numeric kernels; compile missing ones."""
     from roboglot.kernels import MODULES
     from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead
 

@@ -204,7 +204,7 @@ def _folder(data: Path | None) -> Path:
 
 
 class _Asked(NamedTuple):
-    """Options of a plan; none of them: the plan that is kept."""
+    """Options of a plan; without options: the stored plan."""
 
     worlds: int
     robots_each: int
@@ -213,7 +213,7 @@ class _Asked(NamedTuple):
 
 
 def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
-    """Return the plan that is kept, or a new one. Raises ValueError if the kept one is for something else."""
+    """Return the stored plan, or a new one. Raises ValueError if the stored one has other options."""
     from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet
 
     kept = None if replan else load(folder)
@@ -235,7 +235,7 @@ def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
 
 
 def _where(on: str) -> AbstractContextManager[None]:
-    """Be part of the cluster that is meant, if one is. Raises MissingExtra, OSError."""
+    """Return a context in the cluster ``on``, if given. Raises MissingExtra, OSError."""
     if not on:
         return nullcontext()
     from roboglot.shards.cluster import joined
@@ -290,7 +290,7 @@ def _first_address(fleet_host: FleetHost) -> str:
 
 
 def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
-    """Return what `fleet up` says when all worlds are up or have failed."""
+    """Return the text of `fleet up` when all worlds are up or have failed."""
     from roboglot.shards.supervisor import State
 
     shards = list(fleet_host.shards.values())
@@ -304,7 +304,7 @@ def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
 
 
 def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:
-    """Return the fleet's answer; ends the program with a sentence if there is none, or if it refused."""
+    """Return the fleet's answer; without one, or after a refusal, end the program with a sentence."""
     from roboglot.hosting.local_socket import ask
     from roboglot.shards.wishes import SOCKET, Answer, Request
 

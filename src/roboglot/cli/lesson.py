@@ -1,4 +1,4 @@
-"""``roboglot lesson``: play missions of the studio back: each solution must pass, each typical mistake must fail."""
+"""``roboglot lesson``: plays missions of the studio; each solution must pass, each typical mistake must fail."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ async def _graded(rehearsals: Rehearsals, lesson: Lesson, program: str) -> Grade
 
 
 def _judge(what: str, grade: Grade, fails: str, chinese: bool) -> bool:
-    """Print a line and the reasons. ``fails``: the check that must fail; empty: all that are needed must pass."""
+    """Print a line and the reasons. ``fails``: the check that must fail; empty: all required checks must pass."""
     failed = [row for row in grade.rows if not row.passed]
     right = grade.passed if not fails else fails in [row.kind for row in failed if not row.star]
     stars = f"{grade.stars} of 3 stars" if grade.passed else "not passed"

@@ -1,4 +1,4 @@
-"""``roboglot map``: ROS maps (yaml beside an image) and composite maps to a robot, from it, and floors to one map."""
+"""``roboglot map``: loads and saves a robot's map (ROS or composite), builds maps from logs, and merges floors."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def command(
 
 
 def _read(path: Path) -> bytes:
-    """A map's file as a composite map. Raises BadMap, ValueError, OSError."""
+    """Return a map file as a composite map. Raises BadMap, ValueError, OSError."""
     if path.suffix != COMPOSITE:
         return encode_stcm(composite_of(FloorMap(grid=read_ros_grid(path))))
     data = path.read_bytes()
@@ -103,7 +103,7 @@ def _read(path: Path) -> bytes:
 
 
 def grid_in(data: bytes) -> OccupancyGrid:
-    """The grid of a composite map's first floor that has one. Raises BadMap."""
+    """Return the first grid in a composite map. Raises BadMap."""
     grid = next((floor.grid for floor in floors_of(decode_stcm(data)) if floor.grid is not None), None)
     if grid is None or not grid.width:
         raise BadMap("the map is empty")

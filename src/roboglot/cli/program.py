@@ -1,4 +1,4 @@
-"""``roboglot program``: block programs from files, checked, saved, run and watched; on a running robot or one's own."""
+"""``roboglot program``: checks, saves, runs and watches block programs, on a running robot or a separate one."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class What(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """Operation on a task (or module); ``saving`` are the fields it is saved with."""
+    """Operation on a task (or module); ``saving``: its fields when saved."""
 
     what: What
     task: str
@@ -123,7 +123,7 @@ def _stops(breaks: list[int] | None, *, step: bool) -> Stops | None:
 
 
 async def _check(file: Path, source: str, *, as_json: bool) -> int:
-    """Print what is wrong, as compilers do; the exit status."""
+    """Print errors, as compilers do; return the exit status."""
     from roboglot.programs.engine.engine import Engine, EngineError, SandboxUnavailable
     from roboglot.programs.functions.prelude import ability_set
 
@@ -197,7 +197,7 @@ async def _ask(frames: TextLink, operate: str, *targets: str, **fields: str) -> 
 
 
 async def _run(frames: TextLink, log: TextLink, task: str, condition: str, stepper: Stepper | None = None) -> None:
-    """Run it, and show what it does until it has ended; an interruption ends it."""
+    """Run a task and show its blocks and prints to its end; an interruption ends it."""
     await _ask(frames, "run", task)
     if condition.strip() != "now":
         print(f"{task} waits for {condition}")
@@ -218,7 +218,7 @@ async def _run(frames: TextLink, log: TextLink, task: str, condition: str, stepp
 
 
 async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = None) -> str:
-    """Show begin and end of blocks; why the program ended, "" for at its end."""
+    """Show begin and end of blocks; return the error that ended the program, "" for none."""
     error = ""
     async for text in frames:
         frame = json.loads(text)
@@ -246,7 +246,7 @@ async def _follow_blocks(frames: TextLink, task: str, stepper: Stepper | None = 
 
 
 async def _halted(stepper: Stepper | None) -> bool:
-    """Show that the program halts; False if the user ended it meanwhile."""
+    """Show that the program halts; return False if the user ends it."""
     if stepper is not None:
         return await stepper.halted()
     print("‖ suspended", file=sys.stderr, flush=True)
@@ -279,7 +279,7 @@ async def _print_log(log: TextLink, task: str, *, as_json: bool) -> int:
 
 
 async def _follow_log(log: TextLink, task: str, errors: set[str] | None = None, *, times: bool = False) -> int:
-    """Print lines of ``task`` until the robot says that these were all; how many it has kept. ``errors`` are added."""
+    """Print lines of ``task`` up to the last; return the number of stored ones. Errors are added to ``errors``."""
     async for text in log:
         line = json.loads(text)
         if "entries" in line:
@@ -297,7 +297,7 @@ async def _follow_log(log: TextLink, task: str, errors: set[str] | None = None, 
 
 
 async def _list(address: str, frames: TextLink, kind: str, *, as_json: bool) -> None:
-    """Tasks or modules; of those that run, what they take of the machine."""
+    """Print tasks or modules, with the resources of running ones."""
     listed: list[TaskFrame] = (await _ask(frames, "inquiry", type=kind))["list"]
     async with _link(address, RUNS) as link:
         await link.send("")
@@ -323,7 +323,7 @@ def _print_table(kind: str, listed: list[TaskFrame]) -> None:
 
 
 def _figures(run: TaskFrame | None) -> list[str]:
-    """Processor time, memory and age of a run."""
+    """Return processor time, memory and age of a run, as text."""
     if run is None:
         return ["", "", ""]
     minutes, seconds = divmod(int(run["age"]), 60)
@@ -333,7 +333,7 @@ def _figures(run: TaskFrame | None) -> list[str]:
 
 @contextlib.asynccontextmanager
 async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
-    """A robot in this process, with nothing but the programs' WebSocket on any free port; its address."""
+    """Start a robot in this process with only the programs' WebSocket, on a free port; yield its address."""
     from roboglot.fleet import build_fleet
     from roboglot.model.clock import RealClock
     from roboglot.programs.engine.engine import Engine

@@ -31,7 +31,7 @@ CYBERDOG_PORT = 50052
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A robot: its URL, and what it says of itself."""
+    """A robot: its URL, and its own description."""
 
     url: str
     words: str
@@ -57,7 +57,7 @@ def command(
 
 
 def expand(texts: Iterable[str]) -> Iterable[str]:
-    """Every address of addresses and networks. Raises ValueError beyond ADDRESSES_MAX."""
+    """Yield every address of addresses and networks. Raises ValueError beyond ADDRESSES_MAX."""
     count = 0
     for text in texts:
         network = ip_network(text, strict=False)
@@ -77,7 +77,7 @@ async def _scan(hosts: list[str], seconds: float) -> list[Found]:
 
 
 async def find(hosts: list[str], seconds: float) -> AsyncIterator[Found]:
-    """Robots as they answer."""
+    """Yield robots as they answer."""
     turns = asyncio.Semaphore(AT_ONCE_MAX)
 
     async def ask(probe: Callable[[str], Awaitable[Found | None]], host: str) -> list[Found]:

@@ -13,7 +13,7 @@ from roboglot.protocols.door import Endpoint
 
 
 def warn_if_open(config: Config) -> None:
-    """Print in red, on standard error, what is open to whom; nothing for robots on loopback or with access control."""
+    """Warn in red, on standard error, of open doors; not for robots on loopback or with access control."""
     if config.access.on:
         return
     console = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -27,14 +27,14 @@ def warn_if_open(config: Config) -> None:
 
 
 def _open_doors(config: Config) -> str:
-    """Name what takes anyone's commands, and what asks for something by itself."""
+    """Name the doors that obey all clients, and those that demand something by themselves."""
     listening = [door for door in DOORS if door.listens(config)]
     asking = [f"{door.title} asks for {door.asks}" for door in listening if door.asks]
     return "; ".join([", ".join(door.title for door in listening if not door.asks), *asking])
 
 
 def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: str = "") -> None:
-    """Every door's address and one line to copy that tries it, and the console's ``page``; no line is broken."""
+    """Print every door's address with a line that tries it, and the console's ``page``; lines are not wrapped."""
     console = Console(highlight=False, soft_wrap=True)
     pace = "lockstep: type seconds" if config.lockstep else f"x{config.speed:g}"
     console.print(f"[bold]roboglot[/]  world {config.world} · clock {pace} · data {escape(str(config.data))}")

@@ -1,4 +1,4 @@
-"""Walking through a program from the terminal: where it halts, and what people type then. Knows no frame."""
+"""Stepping through a program from the terminal: its halts, and the commands typed there. Knows no frame."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Stepper:
         self._reading = False
 
     async def prepare(self) -> str:
-        """Say where to halt, once the task is saved; why that cannot be, "" if it can."""
+        """Set the places to halt at, once the task is saved; return the error, "" for none."""
         return str((await self._ask("break", lines=list(self._lines), first=self._first))["error"])
 
     async def halted(self) -> bool:
@@ -55,7 +55,7 @@ class Stepper:
         raise LinkLost("the robot went away")
 
     async def _type(self) -> str:
-        """A line of the terminal; "c" at its end. Read in a daemon thread, as Ctrl-C would hang otherwise."""
+        """Return a typed line; "c" at the end of input. Read in a daemon thread, as Ctrl-C would hang otherwise."""
         if not self._reading:
             self._reading = True
             print(f"  {HELP}", file=sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-"""``roboglot test``: scenarios in YAML, each on robots of its own, judged by the truth of the world."""
+"""``roboglot test``: scenarios in YAML, each on its own robots, judged by ground truth."""
 
 from __future__ import annotations
 

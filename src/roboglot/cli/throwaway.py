@@ -1,6 +1,6 @@
-"""A command that was run by uvx or pipx without installing anything: it is run again with the extra that it needs.
+"""Runs a command of uvx or pipx, which install nothing permanently, again with the extra that it needs.
 
-Environments that their owners keep are left alone; there one sentence says what to install.
+Permanent environments are left alone; there one sentence says what to install.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ AGAIN = "ROBOGLOT_RUN_AGAIN"  # set for the second run, which is the last
 
 
 def runner() -> list[str]:
-    """Return the command that runs one of ours from a requirement, which it takes last; empty if nothing does."""
+    """Return the command that runs roboglot from a requirement, its last argument; empty if there is none."""
     if AGAIN in os.environ:
         return []
     uv = os.environ.get("UV", "")  # uv sets this for its child processes
@@ -30,7 +30,7 @@ def runner() -> list[str]:
 
 
 def requirement(extra: str) -> str:
-    """Return this very roboglot with an extra: from where it was installed, else by its version."""
+    """Return this roboglot with an extra as a requirement: by its source of installation, else by its version."""
     try:
         here = distribution("roboglot")
     except PackageNotFoundError:
@@ -40,7 +40,7 @@ def requirement(extra: str) -> str:
 
 
 def run_again(command: list[str], extra: str, arguments: list[str]) -> NoReturn:
-    """Have ``command`` run roboglot's ``arguments`` with ``extra``. Raises OSError."""
+    """Replace this process by ``command`` with ``extra`` and roboglot's ``arguments``. Raises OSError."""
     wanted = requirement(extra)
     print(f"roboglot: running again with {wanted}, which is fetched once", file=sys.stderr, flush=True)
     os.environ[AGAIN] = "1"

@@ -140,7 +140,7 @@ def command(
 
 
 def access_section(*, on: bool, insecure: bool) -> dict[str, object] | None:
-    """Return what the options say of [access]; --insecure beats a file that is on. Raises ValueError for both."""
+    """Return the options' section [access]; --insecure overrides the file's. Raises ValueError for both options."""
     if on and insecure:
         raise ValueError("--access asks who comes and --insecure lets everyone in: give one of them")
     return {"on": on} if on or insecure else None
@@ -168,7 +168,7 @@ def _with_door_options() -> inspect.Signature:
 
 
 def _sections(given: Mapping[str, object]) -> dict[str, object]:
-    """Return the doors' sections of the configuration as far as options were given."""
+    """Return the doors' sections of the configuration, from the given options."""
     found: dict[str, object] = {}
     for door in DOORS:
         values = {
@@ -187,7 +187,7 @@ def _robots(texts: list[str]) -> list[dict[str, object]]:
 
 
 async def _serve(config: Config, *, open_console: bool) -> int:
-    """Run until a signal; the exit status."""
+    """Run until a signal; return the exit status."""
     from roboglot.runtime import Runtime
 
     stop = asyncio.Event()
@@ -231,7 +231,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
 
 
 async def _step(clock: LockstepClock) -> None:
-    """Each line on standard input is seconds to pass; each is answered by the time reached."""
+    """Advance by the seconds on each line of standard input; answer each with the time reached."""
     async for line in _lines():
         try:
             seconds = float(line)
@@ -245,7 +245,7 @@ async def _step(clock: LockstepClock) -> None:
 
 
 async def _lines() -> AsyncIterator[str]:
-    """Lines of standard input, until it ends."""
+    """Yield lines of standard input, until it ends."""
     reader = asyncio.StreamReader(limit=LINE_MAX)
     with contextlib.suppress(PermissionError, OSError):  # standard input may be a file or closed
         await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(0))

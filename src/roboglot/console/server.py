@@ -59,7 +59,7 @@ class Console:
         return f"{'https' if self._tls else 'http'}://{host}:{self.port}"
 
     def open(self) -> None:
-        """Bind the port, or the next free one, and get ready in the background. No console is no reason to fail.
+        """Bind the port, or the next free one, and get ready in the background. Without a port, only log a warning.
 
         Raises MissingExtra if metrics are to be pushed and their package is missing.
         """

@@ -40,7 +40,7 @@ class Pad:
         self.late = 0
 
     def drive(self, wish: Velocity, now: float) -> bool:
-        """Drive so for ``DEAD_MAN`` s; ``now``: the server's time in ms. False: it was old and is ignored.
+        """Drive for ``DEAD_MAN`` s; ``now``: the server's time in ms. Return False for an old velocity, ignored.
 
         Raises the errors of driving (Busy, EmergencyStopped, …).
         """

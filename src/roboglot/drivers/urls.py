@@ -34,8 +34,8 @@ class Drivers:
         ``slamware://HOST[:PORT]``, ``robomaster://HOST[:PORT]``, ``robomaster://discover``, and
         ``cyberdog://HOST[:PORT]?certs=FOLDER[&app=PORT]``: the folder has ca-cert.pem, client-cert.pem and
         client-key.pem, or is "none" for a dog on this machine that talks without TLS; the dog calls back at ``app``.
-        RoboMasters take ``?event=PORT&video=PORT&audio=PORT&push=PORT&local=ADDRESS`` where those are not a real one's,
-        and ``drive=speed`` to be driven by velocities that stand until they are changed.
+        RoboMasters take ``?event=PORT&video=PORT&audio=PORT&push=PORT&local=ADDRESS`` if not a real one's, and
+        ``drive=speed`` for velocities that last until changed, instead of short moves.
         """
         try:
             parts = urlsplit(url)

@@ -47,7 +47,7 @@ class Overview:
         return f"http://{self._host}:{self._socket.getsockname()[1]}{PAGE}" if self._socket is not None else ""
 
     def open(self) -> None:
-        """Bind the port and get ready in the background. Outside of loopback, or with no free port, no page opens."""
+        """Bind the port and get ready in the background; outside loopback, or without a free port, no page opens."""
         if not is_loopback(self._host):
             return
         try:

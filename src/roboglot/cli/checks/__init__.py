@@ -1,1 +1,1 @@
-"""Checks of `roboglot doctor` besides packages: listening ports, and what is open to whom."""
+"""Checks of `roboglot doctor` besides packages: listening ports, and their reach."""

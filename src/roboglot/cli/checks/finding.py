@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One check: whether it is well, what was seen, and what to do if not."""
+    """One check: its name, True if all is well, the observation, and a remedy."""
 
     name: str
     well: bool

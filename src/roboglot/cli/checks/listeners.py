@@ -22,7 +22,7 @@ class Holder:
 
     @property
     def is_roboglot(self) -> bool:
-        """True for ``roboglot up`` and what else this program serves."""
+        """True for ``roboglot up`` and other servers of this program."""
         return "roboglot" in self.command
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""``roboglot doctor --security``: what listens where, who may reach it, rights no one uses, weak spots in words."""
+"""``roboglot doctor --security``: listeners, their reach, unused rights, and weak settings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DAY = 86400.0  # s
 
 
 def examine_security(config: Config) -> Iterator[Finding]:
-    """All of it, what listens first."""
+    """Yield all findings, listeners first."""
     yield from _listeners(config)
     yield from _opened(config)
     yield from _fingerprints(config)
@@ -45,7 +45,7 @@ def reach_of(address: str) -> str:
 
 
 def _listeners(config: Config) -> Iterator[Finding]:
-    """Every TCP port of the configuration: whether it is open now, and to whom it would be."""
+    """Yield every TCP port of the configuration: its state, and the clients that could reach it."""
     places = [
         (f"robot {robot.name}, {label}", robot.address, number)
         for robot in config.robots
@@ -154,7 +154,7 @@ def _weakness(identity: Identity, grants: list[Grant]) -> str:
 
 
 def _unused(config: Config, identities: list[Identity]) -> Iterator[Finding]:
-    """Rights to change something that were not used for UNUSED_DAYS; only where the audit is that old."""
+    """Yield rights beyond seeing that were not used for UNUSED_DAYS; none if the audit is younger."""
     now = time.time()
     if not config.database and not (config.data / TRAIL).exists():
         return
@@ -171,7 +171,7 @@ def _unused(config: Config, identities: list[Identity]) -> Iterator[Finding]:
 
 
 def _used(config: Config, since: float) -> tuple[Mapping[str, set[Right]], float | None]:
-    """Return which rights each identity made use of, and when the audit begins."""
+    """Return the rights used by each identity, and the beginning of the audit (Unix s)."""
     needed: dict[tuple[str, str], Right] = {
         (door.name, str(_key(operation.key))): operation.right
         for door in DOORS
@@ -197,7 +197,7 @@ def _key(key: object) -> object:
 
 
 def _settings(config: Config) -> Iterator[Finding]:
-    """Settings that open more than they say."""
+    """Yield settings that open more than their names suggest."""
     for name, section in (*((door.name, door.section(config)) for door in DOORS), ("console", config.console)):
         if "*" in getattr(section, "origins", ()):
             yield Finding(f"[{name}] origins", False, "every web page may command the robots", "name the pages")

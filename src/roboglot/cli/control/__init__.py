@@ -1,1 +1,1 @@
-"""Control of the robots of a running ``roboglot up``: who moves them, stop, start again."""
+"""Control of the robots of a running ``roboglot up``: lease, stop, reset."""

@@ -47,7 +47,7 @@ def command(
 
 
 def wish(command: str, request: Request, data: Path | None) -> Answer:
-    """Return the answer of the running `roboglot up`; ends the program with a sentence if there is none."""
+    """Return the answer of the running `roboglot up`; without one, end the program with a sentence."""
     folder = data or default_data_folder(os.environ)
     try:
         answer = asyncio.run(_ask(folder / NAME, request))
@@ -59,7 +59,7 @@ def wish(command: str, request: Request, data: Path | None) -> Answer:
 
 
 async def _ask(path: Path, wish: Request) -> Answer:
-    """TimeoutError if the robot does not brake in time; it is an OSError, as all others."""
+    """Return the answer. Raises OSError; its subclass TimeoutError if the robot does not brake in time."""
     line = await ask(path, msgspec.json.encode(wish), PATIENCE)
     try:
         return msgspec.json.decode(line, type=Answer)
@@ -68,7 +68,7 @@ async def _ask(path: Path, wish: Request) -> Answer:
 
 
 def in_words(control: Control) -> str:
-    """A line of the table."""
+    """Return a line of the table."""
     if control.holder:
         moved = f"moved by {control.holder}" + (f" ({control.doing}" if control.doing else " (")
         moved += f"{' ' if control.doing else ''}for {control.seconds:.0f} s)"

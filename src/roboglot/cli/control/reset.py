@@ -1,4 +1,4 @@
-"""``roboglot reset``: a simulated robot of a running ``roboglot up`` is put back as it was at the start."""
+"""``roboglot reset``: returns a simulated robot of a running ``roboglot up`` to its start."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``roboglot stop``: what a robot of a running ``roboglot up`` does is cancelled; it brakes and stands."""
+"""``roboglot stop``: cancels all actions of a robot of a running ``roboglot up``, which brakes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``roboglot map build``: a recorded drive to a map that any door can load, its trajectory and a report."""
+"""``roboglot map build``: makes a map, which every door can load, a trajectory and a report from a recorded drive."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def build(log: Path, out: Path, relations: Path | None) -> None:
 
 
 def tum(drive: MappedDrive) -> str:
-    """The trajectory as TUM's tools read it: stamp x y z qx qy qz qw."""
+    """Return the trajectory in TUM's format: stamp x y z qx qy qz qw."""
     lines = []
     for point in drive.trajectory:
         x, y, half = point.pose.x, point.pose.y, point.pose.yaw / 2
@@ -81,7 +81,7 @@ def report(recording: DriveLog, drive: MappedDrive, relations: Path | None) -> s
 
 
 def accuracy(recording: DriveLog, drive: MappedDrive, relations: Path | None) -> list[tuple[str, str]]:
-    """Against the file of relations, or against the reference in the log, if there is one."""
+    """Return rows of errors against the file of relations, or the log's reference, if there is one."""
     estimated = [(point.stamp, point.pose) for point in drive.trajectory]
     known = {item.scan.stamp: item.reference for item in recording.scans if item.reference is not None}
     pairs = [(stamp, pose, known[stamp]) for stamp, pose in estimated if stamp in known]

@@ -21,10 +21,10 @@ LABELS = ("building", "floor", "order", "default")
 
 
 def merged(floors: Sequence[str], building: str, fetch: Callable[[str], bytes]) -> bytes:
-    """A composite map with a floor for each "NAME=SOURCE", lowest first; the robot begins on the first.
+    """Return a composite map with a floor for each "NAME=SOURCE", lowest first; the robot starts on the first.
 
     A source is a composite map's file (of one floor, or with one of that name), a ROS map (.yaml), or a robot's http://
-    address, whose map ``fetch`` gets.
+    address, from which ``fetch`` gets the map.
     Raises BadMap and ValueError in plain words, OSError.
     """
     if not 0 < len(floors) <= FLOORS_MAX:
@@ -49,7 +49,7 @@ def merged(floors: Sequence[str], building: str, fetch: Callable[[str], bytes]) 
 
 
 def _floor_of(name: str, source: str, fetch: Callable[[str], bytes]) -> FloorMap:
-    """The one floor of a source; of several, the one of that name."""
+    """Return the only floor of a source, or the one of that name."""
     if source.endswith((".yaml", ".yml")):
         return FloorMap(grid=read_ros_grid(Path(source)))
     data = fetch(source) if "://" in source else Path(source).read_bytes()

@@ -1,4 +1,4 @@
-"""Writes grids as ROS's map_server reads them."""
+"""Writes grids in the format of ROS's map_server."""
 
 from __future__ import annotations
 

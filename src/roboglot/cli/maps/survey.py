@@ -1,4 +1,4 @@
-"""A composite map of all floors of a world, from its plan: walls and furniture as a lidar sees them, docks, lift."""
+"""A composite map of all floors of a world, from its plan: walls and furniture as seen by a lidar, docks, lift."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BODY_GAP = 0.3  # m of a lift's sill
 
 
 def surveyed(world: WorldDescription) -> bytes:
-    """The map; its frame is the world's. Raises BadMap."""
+    """Return the map, in the world's frame. Raises BadMap."""
     docks = docks_of(world)
     layers: list[Layer] = []
     for number, floor in enumerate(world.floors):
@@ -73,7 +73,7 @@ def _grid(floor: Floor, lift: Lift | None) -> OccupancyGrid:
 
 
 def _around(solid: Solid, x: NDArray[np.floating], y: NDArray[np.floating]) -> tuple[slice, slice]:
-    """Return the rows and columns that a solid may reach, whichever way it faces; a cell more on each side."""
+    """Return the rows and columns that a solid may cover in every orientation, with a margin of one cell."""
     reach = math.hypot(solid.size[0], solid.size[1]) / 2 + RESOLUTION
     (top, bottom), (left, right) = (
         np.searchsorted(axis, (middle - reach, middle + reach))
@@ -83,7 +83,7 @@ def _around(solid: Solid, x: NDArray[np.floating], y: NDArray[np.floating]) -> t
 
 
 def _depth(solid: Solid, x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return how far (m) each cell is below the surface of a solid; below 0: outside."""
+    """Return the depth (m) of each cell below a solid's surface; negative outside."""
     dx, dy = x - solid.pose.x, y - solid.pose.y
     if solid.round:
         return np.asarray(solid.size[0] / 2 - np.hypot(dx, dy))
@@ -97,7 +97,7 @@ def _car(lift: Lift) -> Pose:
 
 
 def _elevator(world: WorldDescription, lift: Lift) -> Area:
-    """The car, from its door to its back; the same lift on every floor."""
+    """Return the area of the lift's car, from door to back, with the same id on every floor."""
     car, half = _car(lift), lift.size[0] / 2
     metadata = {
         "elevator_id": str(uuid.uuid5(uuid.NAMESPACE_OID, f"{world.name}/lift")),

@@ -1,4 +1,4 @@
-"""``roboglot compare``: two recordings or robots, and how much of them agrees."""
+"""``roboglot compare``: compares two recordings or robots."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def command(
 async def compared(
     names: tuple[str, str], by: By | None, robot: str, door: str, mask: Mask, *, commands: bool
 ) -> Comparison:
-    """Compare what two names stand for. Raises ClientError, ValueError, OSError."""
+    """Compare the recordings or robots of two names. Raises ClientError, ValueError, OSError."""
     from roboglot.recording.comparing.behaviour import compare_behaviour
     from roboglot.recording.comparing.comparison import answers_only, compare
 

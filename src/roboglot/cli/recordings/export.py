@@ -1,4 +1,4 @@
-"""``roboglot export``: a recording in a form that others read."""
+"""``roboglot export``: converts a recording to a format of other tools."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``roboglot fidelity``: how much our doors agree with what was published of real robots, and with themselves."""
+"""``roboglot fidelity``: agreement of our doors with published answers of real robots, and with themselves."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ WIDTH = 110
 
 
 class Asked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One request, and what is known of its answer."""
+    """One request, and the known facts of its answer."""
 
     request: str
     status: str = ""
@@ -57,7 +57,7 @@ class Session(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Verdict(msgspec.Struct, frozen=True):
-    """One source: how many of its facts hold at our door, and those that do not, in words."""
+    """One source: number of its facts that hold at our door, and the others as text."""
 
     door: str
     source: str
@@ -75,14 +75,14 @@ def command(write: Annotated[bool, typer.Option("--write", help="Write docs/fide
 
 
 def published(door: str = "") -> tuple[Session, ...]:
-    """Return what was published of real robots, or of those that speak one protocol."""
+    """Return the published sessions of real robots, or of those with one protocol."""
     found = tomllib.loads(PUBLISHED.read_text(encoding="utf-8"))
     sessions = msgspec.convert(found["session"], tuple[Session, ...])
     return tuple(session for session in sessions if door in ("", session.door))
 
 
 async def page(addresses: str) -> str:
-    """Return the page; robots are opened at these addresses of the machine, in lockstep, so it is always the same."""
+    """Return the page; it is reproducible, as robots run in lockstep, at these addresses of this machine."""
     doors, sessions = sorted(BODY), defaultdict[str, list[Sequence[Exchange]]](list)
     verdicts: list[Verdict] = []
     for seed in SEEDS:
@@ -97,7 +97,7 @@ async def page(addresses: str) -> str:
 
 
 async def _judge(session: Session, served: _Served) -> Verdict:
-    """Ask one of our robots what was asked of a real one."""
+    """Send a real robot's requests to one of ours, and compare the answers."""
     wrong: list[str] = []
     facts = 0
     line = served.targets[session.door].line(RealClock(), lambda _operation, _data: None)
@@ -128,7 +128,7 @@ def _request(door: str, text: str) -> tuple[str, bytes]:
 
 
 def _facts(asked: Asked, answers: Sequence[tuple[bytes, str]]) -> list[tuple[bool, str]]:
-    """Return each known fact: whether it holds, and the answer received instead."""
+    """Return, for each known fact, whether it holds, and the received answer."""
     if asked.silent:
         return [(not answers, f"{len(answers)} answers")]
     if not answers:
@@ -183,7 +183,7 @@ class _Served:
 
 
 async def _pass(clock: LockstepClock) -> None:
-    """Let robot time pass while answers are waited for that need some."""
+    """Let robot time pass, for answers that need it."""
     while True:
         await clock.advance(0.1)
         await asyncio.sleep(0.005)

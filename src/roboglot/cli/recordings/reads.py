@@ -12,12 +12,12 @@ SENT_AGAIN = frozenset({"GET /api/platform/v1/events"})  # each answer removes e
 
 
 def reads(door: str) -> set[str]:
-    """Return all that change nothing, in the tap's words."""
+    """Return all read-only operations, in the tap's words."""
     return {name for name, _ in _reading(door)}
 
 
 def askable(door: str) -> list[str]:
-    """Return those that can be asked without parameters."""
+    """Return the read-only operations without required parameters."""
     found = []
     for name, operation in _reading(door):
         needed = any(operation.requires(parameter) for parameter in operation.names)

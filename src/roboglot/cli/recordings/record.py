@@ -30,10 +30,10 @@ EPILOG = "A URL instead of a command records a real robot: roboglot record slamw
 
 
 class _Commands(TyperGroup):
-    """A URL in the place of a command means ``proxy``."""
+    """Group in which a URL in place of a command means ``proxy``."""
 
     def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
-        """Put the command's name in front of a URL."""
+        """Insert the command's name before a URL."""
         return super().parse_args(ctx, ["proxy", *args] if args and "://" in args[0] else args)
 
 
@@ -129,7 +129,7 @@ def proxy(
 
 
 def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> DogRelay:
-    """To the app it is a robot of ours, with the certificates of the data folder. Raises OSError, ValueError."""
+    """Return a relay that has our certificates of the data folder towards the app. Raises OSError, ValueError."""
     from roboglot.protocols.cyberdog.certificates import ensure_certificates
     from roboglot.protocols.cyberdog.server import FOLDER
     from roboglot.recording.proxy.dog import DogRelay, Proof

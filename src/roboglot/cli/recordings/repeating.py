@@ -1,4 +1,4 @@
-"""Does once more, in a rerun, what a recording says was done from outside: hands, commands at the console, answers."""
+"""Repeats, in a rerun, recorded inputs from outside: interventions, commands at the console, answers."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class Ros2Line(Line):
-    """Messages for the ROS 2 door, handed to it: a Zenoh router on the way would only add time."""
+    """Messages for the ROS 2 door, passed directly: a Zenoh router between would only add time."""
 
     def __init__(self, doors: RobotDoors) -> None:
         self._doors = doors
@@ -38,7 +38,7 @@ class Ros2Line(Line):
         """Do nothing: there is no connection."""
 
     async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
-        """Hand on one message; ``operation`` is its topic's key."""
+        """Pass one message to the door; ``operation``: its topic's key."""
         door = cast("Ros2Door", self._doors.door("ros2"))
         door.receive(operation, payload)
         return []
@@ -66,7 +66,7 @@ class SerialTextLine(TextLine):
         return []
 
     async def drain(self) -> None:
-        """Read and discard what the robot says."""
+        """Read and discard the robot's output."""
         loop = asyncio.get_running_loop()
         loop.add_reader(self._end, os.read, self._end, 1 << 16)
         await self._closed.wait()
@@ -79,7 +79,7 @@ class SerialTextLine(TextLine):
 
 
 class Repeater:
-    """Repeater of one runtime's inputs; its robots make no calls of their own any more."""
+    """Repeater of one runtime's inputs; its robots make no further calls by themselves."""
 
     def __init__(self, runtime: Runtime) -> None:
         self._runtime, self._robots = runtime, runtime.fleet.robots

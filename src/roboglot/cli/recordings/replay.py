@@ -1,4 +1,4 @@
-"""``roboglot replay``: sends recorded requests to a robot again and compares what it answers."""
+"""``roboglot replay``: sends recorded requests to a robot again and compares the answers."""
 
 from __future__ import annotations
 

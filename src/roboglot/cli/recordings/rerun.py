@@ -1,4 +1,4 @@
-"""``roboglot rerun``: the world of a recording once more, with the same inputs, and whether all of it is the same."""
+"""``roboglot rerun``: runs a recording's world again with the same inputs, and compares the traces."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def command(
 
 
 def configuration(recording: Recording, folder: Path) -> Config:
-    """Return what the recording was started with, for a rerun with its data in ``folder``. Raises NoRerun."""
+    """Return the recording's configuration, for a rerun with its data in ``folder``. Raises NoRerun."""
     from roboglot.config import ConsoleConfig, config_of
     from roboglot.protocols import sections
 
@@ -110,7 +110,7 @@ def _why_not(recording: Recording, config: Config) -> str:
 
 
 def _alone(doors: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """Return the doors' settings for a rerun that meets no one else: no ROS 2 routers, serial lines in ``folder``."""
+    """Return the doors' settings for an isolated rerun: no ROS 2 routers, serial lines in ``folder``."""
     own = dict(doors)
     if (ros2 := doors.get("ros2")) is not None:
         own["ros2"] = dataclasses.replace(ros2, connect=())
@@ -120,7 +120,7 @@ def _alone(doors: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
 
 
 def reasons(recording: Recording) -> list[str]:
-    """Return in words what of a recording a rerun cannot give again."""
+    """Return, as text, the inputs of a recording that a rerun cannot repeat."""
     from roboglot.model.tap import Direction
     from roboglot.recording.redaction import REDACTED
 
@@ -135,7 +135,7 @@ def reasons(recording: Recording) -> list[str]:
 
 
 async def run(recording: Recording, config: Config) -> list[str]:
-    """Run it, recorded as configured; returns the inputs that were not heard. Raises OSError for a taken address."""
+    """Run it, recorded as configured; return the inputs without effect. Raises OSError for a taken address."""
     from roboglot.cli.recordings.repeating import Repeater
     from roboglot.model.clock import LockstepClock
     from roboglot.recording.inputs import Inputs
@@ -159,7 +159,7 @@ async def run(recording: Recording, config: Config) -> list[str]:
 
 
 def _line(runtime: Runtime, place: Place) -> Line | None:
-    """Return a connection to a door, by its own port; None where no client of its kind can be repeated."""
+    """Return a connection to a door, by its own port; None if clients of its kind cannot be repeated."""
     from roboglot.cli.recordings.repeating import Ros2Line, SerialTextLine
     from roboglot.model.clock import RealClock
     from roboglot.protocols.robomaster.ports.serial_line import SERIAL

@@ -1,4 +1,4 @@
-"""Files of classes: a folder for each, in it the class's name and what each pupil handed in. Blocks: call it aside."""
+"""Files of classes: a folder for each, with its name and the pupils' hand-ins. Its functions block."""
 
 from __future__ import annotations
 

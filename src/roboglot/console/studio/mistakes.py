@@ -43,7 +43,7 @@ _ROBOT = ("The robot could not do this.", "机器人做不到这一步。")
 
 
 def explain(text: str) -> dict[str, object]:
-    """Line (0: none) and module of an error in a task's log, and ``en`` and ``zh`` sentences, empty for no error."""
+    """Return an error's line (0: none) and module from a task's log, and ``en`` and ``zh`` sentences or ""."""
     kind, colon, message = text.partition(": ")
     if not colon or not kind.isidentifier():
         return {"line": 0, "module": "", "en": "", "zh": ""}
