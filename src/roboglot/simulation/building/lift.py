@@ -87,7 +87,7 @@ class LiftCar:
         self._calls.append(floor)
 
     def hold_door(self, seconds: float) -> None:
-        """Open the door, or keep it open, for ``seconds``. Raises InvalidGoal; Refused during a ride."""
+        """Open the door, or keep it open, for ``seconds``. Raises InvalidGoal; Refused on a ride or out of service."""
         if not 0.0 < seconds <= HOLD_MAX:
             raise InvalidGoal(f"a door is held for up to {HOLD_MAX:g} s, not {seconds}")
         self._refuse_if_dead()
