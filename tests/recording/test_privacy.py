@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -64,8 +65,11 @@ async def test_no_name_stands_in_a_recording(tmp_path: Path) -> None:
                 await asyncio.sleep(0.0005)
         await session.dog.close()
     for message in read_messages(tmp_path / "r.mcap"):
+        data = message.data
+        if message.topic == "/log":  # a busy machine has warnings; their loggers are called as the network is
+            data = re.sub(rb"roboglot(\.\w+)+", b"", data)
         for name in (*NAMES, network):
-            assert name.encode() not in message.data, (message.topic, message.data)
+            assert name.encode() not in data, (message.topic, data)
     found = read_recording(tmp_path / "r.mcap").exchanges
     asked = [exchange for exchange in found if exchange.direction is Direction.REQUEST]
     assert {int(exchange.operation) for exchange in asked} == {int(code) for code, _ in SAID}
