@@ -269,7 +269,7 @@ async def test_simulated_picture_has_the_frame_of_the_map(studio: Open, opened: 
     await page.click("#tab-robot")
     await until(page, "document.querySelector('.world canvas').turned !== undefined")
     await loaded(page, FOREVER)
-    await page.click("text=Simulate first")
+    await page.dblclick("text=Simulate first")
     await until(page, "document.querySelector('canvas.trace')?.turned !== undefined")
     shown = await page.evaluate("['.world canvas', 'canvas.trace'].map(c => document.querySelector(c).turned)")
     world.hands.place("a", before)

@@ -28,6 +28,26 @@ async def test_line_of_a_running_text_is_lit(studio: Open) -> None:
     assert page.errors == []
 
 
+async def test_message_of_the_checker_can_be_read(studio: Open) -> None:
+    page = await studio()
+    await opens_text(page, "cyberdog.motion.tunr(20, 1)")
+    await page.hover(".cm-lint-marker")  # it stays for long enough
+    await page.wait_for_selector(".cm-tooltip >> text=Did you mean 'turn'?")
+    assert page.errors == []
+
+
+async def test_buttons_undo_and_redo_texts(studio: Open) -> None:
+    page = await studio()
+    await opens_text(page, "n = 1")
+    await page.click(".cm-content")
+    await page.keyboard.press("Control+End")
+    await page.keyboard.type("23")
+    for name, found in (("Undo", "n = 1"), ("Redo", "n = 123")):
+        await page.get_by_role("button", name=name).click()
+        await shows(page, "document.querySelector('.cm-content').textContent", found)
+    assert page.errors == []
+
+
 async def test_page_says_that_an_older_version_runs(studio: Open) -> None:
     page = await loaded(await studio(), FOREVER)
     await page.keyboard.press("F5")
@@ -41,7 +61,8 @@ async def test_page_says_that_an_older_version_runs(studio: Open) -> None:
     await shows(page, WORD, "Running · old version")
     await page.evaluate(seconds % 3)
     await shows(page, WORD, "Running")
-    await page.keyboard.press("Shift+F5")
+    await page.click("#tab-robot")
+    await page.click(".panel .buttons >> text=Stop")  # a program that went on would move the robot again
     await phase(page, "idle")
     assert page.errors == []
 

@@ -14,6 +14,7 @@ import { Missions, allowHere, forget, loadMissions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
 import { body, changed, handOver, list, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
+import * as text from "./text.js";
 
 Object.assign(PATHS, { // the studio's own icons
   step: "M5 5v14l9-7zM18 5v14",
@@ -60,6 +61,8 @@ function held() {
   return block ? ` · ${block.toString(60)}` : "";
 }
 
+const undo = (/** @type {boolean} */ redo) => (program.value.kind === "text" ? text.undo(redo) : editor.undo(redo));
+
 function Bar() {
   const others = runner.others.value.length;
   const phase = runner.phase.value, busy = phase === "running" || phase === "starting";
@@ -76,7 +79,7 @@ function Bar() {
     <span class="grow"></span>
     ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; hits.value = editor.search(e.target.value); }} onKeyDown=${(e) => { if (/^(Enter|ArrowDown)$/.test(e.key) && sought.value && hits.value) { e.preventDefault(); e.stopPropagation(); editor.toToolbox(true); } }} /></label>
       <span class="unseen" role="status" aria-live="polite">${sought.value && t("studio.search.count", { n: hits.value })}</span>`}
-    <${Button} compact icon="undo" label=${t("studio.undo")} onClick=${() => editor.undo(false)} /><${Button} compact icon="redo" label=${t("studio.redo")} onClick=${() => editor.undo(true)} />
+    <${Button} compact icon="undo" label=${t("studio.undo")} onClick=${() => undo(false)} /><${Button} compact icon="redo" label=${t("studio.redo")} onClick=${() => undo(true)} />
     <${Button} icon="folder" label=${t("studio.programs")} title=${others ? t("studio.others", { n: others }) : t("studio.programs")} aria-label=${others ? `${t("studio.programs")}. ${t("studio.others", { n: others })}` : t("studio.programs")} onClick=${() => { shown.value = "library"; }}>${others > 0 && html`<b class="count" aria-hidden="true">${others}</b>`}<//>
     <${Button} compact icon="clock" label=${t("studio.schedule")} onClick=${() => { shown.value = "schedule"; }} />
     <${Button} compact icon="keys" label=${t("studio.keys")} onClick=${() => { shown.value = "keys"; }} />

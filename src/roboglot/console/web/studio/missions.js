@@ -40,6 +40,7 @@ function begin(m) {
 
 /** Try the program in the mission's world, or in a copy of the robot's. @param {string} lesson */
 export async function attempt(lesson) {
+  if (trying.value) return;
   if (!python().trim()) { say(t("studio.empty")); return; }
   trying.value = true; outcome.value = null; trace.value = [];
   try {

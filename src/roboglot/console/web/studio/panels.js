@@ -8,7 +8,7 @@ import { blocksOfLines } from "./blocks.js";
 import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
 import { body, continueAsText, program } from "./program.js";
-import { failure, line, lit, phase, printed, problems, readings, textBreaks, variables } from "./runner.js";
+import { failure, line, lit, phase, printed, problems, readings, stop, textBreaks, variables } from "./runner.js";
 import { Simulate } from "./missions.js";
 import { makeText } from "./text.js";
 
@@ -72,7 +72,7 @@ export function TextEditor() {
   }, [program.value.id]);
   useEffect(() => { made.current?.set(body.value); }, [body.value]);
   useEffect(() => { made.current?.refresh(); });
-  void problems.value; void textBreaks.value; void lit.value; void line.value; void phase.value;
+  void problems.value; void textBreaks.value; void lit.value; void line.value; void phase.value; void language.value;
   return html`<div class="text" ref=${place}></div>`;
 }
 
@@ -106,5 +106,5 @@ export function RobotPanel() {
     ${has && html`<div class="buttons"><${Button} on=${film.value} label=${t(film.value ? "camera.close" : "camera.open")} onClick=${() => { film.value = !film.value; }} /></div>`}
     ${has && film.value && html`<figure class="film"><img src=${`/api/robots/${encodeURIComponent(current.value)}/camera.mjpeg`} alt=${t("camera.alt")} /></figure>`}
     ${state.value?.faults?.length > 0 && html`<ul class="faults">${state.value.faults.map((f) => html`<li class=${f.level.toLowerCase()}>${robotWord(f.message)}</li>`)}</ul>`}
-    <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop")} onClick=${() => command("stop")} /></div>`;
+    <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop")} title=${t("studio.halt.hint")} onClick=${() => { if (phase.value !== "idle") stop(); command("stop"); }} /></div>`;
 }

@@ -4,12 +4,16 @@ import { table, words } from "./blocks.js";
 import { body, changed } from "./program.js";
 import { line, phase, problems, textBreaks } from "./runner.js";
 
+let turnBack = (/** @type {boolean} */ _redo) => {};
+/** Undo, or redo, in the text that is shown. @param {boolean} redo */
+export const undo = (redo) => turnBack(redo);
+
 /** Make the editor in `element`. @param {HTMLElement} element @returns {Promise<{destroy: () => void, set: (text: string) => void, refresh: () => void}>} */
 export async function makeText(element) {
   const cm = await import("codemirror");
   const { Decoration, EditorState, EditorView, GutterMarker, StateEffect, StateField, RangeSet } = cm;
   class Dot extends GutterMarker { toDOM() { const dot = document.createElement("span"); dot.className = "dot"; return dot; } }
-  const dot = new Dot(), show = StateEffect.define();
+  const dot = new Dot(), show = StateEffect.define(), judged = StateEffect.define();
   const here = StateField.define({
     create: () => Decoration.none,
     update: (found, change) => {
@@ -32,7 +36,7 @@ export async function makeText(element) {
     const row = view.state.doc.line(p.line), from = Math.min(row.to, row.from + Math.max(0, p.column - 1));
     const word = /^[\w.]+/.exec(row.text.slice(from - row.from))?.[0].length ?? 1;
     return { from, to: Math.min(row.to, from + word), severity: "error", message: words(p) };
-  }), { delay: 0, needsRefresh: () => true });
+  }), { delay: 0, needsRefresh: (update) => update.transactions.some((one) => one.effects.some((effect) => effect.is(judged))) });
   let setting = false;
   const view = new EditorView({
     parent: element,
@@ -54,7 +58,14 @@ export async function makeText(element) {
       ],
     }),
   });
-  let looked = 0;
+  turnBack = (redo) => { cm.historyKeymap.find((/** @type {any} */ one) => one.key === (redo ? "Mod-y" : "Mod-z")).run(view); };
+  let looked = 0, known = /** @type {any[]} */ ([]);
+  /** What the checker found, once: a message that is made anew all the time cannot be read. */
+  const verdict = () => {
+    const same = known[0] === problems.value && known[1] === language.value;
+    known = [problems.value, language.value];
+    return same ? [] : [judged.of(null)];
+  };
   /** A line at which it is held comes into view, once. */
   const shown = () => {
     const at = phase.value === "paused" ? line.value : 0, comes = at !== looked && at > 0 && at <= view.state.doc.lines;
@@ -64,7 +75,7 @@ export async function makeText(element) {
   return {
     destroy: () => view.destroy(),
     set: (text) => { if (text === view.state.doc.toString()) return; setting = true; view.dispatch({ changes: { from: 0, to: view.state.doc.length, insert: text } }); setting = false; },
-    refresh: () => { view.dispatch({ effects: [show.of(line.value), ...shown()] }); cm.setDiagnostics && view.dispatch({}); },
+    refresh: () => { view.dispatch({ effects: [show.of(line.value), ...shown(), ...verdict()] }); },
   };
 }
 
