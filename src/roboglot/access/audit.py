@@ -68,7 +68,7 @@ class Audit:
         self._closing.set()
         self._thread.join(CLOSE_SECONDS)
         if self._thread.is_alive():
-            log.error("the audit is not written to its end: its database does not answer")
+            log.error("cannot write the rest of the audit: its database does not answer")
 
     def _settle(self, until: float) -> None:
         """Write rows of counted repetitions whose series have ended by ``until``."""

@@ -221,7 +221,7 @@ class Files:
             path, _ = self._closed.pop(0)
             path.unlink(missing_ok=True)
             self.deleted += 1
-            log.warning("recording: %s is deleted, for all parts have %d bytes", path, self._limits.total_bytes)
+            log.warning("recording: deleted %s, all parts may take %d bytes", path, self._limits.total_bytes)
         self._number += 1
         self._part = PartWriter(self.path, self._origin, self._redaction, at, self._number)
         for entry in self._standing.at(at):

@@ -274,7 +274,7 @@ class Recorder:
             return
         if self._clock.time() - self._warned > DROPS_PERIOD:
             self._warned = self._clock.time()
-            log.warning("recording: %d values are lost so far, for the disk is too slow", thread.dropped)
+            log.warning("recording: dropped %d values so far, the disk is too slow", thread.dropped)
 
     def _put(self, entry: Entry) -> None:
         if self._thread is not None:

@@ -299,7 +299,7 @@ async def _free_the_silent(plan: FleetPlan) -> None:
     try:
         database = await asyncio.to_thread(open_registry, where)
     except (ValueError, OSError, sqlite3.Error) as error:
-        log.warning("robots of a dead shard are free %g s later: the registry cannot be opened here: %s", LEASE, error)
+        log.warning("dead shards free their robots %g s later: cannot open the registry here: %s", LEASE, error)
         return
     try:
         await Silence(Homes(database), [robot for shard in plan.shards for robot in shard.robots]).look_always()

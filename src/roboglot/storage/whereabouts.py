@@ -45,7 +45,7 @@ class Whereabouts:
             try:
                 now = await self.of(robot)
             except OSError as error:
-                log.info("robot %s is taken for unmoved: %s", robot, error)
+                log.info("cannot look up robot %s, it counts as unmoved: %s", robot, error)
                 continue
             if now is not None and now.epoch != epoch:
                 return

@@ -91,7 +91,7 @@ class Repeater:
         return self._runtime.build_desk()
 
     async def __call__(self, given: Input) -> bool:
-        """Do it; False: the robot does not wait for that answer yet. What was refused then is refused again."""
+        """Repeat an input, even a refused one; return False if the robot does not wait for that answer yet."""
         if given.kind == ANSWER:
             return self._answer(given)
         ask_for(given.client, given.connection)

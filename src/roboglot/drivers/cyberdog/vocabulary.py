@@ -30,7 +30,7 @@ RANGE_MAX = 12.0  # m; the range of the lidar is not reported
 SURE = 100  # log-odds of a cell that the app sees as free or occupied
 
 FIGURES = {number: Figure[name] for number, name in FIGURE_NAMES.items()}
-WALKS = {Gait[name]: number for number, name in reversed(list(WALK_NAMES.items()))}  # the first of two for one gait
+WALKS = {Gait[name]: number for number, name in reversed(list(WALK_NAMES.items()))}  # the first if two share a gait
 POSTURES = {
     Motion.EMERGENCY_STOP: Posture.LIMP,
     Motion.LIE_DOWN: Posture.LYING,

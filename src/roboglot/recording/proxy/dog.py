@@ -167,7 +167,7 @@ def _read(kind: type[Message], data: bytes) -> Message | None:
     try:
         return kind.FromString(data)
     except DecodeError as error:
-        log.warning("not understood: %s", error)
+        log.warning("cannot parse a message: %s", error)
         return None
 
 

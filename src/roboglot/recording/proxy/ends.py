@@ -85,8 +85,8 @@ class End(asyncio.Protocol):
         if self.look is not None:
             try:
                 self.look(data)
-            except Exception as error:  # noqa: BLE001 - what is not understood passes all the same
-                log.warning("a connection is no longer understood, and still passed: %s", error)
+            except Exception as error:  # noqa: BLE001 - bytes that cannot be parsed still pass
+                log.warning("cannot parse a connection any more, its bytes still pass: %s", error)
                 self.look = None
 
     def join(self, other: End) -> None:
