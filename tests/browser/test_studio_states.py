@@ -64,6 +64,12 @@ async def test_page_says_that_an_older_version_runs(studio: Open) -> None:
     await page.click("#tab-robot")
     await page.click(".panel .buttons >> text=Stop")  # a program that went on would move the robot again
     await phase(page, "idle")
+    await page.evaluate(seconds % 5)
+    await until(page, "studio.editor.code.value.includes('sleep(5)')")
+    await page.evaluate("studio.say('so far')")
+    await page.keyboard.press("F5")
+    await shows(page, WORD, "Running")
+    await shows(page, "document.querySelector('.notice').textContent", "so far")
     assert page.errors == []
 
 

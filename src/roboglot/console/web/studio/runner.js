@@ -65,8 +65,8 @@ async function runNow(step) {
   if (phase.value === "paused") return go(step);
   if (phase.value !== "idle") return undefined;
   if (!python().trim()) { say(t("studio.empty")); return undefined; }
+  under.value = python(); // first: what ran before is no older version of what starts
   phase.value = "starting";
-  under.value = python();
   learn(python());
   began = performance.now();
   runs += 1;
