@@ -182,6 +182,7 @@ async def test_program_is_built_run_and_debugged_by_keyboard(studio: Open) -> No
     await page.keyboard.press("i")
     await until(page, "document.getElementById('blocklyAriaAnnounce').textContent.includes('print')")
     await page.keyboard.press("F9")
+    await until(page, "/^Breakpoint set: print/.test(document.querySelector('.notice').innerText)")
     await page.keyboard.press("F5")
     await phase(page, "paused")
     await prints(page)
@@ -273,7 +274,8 @@ async def test_simulated_picture_has_the_frame_of_the_map(studio: Open, opened: 
     await until(page, "document.querySelector('canvas.trace')?.turned !== undefined")
     shown = await page.evaluate("['.world canvas', 'canvas.trace'].map(c => document.querySelector(c).turned)")
     world.hands.place("a", before)
-    await page.click(".panel >> text=Stop")
+    await page.locator("canvas.trace").locator("xpath=preceding::button[1]").click()
+    await shows(page, "document.querySelector('.notice').innerText", "The simulation is ended.")  # no refusal
     assert shown[1] == pytest.approx(shown[0], abs=0.05)
     assert page.errors == []
 

@@ -41,6 +41,8 @@ async def test_buttons_undo_and_redo_texts(studio: Open) -> None:
     await opens_text(page, "n = 1")
     await page.click(".cm-content")
     await page.keyboard.press("Control+End")
+    await page.keyboard.press("F9")
+    await shows(page, "document.querySelector('.notice').innerText", "Breakpoint set: 1 n = 1")
     await page.keyboard.type("23")
     for name, found in (("Undo", "n = 1"), ("Redo", "n = 123")):
         await page.get_by_role("button", name=name).click()

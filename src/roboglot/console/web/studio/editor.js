@@ -160,6 +160,7 @@ export function toggleBreak(id = selected.value) {
   const block = statementOf(workspace.getBlockById(id));
   if (!block) { say(t("studio.break.choose")); return; }
   block.data = block.data === BREAK ? null : BREAK;
+  say(t(block.data ? "studio.break.set" : "studio.break.gone", { what: block.toString(60) }));
   refresh();
   changes.value += 1;
 }

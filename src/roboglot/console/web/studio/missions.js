@@ -38,16 +38,22 @@ function begin(m) {
   if (top) editor.load({ blocks: { languageVersion: 0, blocks: [{ ...top, x: 40, y: 40 }] } });
 }
 
+let calledOff = false; // the trial under way, in this page
+
+function callOff() { calledOff = true; send({ type: "end_try" }); }
+
 /** Try the program in the mission's world, or in a copy of the robot's. @param {string} lesson */
 export async function attempt(lesson) {
   if (trying.value) return;
   if (!python().trim()) { say(t("studio.empty")); return; }
-  trying.value = true; outcome.value = null; trace.value = [];
+  trying.value = true; calledOff = false; outcome.value = null; trace.value = [];
   try {
     const found = await ask({ type: "try", body: python(), lesson });
     outcome.value = found;
     if (found.grade && found.grade.stars > earned(lesson)) stars.value = JSON.stringify({ ...results(), [lesson]: found.grade.stars });
-  } catch (error) { say(t("refused", { why: error.message }), true); } finally { trying.value = false; litThere.value = ""; editor.light(""); }
+  } catch (error) {
+    if (calledOff) say(t("studio.try.ended")); else say(t("refused", { why: error.message }), true);
+  } finally { trying.value = false; litThere.value = ""; editor.light(""); }
 }
 
 listen((message) => {
@@ -128,7 +134,7 @@ export function Missions() {
       <${Button} label=${t("studio.begin")} onClick=${() => begin(one)} /></li>`)}</ul>${!missions.value.length && html`<p class="muted">${t("studio.missions.none")}</p>`}`;
   }
   return html`<h2>${said(m.title)} <${Stars} count=${earned(m.id)} /></h2><p>${said(m.task)}</p>
-    <div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${() => send({ type: "end_try" })} />` : html`<${Button} kind="main" icon="play" label=${t("studio.attempt")} onClick=${() => attempt(m.id)} />`}
+    <div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${callOff} />` : html`<${Button} kind="main" icon="play" label=${t("studio.attempt")} onClick=${() => attempt(m.id)} />`}
       ${hints.value < m.hints.length && html`<${Button} label=${t("studio.hint")} onClick=${() => { hints.value += 1; }} />`}<${Button} label=${t("studio.missions.all")} onClick=${() => { rename({ lesson: undefined }); outcome.value = null; allowHere(); }} /></div>
     ${m.hints.slice(0, hints.value).map((h) => html`<p class="hinted">${said(h)}</p>`)}
     <${Verdict} found=${outcome.value} /><${Chart} scene=${m} />`;
@@ -137,6 +143,6 @@ export function Missions() {
 /** A program tried on a copy of the world, beside the robot's own map. */
 export function Simulate() {
   if (program.value.lesson) return null;
-  return html`<div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${() => send({ type: "end_try" })} />` : html`<${Button} icon="eye" label=${t("studio.try")} onClick=${() => attempt("")} />`}</div>
+  return html`<div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${callOff} />` : html`<${Button} icon="eye" label=${t("studio.try")} onClick=${() => attempt("")} />`}</div>
     ${(trying.value || trace.value.length > 1) && html`<${Chart} scene=${{ boxes: [], goals: [], start: null }} />`}<${Verdict} found=${outcome.value} />`;
 }

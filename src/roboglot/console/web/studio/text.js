@@ -1,5 +1,5 @@
 // Python as text: CodeMirror with completion, signatures, the checker's messages, breakpoints; loaded when it is needed.
-import { language } from "../base.js";
+import { language, say, t } from "../base.js";
 import { table, words } from "./blocks.js";
 import { body, changed } from "./program.js";
 import { line, phase, problems, textBreaks } from "./runner.js";
@@ -31,6 +31,8 @@ export async function makeText(element) {
   const toggle = (number) => {
     textBreaks.value = textBreaks.value.includes(number) ? textBreaks.value.filter((n) => n !== number) : [...textBreaks.value, number].sort((a, b) => a - b);
     view.dispatch({ effects: show.of(line.value) });
+    const row = view.state.doc.line(number).text.trim().slice(0, 60);
+    say(t(textBreaks.value.includes(number) ? "studio.break.set" : "studio.break.gone", { what: `${number} ${row}`.trim() }));
   };
   const messages = cm.linter((view) => problems.value.filter((p) => p.line >= 1 && p.line <= view.state.doc.lines).map((p) => {
     const row = view.state.doc.line(p.line), from = Math.min(row.to, row.from + Math.max(0, p.column - 1));
