@@ -13,7 +13,7 @@ import pytest
 
 from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig
-from roboglot.console.people.session_file import KeptSession, SessionFile, seal
+from roboglot.access.session_file import KeptSession, SessionFile, seal
 from roboglot.console.people.sessions import LIFETIME, Sessions
 from roboglot.model.admission import Proof, ProofKind
 from roboglot.operations import Right

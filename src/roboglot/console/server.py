@@ -125,7 +125,7 @@ class Console:
 
     def _open_sessions(self) -> Sessions:
         """Return the stored sessions; an empty set, with a log line, if they cannot be read."""
-        from roboglot.console.people.session_file import SessionFile
+        from roboglot.access.session_file import SessionFile
         from roboglot.console.people.sessions import Sessions
 
         if self._desk.sessions is None:

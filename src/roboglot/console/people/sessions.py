@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from roboglot.console.people.session_file import KeptSession, SessionFile, seal, unseal
+from roboglot.access.session_file import KeptSession, SessionFile, seal, unseal
 from roboglot.model.admission import NO_PROOF, Proof
 
 COOKIE = "roboglot"

@@ -70,8 +70,12 @@ class Rectangle:
         return math.hypot(dx, dy)
 
 
-def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Solid]:
-    """Yield all still solids of one floor. ``lift_here``: the car is parked here, so the landing door is open."""
+def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> tuple[Solid, ...]:
+    """Return all still solids of one floor. ``lift_here``: the car is parked here, so the landing door is open."""
+    return tuple(_solids(floor, lift, lift_here))
+
+
+def _solids(floor: Floor, lift: Lift | None, lift_here: bool) -> Iterator[Solid]:
     if floor.enclosed:
         yield from _enclosure(floor)
     for wall in floor.walls:

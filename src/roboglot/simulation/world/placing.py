@@ -188,7 +188,7 @@ class Places:
         if any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self._taken):
             return False
         if floor not in self._solids:
-            self._solids[floor] = tuple(solids_of(storey, self.world.lift, lift_here=False))
+            self._solids[floor] = solids_of(storey, self.world.lift, lift_here=False)
         return all(_distance(pose, solid) >= radius for solid in self._solids[floor])
 
 
