@@ -53,6 +53,8 @@ async def test_blocks_are_found_and_joined_by_keyboard(studio: Open) -> None:
     await shows(page, "document.activeElement.textContent", "To the blocks")
     await page.keyboard.press("Enter")
     await until(page, TOOLBOX)
+    for made_anew in ("remake()", "showModules()"):  # as modules and missions come from the robot
+        assert await page.evaluate(f"(studio.editor.{made_anew}, {TOOLBOX})")
     await take_found(page, "print")
     await take_found(page, "print")
     await until(page, f"{STACKS} === 1 && studio.editor.code.value.split('print(').length === 3")

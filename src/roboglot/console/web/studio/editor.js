@@ -29,7 +29,18 @@ export function mount(element) {
 }
 
 export function remake() {
-  if (!place) return;
+  if (place) keepingKeyboard(build);
+}
+
+/** Have the keyboard where it was, in the toolbox or among the blocks, when `act` makes them anew. @param {() => void} act */
+function keepingKeyboard(act) {
+  const at = place.contains(document.activeElement) && document.activeElement;
+  const boxed = at && at.closest(".blocklyToolbox");
+  act();
+  if (at && !document.contains(at)) Blockly.getFocusManager().focusTree(boxed ? workspace.getToolbox() : workspace);
+}
+
+function build() {
   const state = workspace ? save() : null;
   const view = workspace ? { scale: workspace.scale, x: workspace.scrollX, y: workspace.scrollY } : null;
   workspace?.dispose();
@@ -129,7 +140,9 @@ export function allow(types) {
 }
 
 /** The modules that there are now, in the toolbox. */
-export function showModules() { if (workspace) workspace.updateToolbox(toolbox(modules.value.flatMap(defineModule), allowed)); }
+export function showModules() {
+  if (workspace) keepingKeyboard(() => workspace.updateToolbox(toolbox(modules.value.flatMap(defineModule), allowed)));
+}
 
 /** Blocks to look at, in `element`. @param {HTMLElement} element @param {any} state */
 export function picture(element, state) {
