@@ -11,9 +11,9 @@ from urllib.request import Request, urlopen
 
 import pytest
 
+from roboglot.access.session_file import KeptSession, SessionFile, seal
 from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig
-from roboglot.access.session_file import KeptSession, SessionFile, seal
 from roboglot.console.people.sessions import LIFETIME, Sessions
 from roboglot.model.admission import Proof, ProofKind
 from roboglot.operations import Right
