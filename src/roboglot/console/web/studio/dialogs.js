@@ -43,7 +43,7 @@ export function Library() {
   useEffect(() => {
     let due = 0;
     const look = () => list().catch((error) => say(error.message, true));
-    const leave = listen(({ type, frame: told }) => { if (type === "frame" && told.feedback?.type === "task" && !told.block) { clearTimeout(due); due = window.setTimeout(look, SOON); } });
+    const leave = listen(({ type, frame: news }) => { if (type === "frame" && news.feedback?.type === "task" && !news.block) { clearTimeout(due); due = window.setTimeout(look, SOON); } });
     look();
     return () => { clearTimeout(due); leave(); };
   }, []);

@@ -100,7 +100,7 @@ function paint(canvas, scene, path) {
 }
 
 /** What the simulation shows, worst first. */
-function told(found) {
+function summary(found) {
   const { error, touched, late, refused, seconds } = found;
   if (error) return t("studio.try.failed");
   if (touched !== null && touched !== undefined) return t("studio.try.touched", { s: touched.toFixed(0) });
@@ -121,7 +121,7 @@ function lineShown({ line, module }) {
 
 function Verdict({ found }) {
   if (!found) return null;
-  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null || found.late || found.refused?.length ? "" : "fine"}`} role="status"><b>${told(found)}</b><${Refused} calls=${found.refused} />${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${found.error}</small>`}</div>`;
+  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null || found.late || found.refused?.length ? "" : "fine"}`} role="status"><b>${summary(found)}</b><${Refused} calls=${found.refused} />${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${found.error}</small>`}</div>`;
   const { stars: count, rows } = found.grade;
   return html`<div class=${`failure ${count ? "fine" : ""}`} role="status"><b>${count ? t("studio.passed") : t("studio.not.passed")} <${Stars} count=${count} /></b>
     <ul>${rows.filter((r) => !r.passed).map((r) => html`<li>${r.star ? "☆ " : "✗ "}${said(r)}</li>`)}</ul></div>`;
