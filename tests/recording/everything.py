@@ -1,4 +1,4 @@
-"""A lockstep session with all inputs: four protocols, a dog's app, hands, the console's desk."""
+"""A lockstep session with all inputs: six protocols, a dog's app, hands, the console's desk."""
 
 from __future__ import annotations
 
@@ -139,6 +139,7 @@ class Session:
         wanted = [{"id": c["id"], "channelId": c["id"]} for c in channels if "cam" not in c["topic"]]
         publish = {"id": 7, "topic": "/a/cmd_vel", "encoding": "json", "schemaName": "geometry_msgs/Twist"}
         twist = {"linear": {"x": 0.2, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0.2}}
+        reading = asyncio.ensure_future(_read_all(socket))  # unread topics would delay the hang-up by 10 s
         messages: list[str | bytes] = [
             json.dumps({"op": "subscribe", "subscriptions": wanted}),
             json.dumps({"op": "advertise", "channels": [publish]}),
@@ -150,6 +151,7 @@ class Session:
             await self.until_heard(door, Direction.REPLY, number)
             await self.clock.advance(0.123)
         await socket.close()
+        await reading
         async with asyncio.timeout(120):  # a busy machine
             while self.gone.count(door) == gone:  # noqa: ASYNC110 - the robot calls back in the loop
                 await asyncio.sleep(0.0005)
@@ -202,9 +204,9 @@ async def begun(folder: Path, **more: object) -> AsyncIterator[Session]:
         await session.runtime.close()
 
 
-async def hold(folder: Path, rounds: int, *, field: bool) -> Session:
-    """Hold a session of ``rounds`` times 20 s of robot time; ``field``: with clients of Foxglove and ROS 2, too."""
-    async with begun(folder, foxglove={"enabled": field}, ros2={"enabled": field}) as session:
+async def hold(folder: Path, rounds: int) -> Session:
+    """Hold a session of ``rounds`` times 20 s of robot time, with clients of Foxglove and ROS 2, too."""
+    async with begun(folder, foxglove={"enabled": True}, ros2={"enabled": True}) as session:
         clock, rest = session.clock, session.rest
         reader, writer = await asyncio.open_connection(ADDRESS, 40923)
 
@@ -253,9 +255,8 @@ async def hold(folder: Path, rounds: int, *, field: bool) -> Session:
                 await clock.advance(2.5)
                 await session.dog_asks(6009, type=0)
                 await clock.advance(1.011)
-                if field:
-                    await session.foxglove_drives()
-                    await session.ros2_drives()
+                await session.foxglove_drives()
+                await session.ros2_drives()
                 await session.console_does("world/remove_box", number=_last_box(session))
                 await session.dog.close()  # the app leaves without notice
                 await clock.advance(6.557)

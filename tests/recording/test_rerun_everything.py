@@ -13,11 +13,11 @@ from tests.recording.test_rerun import rerun
 
 
 @pytest.mark.slow  # in short, one protocol each: test_rerun_clients.py
-@pytest.mark.parametrize(("rounds", "field"), [(1, True), (30, False)])  # 20 s, and ten minutes
-async def test_everything_happens_again(tmp_path: Path, rounds: int, field: bool) -> None:
-    if field:
-        pytest.importorskip("zenoh", reason="needs roboglot[ros2]")
-    session = await hold(tmp_path, rounds, field=field)
+@pytest.mark.timeout(600)  # a hang
+@pytest.mark.parametrize("rounds", [1, 30])  # 20 s, and ten minutes
+async def test_everything_happens_again(tmp_path: Path, rounds: int) -> None:
+    pytest.importorskip("zenoh", reason="needs roboglot[ros2]")
+    session = await hold(tmp_path, rounds)
     assert session.pushed
     assert session.photographed > 10_000 * rounds
     recording = read_recording(tmp_path / "r.mcap")
@@ -27,7 +27,7 @@ async def test_everything_happens_again(tmp_path: Path, rounds: int, field: bool
     assert "ok" in heard
     assert heard & {"unavailable", "closed"}, "the app was never lost"
     doors = {exchange.door for exchange in recording.exchanges}
-    assert doors == {"slamware", "robomaster", "cyberdog", "visual"} | ({"foxglove", "ros2"} if field else set())
+    assert doors == {"slamware", "robomaster", "cyberdog", "visual", "foxglove", "ros2"}
     assert recording.seconds > 20 * rounds
     done = await asyncio.to_thread(rerun, tmp_path / "r.mcap")
     assert done.stdout.startswith("identical: "), done.stdout + done.stderr
