@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from roboglot.model.tap import Exchange
 from roboglot.recording import foxglove, messages
+from roboglot.recording.readings import READINGS
 from roboglot.recording.redaction import Redaction
 
 SCAN_BYTES = 1500  # assumed for a queued value of unknown size
@@ -57,7 +58,6 @@ KINDS = {
     "event": EntryKind("roboglot.Event", _plain),
     "action": EntryKind("roboglot.Action", _plain),
     "battery": EntryKind("roboglot.Battery", _plain),
-    "pressure": EntryKind("roboglot.Pressure", _plain),
     "state": EntryKind("roboglot.State", _plain),
     "mark": EntryKind("roboglot.Mark", _plain),
     "pose": EntryKind("foxglove.PoseInFrame", foxglove.encode_pose),
@@ -67,6 +67,7 @@ KINDS = {
     "log": EntryKind("foxglove.Log", foxglove.encode_log),
     "scene": EntryKind("foxglove.SceneUpdate", foxglove.encode_scene),
     "video": EntryKind("foxglove.CompressedVideo", foxglove.encode_video),
+    **{reading.topic: EntryKind(reading.schema, _plain) for reading in READINGS},
 }
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import Direction, Exchange
+from roboglot.recording.readings import READINGS
 
 DEPTH_MAX = 6
 ITEMS_MAX = 200  # of a list in an event
@@ -194,7 +195,6 @@ SCHEMAS = {  # JSON schemas, by name
     "roboglot.Battery": _schema(
         "roboglot.Battery", percentage=_NUMBER, voltage=_NUMBER, current=_NUMBER, charging={"type": "boolean"}
     ),
-    "roboglot.Pressure": _schema("roboglot.Pressure", stamp=_NUMBER, pressure=_NUMBER, deviation=_NUMBER),
     "roboglot.State": _schema("roboglot.State"),
     "roboglot.Input": _schema(
         "roboglot.Input",
@@ -208,4 +208,5 @@ SCHEMAS = {  # JSON schemas, by name
         connection=_TEXT,
     ),
     "roboglot.Mark": _schema("roboglot.Mark", text=_TEXT),
+    **{reading.schema: _schema(reading.schema, **dict.fromkeys(reading.names, _NUMBER)) for reading in READINGS},
 }

@@ -10,7 +10,6 @@ from typing import Any
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
-from roboglot.model.components.sensing.barometer import Barometer
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease
@@ -23,6 +22,7 @@ from roboglot.model.sensing import LaserScan
 from roboglot.model.tap import Exchange
 from roboglot.recording.entries import Entry
 from roboglot.recording.messages import plain
+from roboglot.recording.readings import readings_of
 from roboglot.recording.redaction import FILES, without_picture
 
 POSE_PERIOD = 0.1  # s
@@ -161,8 +161,8 @@ class Sampler:
             self._send("body", "scene", (figure,), at, wall)
         if Battery in robot and was_heard(robot):
             self._send_changed("battery", "battery", plain(robot[Battery].state), at, wall)
-        if Barometer in robot:
-            self._send("pressure", "pressure", plain(robot[Barometer].reading), at, wall)
+        for topic, reading in readings_of(robot):
+            self._send(topic, topic, plain(reading), at, wall)
         if Health in robot:
             self._send_changed("faults", "state", {"faults": plain(robot[Health].faults)}, at, wall)
         if Lease in robot:

@@ -29,7 +29,7 @@ def command(
 ) -> None:
     """Write a recording as a bag of ROS 2."""
     with explaining("roboglot export", "logs"):
-        from roboglot.recording.rosbag2 import export
+        from roboglot.recording.ros2.bag import export
     try:
         written = export(file, rosbag2, storage.value, robot)
     except (OSError, ValueError) as error:

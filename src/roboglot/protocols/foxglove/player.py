@@ -20,6 +20,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.stand_in import Recorded
 from roboglot.protocols.foxglove.channels import Channel, Listener, Wish
 from roboglot.recording.reader import BadRecording
+from roboglot.recording.readings import BY_SCHEMA
 from roboglot.recording.reel import Reel, Shot
 from roboglot.wire.foxglove.messages import Playback, PlayStatus
 
@@ -30,7 +31,7 @@ NANO = 1e9
 # Schemas whose last message before a moment gives the state at that moment.
 STATES = frozenset(
     f"foxglove.{name}" for name in ("Grid", "SceneUpdate", "PoseInFrame", "FrameTransforms", "LaserScan")
-) | {"roboglot.Battery", "roboglot.Pressure", "roboglot.State"}
+) | {"roboglot.Battery", "roboglot.State", *BY_SCHEMA}
 
 
 class Player:

@@ -13,13 +13,14 @@ from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
 from roboglot.protocols.foxglove.channels import Channel, Listener, Wish
 from roboglot.recording.entries import KINDS, Entry, encoded
+from roboglot.recording.readings import READINGS
 from roboglot.recording.redaction import Redaction
 from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS, Sampler, Stamps
 
 CHANNELS_MAX = 200
 CAMERA = "camera"
 # Kinds of recorded values whose last one is sent to new clients.
-KEPT = frozenset({"battery", "pressure", "state", "grid", "scene", "pose", "transforms", "scan"})
+KEPT = frozenset({"battery", "state", "grid", "scene", "pose", "transforms", "scan", *(r.topic for r in READINGS)})
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from zenoh.ext import AdvancedPublisher
 
     from roboglot.recording.entries import Entry
-    from roboglot.recording.ros2 import Ros2Words, RosMessage
+    from roboglot.recording.ros2.translation import Ros2Words, RosMessage
     from roboglot.recording.sampler import Sampler
 
 log = logging.getLogger(__name__)
@@ -92,7 +92,7 @@ class Ros2Door:
         with explaining("the ROS 2 door", "ros2"):
             import zenoh
 
-            from roboglot.recording.ros2 import Ros2Words
+            from roboglot.recording.ros2.translation import Ros2Words
             from roboglot.recording.sampler import Sampler
         loop = asyncio.get_running_loop()
         try:
@@ -151,7 +151,7 @@ class Ros2Door:
     # -- listening -----------------------------------------------------------------------------------------------------
 
     def _subscribe(self, key: str, type: str) -> None:
-        from roboglot.recording.ros2 import STORE
+        from roboglot.recording.ros2.translation import STORE
 
         assert self._node is not None
         assert self._session is not None
@@ -187,7 +187,7 @@ class Ros2Door:
         self._follow(self._answer(key, data))
 
     async def _answer(self, key: str, data: bytes | None) -> None:
-        from roboglot.recording.ros2 import read_cdr
+        from roboglot.recording.ros2.translation import read_cdr
 
         try:
             ask_for(DOOR)
@@ -278,7 +278,7 @@ class Ros2Door:
         import zenoh
         from zenoh.ext import CacheConfig, declare_advanced_publisher
 
-        from roboglot.recording.ros2 import STORE
+        from roboglot.recording.ros2.translation import STORE
 
         assert self._node is not None
         assert self._session is not None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import chain
 
 from roboglot.operations import OperationTable
+from roboglot.recording.readings import READINGS
 
 TABLE: OperationTable[str] = OperationTable("ros2")
 # Kinds of a recording's entries that are published, and the topics of each.
@@ -14,7 +15,7 @@ PUBLISHED = {
     "pose": ("pose",),
     "grid": ("map",),
     "battery": ("battery_state",),
-    "pressure": ("pressure",),
+    **{reading.topic: (reading.topic,) for reading in READINGS},
 }
 NOT_RECORDED = ("rosout", "image/compressed")  # topics that the door makes itself
 

@@ -20,6 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.recording.foxglove import LEVELS, TYPES
 from roboglot.recording.reader import Record
+from roboglot.recording.readings import BY_SCHEMA, Reading
 
 if TYPE_CHECKING:
     from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
@@ -126,8 +127,8 @@ class Ros2Words:
         elif record.schema == "roboglot.Battery":
             yield from self._battery(record, msgspec.json.decode(record.data))
             yield self._json(record, f"{record.topic}/state")
-        elif record.schema == "roboglot.Pressure":
-            yield self._pressure(record, msgspec.json.decode(record.data))
+        elif (reading := BY_SCHEMA.get(record.schema)) is not None:
+            yield self._reading(record, reading)
         else:
             yield self._json(record, record.topic)
 
@@ -282,11 +283,10 @@ class Ros2Words:
         line = _new(type, stamp=_time(at), level=level, name=name, msg=text, file="", function="", line=0)
         return self._made("/rosout", type, at, line)
 
-    def _pressure(self, record: Record, reading: Mapping[str, float]) -> RosMessage:
+    def _reading(self, record: Record, reading: Reading) -> RosMessage:
         header = _header(record.at, f"{record.topic.split('/')[1]}/base_link")
-        type, deviation = "sensor_msgs/msg/FluidPressure", float(reading["deviation"])
-        message = _new(type, header=header, fluid_pressure=float(reading["pressure"]), variance=deviation * deviation)
-        return self._made(record.topic, type, record.at, message)
+        values = reading.ros_fields(msgspec.json.decode(record.data, type=dict[str, float]))
+        return self._made(record.topic, reading.ros, record.at, _new(reading.ros, header=header, **values))
 
     def _battery(self, record: Record, state: _Battery) -> Iterator[RosMessage]:
         type, unknown = "sensor_msgs/msg/BatteryState", math.nan

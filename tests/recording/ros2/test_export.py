@@ -24,8 +24,8 @@ from tests.recording.test_recorder import advance, config
 pytest.importorskip("rosbags", reason="needs roboglot[logs]")
 from rosbags.highlevel import AnyReader
 
-from roboglot.recording.ros2 import Ros2Words
-from roboglot.recording.rosbag2 import export
+from roboglot.recording.ros2.bag import export
+from roboglot.recording.ros2.translation import Ros2Words
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")

@@ -11,7 +11,7 @@ from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, Qo
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
 from roboglot.recording.reader import BadRecording, read_messages
-from roboglot.recording.ros2 import STORE, Ros2Words, RosMessage
+from roboglot.recording.ros2.translation import STORE, Ros2Words, RosMessage
 
 VERSION: Literal[8] = 8  # of metadata.yaml
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
