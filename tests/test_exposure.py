@@ -16,6 +16,9 @@ from roboglot.config import Config, RobotConfig, load_config
 from roboglot.protocols.foxglove.config import FoxgloveConfig
 from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
+
+ADDRESS = free_addresses(1)
 
 LISTENS = "0A"  # TCP's state in /proc/net/tcp
 MAPPED = "0000000000000000FFFF0000"  # before an IPv4 address of an IPv6 socket there
@@ -39,12 +42,12 @@ async def test_a_default_start_is_reached_by_loopback_alone(tmp_path: Path, monk
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)  # a busy machine may close connections late
     base = load_config(None, {"data": str(tmp_path / "data"), "world": "empty", "lockstep": True})
     before = own_sockets()
-    runtime = Runtime(replace(base, robots=(RobotConfig("a", "universal", "127.0.0.93"),)))
+    runtime = Runtime(replace(base, robots=(RobotConfig("a", "universal", ADDRESS),)))
     await runtime.start()
     opened = list((Counter(own_sockets()) - Counter(before)).elements())  # another test's console may be open, too
     await runtime.close()
     assert len([entry for entry in opened if entry[0] == "tcp" and entry[2] == LISTENS]) >= 7
-    robots = {("tcp", "127.0.0.93"), ("udp", "127.0.0.93")}
+    robots = {("tcp", ADDRESS), ("udp", ADDRESS)}
     assert {(kind, address) for kind, address, _ in opened} == robots | {("tcp", "127.0.0.1")}  # and the console
 
 

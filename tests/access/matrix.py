@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,12 +17,12 @@ from roboglot.access.rights import NOTHING, whole
 from roboglot.clients.visual import TextLink
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_app
+from roboglot.testing.addresses import free_addresses
 from roboglot.wire.cyberdog.channel import ROBOT_NAME
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import GrpcAppStub
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-ADDRESS = f"127.0.95.{100 + WORKER}"  # one per process
+ADDRESS = free_addresses(1)
 
 
 SUBPROTOCOL = Subprotocol("foxglove.websocket.v1")

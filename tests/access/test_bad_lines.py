@@ -25,12 +25,13 @@ from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 from roboglot.testing.bad_line import BadLine
 from tests.access.line import bad_line
-from tests.access.matrix import ADDRESS, WORKER, frame_states
+from tests.access.matrix import ADDRESS, frame_states
 from tests.protocols.robomaster.clients.test_robomasterpy import TOUR, check, listen
 
-HERE = f"127.0.96.{100 + WORKER}"
+HERE = free_addresses(1)
 
 
 @contextlib.asynccontextmanager

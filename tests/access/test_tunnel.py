@@ -26,9 +26,10 @@ from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
-from tests.access.matrix import ADDRESS, WORKER
+from roboglot.testing.addresses import free_addresses
+from tests.access.matrix import ADDRESS
 
-HERE = f"127.0.96.{1 + WORKER}"
+HERE = free_addresses(1)
 POSE = "/api/core/slam/v1/localization/pose"
 
 
@@ -262,7 +263,7 @@ async def test_a_tunnel_takes_no_address_where_others_listen(
 ) -> None:
     runtime, _ = gateway
     assert runtime.guard is not None
-    first = ip_address(ADDRESS.replace("127.0.95", "127.65.0"))  # only of this test's process
+    first = ip_address(free_addresses(2))
     monkeypatch.setattr("roboglot.access.tunnel.gateway.FIRST_ADDRESS", first)
     with socket.create_server((str(first), 8981)):
         async with connected(*gateway, tmp_path):

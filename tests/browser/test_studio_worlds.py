@@ -14,6 +14,7 @@ import pytest
 import pytest_asyncio
 
 from roboglot.shards.classes import FleetClasses
+from roboglot.testing.addresses import free_addresses
 from tests.browser.served import Served, shows, until
 from tests.browser.test_studio import FOREVER, READY, Open, loaded, phase, studio
 from tests.console.conftest import Shown
@@ -30,7 +31,7 @@ async def worlds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterat
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     classes = FleetClasses(tmp_path)
     await classes.open()
-    async with world(tmp_path, "w1", "127.0.94.1") as first, world(tmp_path, "w2", "127.0.94.2") as second:
+    async with world(tmp_path, "w1", free_addresses(1)) as first, world(tmp_path, "w2", free_addresses(1)) as second:
         yield [first, second]
     await classes.close()
 

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from ipaddress import IPv4Network, ip_address
 from pathlib import Path
 
 import pytest
@@ -14,9 +15,12 @@ import pytest
 from roboglot.access.store import Grant, open_store
 from roboglot.cli.connect import addresses
 from roboglot.operations import Right
+from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.testing.process import served
 
-ROBOTS, HERE = "127.0.97.1", "127.0.97.32/28"
+ROBOTS, GATEWAY = free_addresses(2), f"{free_addresses(1)}:{free_port()}"
+RANGE = IPv4Network((int(ip_address(free_addresses(7))) + 3 & ~3, 30))  # begins at a multiple of 4
+HERE, SECOND = map(str, RANGE.hosts())
 POSE = "api/core/slam/v1/localization/pose"
 
 
@@ -25,7 +29,7 @@ def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
     store = open_store(data)
     token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])
     store.close()
-    config.write_text('[access]\nlocal = false\ngateway = "127.0.97.1:50090"\n')
+    config.write_text(f'[access]\nlocal = false\ngateway = "{GATEWAY}"\n')
     options = ("--world", "empty", "--no-console", "--config", str(config), "--robot", "b=robomaster_ep")
     with served(data, *options, address=ROBOTS):
         doctor = [
@@ -42,25 +46,25 @@ def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
         seen = subprocess.run(doctor, capture_output=True, text=True, timeout=180, check=False).stdout
         [shown] = [line.split()[-1] for line in seen.splitlines() if "gateway certificate" in line]
         assert "open now, by" in seen
-        command = [sys.executable, "-m", "roboglot", "connect", f"{ROBOTS}:50090", "--robot", "a", "--robot", "b"]
+        command = [sys.executable, "-m", "roboglot", "connect", GATEWAY, "--robot", "a", "--robot", "b"]
         environment = {**os.environ, "ROBOGLOT_TOKEN": token, "XDG_CONFIG_HOME": str(known)}
         pipe = subprocess.PIPE
         with subprocess.Popen(
-            [*command, "--address-range", HERE, "--once"], env=environment, stdout=pipe, stderr=pipe, text=True
+            [*command, "--address-range", str(RANGE), "--once"], env=environment, stdout=pipe, stderr=pipe, text=True
         ) as connect:
             try:
                 assert connect.stdout is not None
                 assert connect.stderr is not None
                 ready = sorted(connect.stdout.readline() for _ in range(2))
                 assert all(ready), connect.stderr.read()
-                assert ready[0].startswith("ready: robot a on 127.0.97.33, ports 1448, ")
-                assert ready[1].startswith("ready: robot b on 127.0.97.34, ports ")
+                assert ready[0].startswith(f"ready: robot a on {HERE}, ports 1448, ")
+                assert ready[1].startswith(f"ready: robot b on {SECOND}, ports ")
                 said = [connect.stderr.readline() for _ in range(2)]
                 assert all(line.startswith(f"gateway {shown}") for line in said)
                 assert sum("seen for the first time" in line for line in said) == 1
-                with urllib.request.urlopen(f"http://127.0.97.33:1448/{POSE}", timeout=60) as reply:
+                with urllib.request.urlopen(f"http://{HERE}:1448/{POSE}", timeout=60) as reply:
                     assert reply.status == 200
-                with socket.create_connection(("127.0.97.34", 40923), 60) as line:
+                with socket.create_connection((SECOND, 40923), 60) as line:
                     line.sendall(b"command;chassis speed x 0.1;")
                     got = b""
                     while got.count(b";") < 2:
@@ -93,9 +97,9 @@ def test_how_to_have_address_of_others_is_explained(tmp_path: Path) -> None:
     token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])
     store.close()
     config = tmp_path / "robots.toml"
-    config.write_text('[access]\ngateway = "127.0.97.1:50091"\n')
-    with served(data, "--world", "empty", "--no-console", "--config", str(config), address="127.0.97.4"):
-        command = [sys.executable, "-m", "roboglot", "connect", "127.0.97.1:50091", "--address-range", "192.0.2.0/24"]
+    config.write_text(f'[access]\ngateway = "{GATEWAY}"\n')
+    with served(data, "--world", "empty", "--no-console", "--config", str(config), address=ROBOTS):
+        command = [sys.executable, "-m", "roboglot", "connect", GATEWAY, "--address-range", "192.0.2.0/24"]
         environment = {**os.environ, "ROBOGLOT_TOKEN": token, "XDG_CONFIG_HOME": str(tmp_path)}
         ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=180, check=False)
     assert ended.returncode == 1

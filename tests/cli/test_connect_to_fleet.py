@@ -23,11 +23,11 @@ from roboglot.runtime import Runtime
 from roboglot.storage import whereabouts
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry, read_registry
-from tests.access.matrix import WORKER
+from roboglot.testing.addresses import free_addresses
 from tests.narrowing import known
 from tests.storage.postgresql_server import PostgreSQLServer, binary_folder, needs_postgresql, postgresql_server
 
-HERE, HOMES = f"127.0.98.{1 + WORKER}", (f"127.0.99.{1 + WORKER}", f"127.0.100.{1 + WORKER}")
+HERE, HOMES = free_addresses(1), (free_addresses(1), free_addresses(1))
 NAME = "/api/core/system/v1/robot/info"
 
 

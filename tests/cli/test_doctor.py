@@ -16,8 +16,9 @@ from roboglot.cli.checks.listeners import holder_of
 from roboglot.cli.doctor import examine_ports
 from roboglot.config import Config, RobotConfig
 from roboglot.protocols.slamware.config import SlamwareConfig
+from roboglot.testing.addresses import free_addresses
 
-ADDRESS = "127.0.0.77"
+ADDRESS = free_addresses(1)
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing import Forward
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 
 PATIENCE = 60  # real seconds, on a busy machine
-EP_ADDRESS = "127.0.0.78"
+EP_ADDRESS = free_addresses(1)
 
 
 class TextClient:

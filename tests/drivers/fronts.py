@@ -30,12 +30,13 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.visual.server import VisualDoor
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
+from roboglot.testing.addresses import free_addresses
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.slamware.chapters.motion import AngleOptions, Direction, MoveByOptions, MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
 from tests.drivers.chain import TextClient
 
-ADDRESS = "127.0.0.80"
+ADDRESS = free_addresses(1)
 SIDE, SPEED = 0.4, 0.3  # m, m/s
 
 

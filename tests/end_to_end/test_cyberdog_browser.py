@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.testing.process import served
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cyberdog_video.py"
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-ADDRESS = "127.0.0.47"
+ADDRESS = free_addresses(1)
 PATIENCE = 90.0  # s without a new picture
 OPTIONS = [
     "--headless=new",

@@ -10,14 +10,18 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from roboglot.testing.addresses import free_addresses
 from roboglot.testing.process import ServedRobot, child, served
 
-FIRST, SECOND = "127.0.0.51", "127.0.0.52"
+FIRST = free_addresses(2)
+SECOND = str(ip_address(FIRST) + 1)
+ALONE = free_addresses(1)
 POIS = "/api/core/artifact/v1/pois"
 POSE = "/api/core/slam/v1/localization/pose"
 TCP_PORTS = (1448, 40923, 40925, 50052)
@@ -122,12 +126,12 @@ def test_memory_does_not_grow_with_requests(pair: ServedRobot) -> None:
 def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
     data = tmp_path / "data"
     poi = {"id": "kitchen", "pose": {"x": 1.5, "y": -2.25, "yaw": 0.5}, "metadata": {"display_name": "厨房"}}
-    with served(data, "--world", "empty", address="127.0.0.53") as robot:
-        post(POIS, poi, "127.0.0.53")
+    with served(data, "--world", "empty", address=ALONE) as robot:
+        post(POIS, poi, ALONE)
         robot.process.send_signal(signal.SIGKILL)
         robot.process.wait()
-    with served(data, "--world", "empty", address="127.0.0.53"):
-        [stored] = get(POIS, "127.0.0.53")
+    with served(data, "--world", "empty", address=ALONE):
+        [stored] = get(POIS, ALONE)
     assert stored["id"] == "kitchen"
     assert stored["metadata"]["display_name"] == "厨房"
     assert stored["pose"]["y"] == pytest.approx(-2.25)
@@ -135,7 +139,7 @@ def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
 
 def test_it_stops_cleanly_on_a_signal(tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with served(tmp_path / "data", "--world", "empty", address="127.0.0.54", log=log) as robot:
+    with served(tmp_path / "data", "--world", "empty", address=ALONE, log=log) as robot:
         robot.process.send_signal(signal.SIGINT)
         assert robot.process.wait(10) == 0
     assert "Traceback" not in log.read_text()
@@ -160,9 +164,9 @@ def test_it_ends_even_if_something_is_stuck() -> None:
 
 
 def test_it_ends_in_middle_of_day_of_lockstep(tmp_path: Path) -> None:
-    with served(tmp_path / "data", "--lockstep", "--world", "empty", address="127.0.0.58") as robot:
+    with served(tmp_path / "data", "--lockstep", "--world", "empty", address=ALONE) as robot:
         assert robot.process.stdin
-        with Line("127.0.0.58") as line:
+        with Line(ALONE) as line:
             assert line.say("command;chassis speed x 0.1") == ["ok;", "ok;"]
             robot.process.stdin.write("86400\n")
             robot.process.stdin.flush()
@@ -172,19 +176,19 @@ def test_it_ends_in_middle_of_day_of_lockstep(tmp_path: Path) -> None:
 
 
 def test_lockstep_time_passes_by_lines_on_standard_input(tmp_path: Path) -> None:
-    with served(tmp_path / "data", "--lockstep", "--world", "empty", address="127.0.0.55") as robot:
+    with served(tmp_path / "data", "--lockstep", "--world", "empty", address=ALONE) as robot:
         assert robot.process.stdin
         assert robot.process.stdout
         robot.process.stdin.write("9" * 300 + "\n-1\nnan\n")
         robot.process.stdin.flush()
         assert [robot.process.stdout.readline() for _ in range(3)] == ["time 0.000\n"] * 3
-        with Line("127.0.0.55") as line:
+        with Line(ALONE) as line:
             assert line.say("command;chassis move x 0.5") == ["ok;", "ok;"]
-            assert abs(float(get(POSE, "127.0.0.55")["x"])) < 0.001
+            assert abs(float(get(POSE, ALONE)["x"])) < 0.001
             robot.process.stdin.write("5\n")
             robot.process.stdin.flush()
             assert robot.process.stdout.readline() == "time 5.000\n"
-            assert float(get(POSE, "127.0.0.55")["x"]) == pytest.approx(0.5, abs=0.05)
+            assert float(get(POSE, ALONE)["x"]) == pytest.approx(0.5, abs=0.05)
 
 
 SEVERAL = """
@@ -219,11 +223,11 @@ def test_mistakes_are_reported_in_plain_words(pair: ServedRobot, tmp_path: Path)
     broken.mkdir()
     (broken / "roboglot.db").write_bytes(b"no database" * 1000)
     errors = refused(
-        ("--data", str(pair.data), "--address", "127.0.0.56"),
+        ("--data", str(pair.data), "--address", ALONE),
         ("--data", str(tmp_path / "1"), "--address", FIRST),
         ("--data", str(tmp_path / "2"), "--world", "atlantis"),
         ("--data", str(tmp_path / "3"), "--robot", "b"),
-        ("--data", str(broken), "--address", "127.0.0.56"),
+        ("--data", str(broken), "--address", ALONE),
         ("--data", str(tmp_path / "4"), "--robot", "b=octopus"),
     )
     for words, said in zip(

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from roboglot.testing.addresses import free_addresses
+
 DEPOT = Path(__file__).parents[1] / "data" / "maps" / "depot.yaml"
 
 
@@ -18,7 +20,7 @@ def test_four_clients_drive_one_robot(world: str, tmp_path: Path, vendor_ports: 
     out = tmp_path / "tour.png"
     command = [sys.executable, "-m", "roboglot", "demo", "--world", world, "--speed", "6"]
     done = subprocess.run(
-        [*command, "--address", "127.0.0.57", "--out", str(out)],
+        [*command, "--address", free_addresses(1), "--out", str(out)],
         capture_output=True,
         text=True,
         timeout=120,

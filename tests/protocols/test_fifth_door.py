@@ -19,9 +19,10 @@ from roboglot.operations import OperationTable, Right
 from roboglot.protocols import DOORS, sections
 from roboglot.protocols.door import Contract, DoorType, Endpoint, PortSetting, Site
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 from roboglot.wire.contracts import Row
 
-ADDRESS = "127.0.0.79"
+ADDRESS = free_addresses(1)
 TABLE: OperationTable[str] = OperationTable("charge")
 
 

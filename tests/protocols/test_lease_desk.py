@@ -34,10 +34,11 @@ from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.storage.settings import StoredSettings
 from roboglot.testing import Forward
+from roboglot.testing.addresses import free_addresses
 from roboglot.wire.slamware.chapters.motion import AngleOptions
 
 pytestmark = pytest.mark.world("empty")
-ADDRESS = "127.0.0.83"
+ADDRESS = free_addresses(1)
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import contextlib
 import dataclasses
 import itertools
 import json
-import os
 import struct
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
@@ -28,13 +27,12 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.runtime import Runtime
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
 from tests.narrowing import of_kind
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-ADDRESS = f"127.0.194.{101 + WORKER}"
+ADDRESS = free_addresses(1)
 TWIST = b"\0\1\0\0" + struct.pack("<6d", 0.2, 0.0, 0.0, 0.0, 0.0, 0.1)  # CDR, little endian
 FRAME: dict[str, object] = dict.fromkeys(("style", "describe", "body"), "") | {
     "type": "task",

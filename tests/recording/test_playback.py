@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import dataclasses
 import json
-import os
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -26,9 +25,9 @@ from roboglot.protocols.cyberdog.certificates import ensure_certificates, export
 from roboglot.recording.playback import open_playback
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run in parallel
-ADDRESS, SECOND = f"127.0.193.{1 + WORKER}", f"127.0.193.{101 + WORKER}"
+ADDRESS, SECOND = free_addresses(1), free_addresses(1)
 SPEED = 4.0
 FAST, LATE = 40.0, 0.2  # s of the robot
 PROGRAM = "cyberdog.task.block('one');\ncyberdog.task.block('two');\n"

@@ -6,7 +6,6 @@ import asyncio
 import dataclasses
 import itertools
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -23,11 +22,11 @@ from roboglot.protocols import sections
 from roboglot.recording.inputs import is_of_client
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-ADDRESS = f"127.0.194.{1 + WORKER}"
+ADDRESS = free_addresses(1)
 
 
 def config(folder: Path, **more: object) -> Config:

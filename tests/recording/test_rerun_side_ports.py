@@ -14,11 +14,11 @@ from roboglot.model.components.interaction.input_device import InputDevice
 from roboglot.model.geometry import Vector3
 from roboglot.model.tap import Direction
 from roboglot.protocols.robomaster.ports.serial_line import SERIAL
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 from tests.recording.everything import ADDRESS, Session, begun
 from tests.recording.test_rerun_clients import identical, until_gone
 
-CLIENT = "127.0.0.9"  # an address of its own, to which pushes go
+CLIENT = free_addresses(1)  # an address of its own, to which pushes go
 
 
 class Ears(asyncio.DatagramProtocol):

@@ -24,10 +24,11 @@ from roboglot.shards.plan import plan_fleet
 from roboglot.shards.supervisor import State
 from roboglot.storage.homes import Home, Homes
 from roboglot.storage.opening import open_registry
+from roboglot.testing.addresses import free_addresses
 
 STORE = 80 << 20
 PATIENCE = 300.0  # s
-FIRST = "127.77.9.1"
+FIRST = free_addresses(4)
 HEALTH = {  # as in deploy/kuberay: a node that is silent for 3 s counts as gone
     "health_check_initial_delay_ms": 1000,
     "health_check_period_ms": 1000,

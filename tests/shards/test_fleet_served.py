@@ -12,6 +12,7 @@ import threading
 import time
 import urllib.request
 from collections.abc import Iterator
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,11 @@ import pytest
 from roboglot.hosting import local_socket
 from roboglot.shards.supervisor import SILENCE_MAX
 from roboglot.shards.wishes import SOCKET
+from roboglot.testing.addresses import free_addresses
 
 PATIENCE = 150.0  # s; a busy machine is twenty times slower than a quiet one
-FIRST = "127.77.1.1"
+FIRST = free_addresses(4)
+SECOND, THIRD, FOURTH = (str(ip_address(FIRST) + further) for further in (1, 2, 3))
 TEMPLATE = """
 world = "office"
 [[robots]]
@@ -123,7 +126,7 @@ def wait_until_gone(pids: list[int]) -> None:
 
 def test_every_robot_answers_at_address_of_its_own(fleet: Fleet) -> None:
     robots = {robot["name"]: robot["address"] for row in fleet.shards().values() for robot in row["robots"]}
-    assert robots == {"a1": FIRST, "b1": "127.77.1.2", "a2": "127.77.1.3", "b2": "127.77.1.4"}
+    assert robots == {"a1": FIRST, "b1": SECOND, "a2": THIRD, "b2": FOURTH}
     assert len({ask(address, "system/v1/robot/info")["deviceID"] for address in robots.values()}) == 4
     assert json.loads(fleet.call("list", "--json").stdout)["shards"][0]["name"] == "w1"
 
@@ -143,33 +146,33 @@ def test_a_hung_shard_is_killed_and_started_again(fleet: Fleet) -> None:
     before = fleet.shards()["w2"]
     os.kill(before["pid"], signal.SIGSTOP)
     fleet.until("w2", state="ready", restarts=before["restarts"] + 1)
-    assert ask("127.77.1.3", "slam/v1/localization/pose")
+    assert ask(THIRD, "slam/v1/localization/pose")
 
 
 def test_stopped_stays_stopped_and_restart_brings_it_back(fleet: Fleet) -> None:
     assert fleet.call("stop", "a2").returncode == 0
     assert fleet.shards()["w2"]["state"] == "stopped"
     with pytest.raises(OSError, match="refused"):
-        ask("127.77.1.3", "slam/v1/localization/pose")
+        ask(THIRD, "slam/v1/localization/pose")
     assert fleet.call("restart", "w2").returncode == 0
-    assert ask("127.77.1.3", "slam/v1/localization/pose")
+    assert ask(THIRD, "slam/v1/localization/pose")
 
 
 def test_robot_moves_with_its_address_and_stored_data(fleet: Fleet) -> None:
-    ask("127.77.1.2", "artifact/v1/pois", {**POI, "id": "shelf"})
+    ask(SECOND, "artifact/v1/pois", {**POI, "id": "shelf"})
     assert fleet.call("move", "b1", "w2").returncode == 0
     homes = {name: [robot["name"] for robot in row["robots"]] for name, row in fleet.shards().items()}
     assert homes == {"w1": ["a1"], "w2": ["a2", "b2", "b1"]}
-    assert pois("127.77.1.2") == ["shelf"]
+    assert pois(SECOND) == ["shelf"]
     refused = fleet.call("move", "a1", "w2")
     assert refused.returncode == 1
     assert "only robot" in refused.stderr
 
 
 def test_reset_forgets_what_was_stored(fleet: Fleet) -> None:
-    ask("127.77.1.3", "artifact/v1/pois", {**POI, "id": "lamp"})
+    ask(THIRD, "artifact/v1/pois", {**POI, "id": "lamp"})
     assert fleet.call("reset", "w2").returncode == 0
-    assert pois("127.77.1.3") == []
+    assert pois(THIRD) == []
 
 
 def test_what_does_not_exist_is_refused_by_name(fleet: Fleet) -> None:

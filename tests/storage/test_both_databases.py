@@ -35,6 +35,7 @@ from roboglot.storage.places import StoredPlaces
 from roboglot.storage.programs import DatabaseProgramStore
 from roboglot.storage.settings import StoredSettings
 from roboglot.storage.transactions import Connection, DatabaseError, DiskFull, Transactions
+from roboglot.testing.addresses import free_addresses
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
 ODD = "naïve 狗\0 \ue000 '; DROP TABLE place; --"
@@ -223,7 +224,7 @@ async def test_robot_moves_to_another_folder_with_its_places(server: PostgreSQLS
     server.empty()
     poi = {"id": "door", "pose": {"x": 1.0, "y": 2.0, "yaw": 0.0}, "metadata": {"display_name": "狗"}}
     for life in ("one machine", "another"):
-        robot = RobotConfig("a", address="127.0.0.143")
+        robot = RobotConfig("a", address=(address := free_addresses(1)))
         runtime = Runtime(
             Config(
                 "empty",
@@ -235,7 +236,7 @@ async def test_robot_moves_to_another_folder_with_its_places(server: PostgreSQLS
             )
         )
         await runtime.start()
-        async with httpx.AsyncClient(base_url="http://127.0.0.143:1448") as client:
+        async with httpx.AsyncClient(base_url=f"http://{address}:1448") as client:
             if life == "one machine":
                 assert (await client.post("/api/core/artifact/v1/pois", json=poi)).status_code == 200
             pois = (await client.get("/api/core/artifact/v1/pois")).json()

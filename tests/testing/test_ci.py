@@ -14,10 +14,11 @@ import pytest
 import yaml
 
 from roboglot.recording.reader import read_recording
+from roboglot.testing.addresses import free_addresses
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "deploy/ci/robot"
-ADDRESS = "127.0.0.222"
+ADDRESS = free_addresses(1)
 
 
 def robot(folder: Path, *arguments: str, **more: str) -> str:

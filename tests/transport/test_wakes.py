@@ -10,10 +10,11 @@ from collections.abc import Callable
 import grpc
 import pytest
 
+from roboglot.testing.addresses import free_addresses
 from roboglot.transport import wakes
 from roboglot.transport.wakes import prompt_wakes
 
-ADDRESS = "127.75.1.1"
+ADDRESS = free_addresses(1)
 
 
 async def test_all_bytes_are_read_in_one_turn() -> None:

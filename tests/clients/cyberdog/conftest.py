@@ -14,10 +14,10 @@ from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.testing import Forward
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 from tests.drivers.pace import settle
 
-ADDRESS = "127.0.0.37"
+ADDRESS = free_addresses(1)
 
 
 @pytest.fixture(scope="session")

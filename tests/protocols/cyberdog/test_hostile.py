@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.dispatch import KNOWN, answer
+from roboglot.testing.addresses import free_addresses
 from roboglot.testing.process import ServedRobot, served
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.text import NotJson, read_params, write
@@ -21,7 +22,7 @@ from tests.protocols.cyberdog.phone import PATIENCE, Client, Messages, Pems
 
 STREAMS = 10_000
 GROWTH_MAX = 150.0  # MB
-LONELY = "127.0.0.48"
+LONELY = free_addresses(1)
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=20),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=12), inner, max_size=4),

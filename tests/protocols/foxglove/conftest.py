@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -19,9 +18,9 @@ from roboglot.config import load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run in parallel
-ADDRESS = f"127.0.194.{1 + WORKER}"
+ADDRESS = free_addresses(1)
 PORT = 8765
 PATIENCE = 60.0  # real s
 

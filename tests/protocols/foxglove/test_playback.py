@@ -21,9 +21,10 @@ from roboglot.protocols import DOORS, sections
 from roboglot.recording.reader import Recording, read_messages, read_recording, records
 from roboglot.recording.reel import Reel, Shot
 from roboglot.runtime import Runtime
-from tests.protocols.foxglove.conftest import ADDRESS, WORKER, Opened, Scene, Viewer
+from roboglot.testing.addresses import free_addresses
+from tests.protocols.foxglove.conftest import ADDRESS, Opened, Scene, Viewer
 
-SECOND = f"127.0.194.{101 + WORKER}"
+SECOND = free_addresses(1)
 NANO = 10**9
 PLAYING, PAUSED, ENDED = 0, 1, 3
 SECONDS = 20.0  # of the recording

@@ -13,8 +13,8 @@ from roboglot.model.geometry import Twist
 from roboglot.protocols.robomaster import limits
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from tests.protocols.robomaster.text_client import ADDRESS
 
-ADDRESS = "127.0.0.9"
 FLOOD = 50_000
 PATIENCE = 100  # s, on a busy machine
 

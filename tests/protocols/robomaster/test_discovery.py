@@ -1,11 +1,12 @@
 """``robot ip``: how a robot is found."""
 
 from roboglot.protocols.robomaster.datagrams import broadcast_address
+from tests.protocols.robomaster.text_client import ADDRESS
 
 
 async def test_every_two_seconds_from_address_in_the_text(door, broadcasts, forward) -> None:
     await forward(seconds=6.001)
-    assert broadcasts.drain() == [("robot ip 127.0.0.9", "127.0.0.9")] * 3
+    assert broadcasts.drain() == [(f"robot ip {ADDRESS}", ADDRESS)] * 3
 
 
 async def test_silent_while_someone_is_in_sdk_mode(connect, broadcasts, forward) -> None:

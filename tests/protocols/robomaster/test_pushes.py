@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.protocols.robomaster.text_client import ADDRESS
+
 
 @pytest.mark.parametrize("rate", [1, 5, 10, 20, 30, 50])
 async def test_each_rate_is_kept_to_the_datagram(client, pushes, forward, rate: int) -> None:
@@ -14,7 +16,7 @@ async def test_form_and_sender(client, pushes, forward) -> None:
     await client.ask("chassis push position on attitude on status on freq 1;")
     await forward(seconds=1.001)
     got = pushes.drain()
-    assert {host for _, host in got} == {"127.0.0.9"}
+    assert {host for _, host in got} == {ADDRESS}
     texts = sorted(text for text, _ in got)
     assert [text.split()[2] for text in texts] == ["attitude", "position", "status"]
     assert all(text.startswith("chassis push ") and text.endswith(";") and text.count(";") == 1 for text in texts)

@@ -9,6 +9,7 @@ import pytest
 from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from tests.protocols.robomaster.text_client import ADDRESS
 
 
 async def heard(line: int) -> str:
@@ -27,7 +28,7 @@ async def test_commands_answers_pushes_and_events_on_one_line(robot, world, forw
     config = RoboMasterConfig(
         control_port=0, event_port=0, video_port=0, audio_port=0, uart=str(tmp_path / "ep"), profile="fw70"
     )
-    door = RoboMasterDoor(robot, "127.0.0.9", config)
+    door = RoboMasterDoor(robot, ADDRESS, config)
     await door.start()
     line = os.open(tmp_path / "ep-a", os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:

@@ -6,8 +6,9 @@ import asyncio
 import socket
 
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.testing.addresses import free_addresses
 
-ADDRESS = "127.0.0.9"
+ADDRESS = free_addresses(1)
 PATIENCE = 60  # real seconds
 
 

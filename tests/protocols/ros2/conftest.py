@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -22,9 +21,9 @@ from roboglot.config import load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.runtime import Runtime
+from roboglot.testing.addresses import free_addresses
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # files of this folder run in parallel
-ADDRESS, PORT = f"127.0.195.{1 + WORKER}", 7447
+ADDRESS, PORT = free_addresses(1), 7447
 PATIENCE = 60.0  # real s
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

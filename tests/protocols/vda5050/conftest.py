@@ -19,13 +19,13 @@ from roboglot.config import load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.runtime import Runtime
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 from tests.protocols.vda5050.orders import encoded
 
 mqtt = pytest.importorskip("paho.mqtt.client", reason="needs paho-mqtt, which aiomqtt brings")
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
 PATIENCE = 60.0  # real s
-ADDRESS = "127.0.0.83"
+ADDRESS = free_addresses(1)
 
 
 def listening(port: int) -> None:

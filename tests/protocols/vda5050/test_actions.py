@@ -8,7 +8,7 @@ from pathlib import Path
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.system.file_store import FileStore
-from tests.protocols.vda5050.conftest import Opened, Yard
+from tests.protocols.vda5050.conftest import ADDRESS, Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
 
 MARKS = str(Path(__file__).parents[2] / "autonomy" / "worlds" / "marks.toml")
@@ -16,7 +16,7 @@ MARKS = str(Path(__file__).parents[2] / "autonomy" / "worlds" / "marks.toml")
 
 def robot_at(x: float, y: float, body: str = "hermes") -> dict[str, object]:
     """The one robot of a world with a shelf and a tag, looking east."""
-    robot = {"name": "a", "body": body, "address": "127.0.0.83", "start": {"x": x, "y": y, "yaw": 0.0}}
+    robot = {"name": "a", "body": body, "address": ADDRESS, "start": {"x": x, "y": y, "yaw": 0.0}}
     return {"world": MARKS, "robots": [robot]}
 
 

@@ -25,12 +25,12 @@ from roboglot.recording.proxy.dog import DogRelay, Proof
 from roboglot.recording.proxy.relay import Book, Relay
 from roboglot.recording.proxy.sniffers import RestSniffer, TextSniffer, rest_operation
 from roboglot.recording.reader import pair, read_recording
-from roboglot.testing.addresses import free_port
+from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT
 from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run, whole_closing
 
 assert whole_closing  # a fixture for these tests, too
-BETWEEN = ADDRESS.replace("127.0.193.", "127.0.195.")
+BETWEEN, ROBOT, OTHER = free_addresses(1), free_addresses(1), free_addresses(1)
 
 
 async def between(url: str, path: Path, script: Any) -> Any:
@@ -147,19 +147,19 @@ async def test_client_that_looks_for_ep_finds_the_proxy(tmp_path: Path, vendor_p
         client.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         client.bind(("", BROADCAST_PORT))
         hearing = (await loop.create_datagram_endpoint(Client, sock=client))[0]
-        robot = Datagrams("127.0.0.89")
-        other = Datagrams("127.0.0.90")
-        other.send(b"robot ip 127.0.0.90;", "127.255.255.255", BROADCAST_PORT)
-        robot.send(b"robot ip 127.0.0.89;", "127.255.255.255", BROADCAST_PORT)
+        robot = Datagrams(ROBOT)
+        other = Datagrams(OTHER)
+        other.send(f"robot ip {OTHER};".encode(), "127.255.255.255", BROADCAST_PORT)
+        robot.send(f"robot ip {ROBOT};".encode(), "127.255.255.255", BROADCAST_PORT)
         try:
             return await asyncio.wait_for(found, 60)
         finally:
             for socket_of in (hearing, robot, other):
                 socket_of.close()
 
-    assert await between("robomaster://127.0.0.89", path, script) == f"robot ip {BETWEEN};".encode()
+    assert await between(f"robomaster://{ROBOT}", path, script) == f"robot ip {BETWEEN};".encode()
     heard = read_recording(path).of(door="robomaster")
-    assert [(e.direction, e.payload) for e in heard] == [(Direction.PUSH, b"robot ip 127.0.0.89;")]
+    assert [(e.direction, e.payload) for e in heard] == [(Direction.PUSH, f"robot ip {ROBOT};".encode())]
 
 
 async def test_pushes_for_client_of_this_machine_are_noted(tmp_path: Path, vendor_ports: None) -> None:
@@ -174,7 +174,7 @@ async def test_pushes_for_client_of_this_machine_are_noted(tmp_path: Path, vendo
 
     async def robot(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await reader.readuntil(b";")
-        datagrams = Datagrams("127.0.0.89")
+        datagrams = Datagrams(ROBOT)
         datagrams.send(push, writer.get_extra_info("peername")[0], 40924)
         datagrams.close()
         await reader.read()
@@ -191,8 +191,8 @@ async def test_pushes_for_client_of_this_machine_are_noted(tmp_path: Path, vendo
             writer.close()
             hearing.close()
 
-    async with await asyncio.start_server(robot, "127.0.0.89", 40923):
-        assert await between("robomaster://127.0.0.89", path, script) == push
+    async with await asyncio.start_server(robot, ROBOT, 40923):
+        assert await between(f"robomaster://{ROBOT}", path, script) == push
     noted = read_recording(path).of(door="robomaster")
     assert push in [exchange.payload for exchange in noted if exchange.direction is Direction.PUSH]
 
@@ -221,7 +221,7 @@ async def test_what_is_not_understood_passes_all_the_same(tmp_path: Path) -> Non
             await writer.wait_closed()
         ended.set()
 
-    robot = await asyncio.start_server(echo, "127.0.0.89", 1448)
+    robot = await asyncio.start_server(echo, ROBOT, 1448)
     sent = bytes(range(256)) * 2000
 
     async def script(address: str) -> bytes:
@@ -233,7 +233,7 @@ async def test_what_is_not_understood_passes_all_the_same(tmp_path: Path) -> Non
             await writer.wait_closed()
         return came
 
-    assert await between("slamware://127.0.0.89", tmp_path / "x.mcap", script) == sent
+    assert await between(f"slamware://{ROBOT}", tmp_path / "x.mcap", script) == sent
     await ended.wait()
     robot.close()
     await robot.wait_closed()

@@ -9,6 +9,7 @@ import tempfile
 import tomllib
 from collections import defaultdict
 from collections.abc import Sequence
+from ipaddress import ip_address
 from pathlib import Path
 from textwrap import wrap
 from typing import Annotated
@@ -32,7 +33,7 @@ from roboglot.runtime import Runtime
 
 PAGE = Path("docs/fidelity.md")
 PUBLISHED = Path(__file__).with_name("published.toml")
-ADDRESSES = "127.0.211"  # robots get .1, .2 and so on
+FIRST_ADDRESS = "127.0.211.1"  # others follow
 BODY = {"robomaster": "robomaster_ep", "cyberdog": "cyberdog2", "slamware": "universal", "visual": "universal"}
 SEEDS = 1, 2
 WIDTH = 110
@@ -67,7 +68,7 @@ class Verdict(msgspec.Struct, frozen=True):
 
 def command(write: Annotated[bool, typer.Option("--write", help="Write docs/fidelity.md.")] = False) -> None:
     """Compare the doors of this version with published answers of real robots, and with themselves."""
-    text = asyncio.run(page(ADDRESSES))
+    text = asyncio.run(page(FIRST_ADDRESS))
     if write:
         PAGE.write_text(text, encoding="utf-8")
     else:
@@ -81,12 +82,12 @@ def published(door: str = "") -> tuple[Session, ...]:
     return tuple(session for session in sessions if door in ("", session.door))
 
 
-async def page(addresses: str) -> str:
-    """Return the page; it is reproducible, as robots run in lockstep, at these addresses of this machine."""
+async def page(first_address: str) -> str:
+    """Return the page, the same each time: robots run in lockstep, at addresses from the first one on."""
     doors, sessions = sorted(BODY), defaultdict[str, list[Sequence[Exchange]]](list)
     verdicts: list[Verdict] = []
     for seed in SEEDS:
-        async with _Served(addresses, seed) as served:
+        async with _Served(first_address, seed) as served:
             for door in doors:
                 sessions[door].append(await probe(served.targets[door], askable(door), RealClock()))
             if seed == SEEDS[0]:
@@ -151,14 +152,14 @@ def _facts(asked: Asked, answers: Sequence[tuple[bytes, str]]) -> list[tuple[boo
 class _Served:
     """Robots in lockstep while ``with`` lasts; ``targets``: their doors."""
 
-    def __init__(self, addresses: str, seed: int) -> None:
-        self._addresses, self._seed = addresses, seed
+    def __init__(self, first_address: str, seed: int) -> None:
+        self._first_address, self._seed = ip_address(first_address), seed
         self._folder = tempfile.TemporaryDirectory(prefix="roboglot-fidelity-")
 
     async def __aenter__(self) -> _Served:
         data = Path(self._folder.name)
         bodies = sorted(set(BODY.values()))
-        address = {body: f"{self._addresses}.{number}" for number, body in enumerate(bodies, 1)}
+        address = {body: str(self._first_address + number) for number, body in enumerate(bodies)}
         values = {
             "data": str(data),
             "world": "empty",

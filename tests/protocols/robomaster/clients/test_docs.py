@@ -14,6 +14,7 @@ from roboglot.model.sound import claps
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.contracts import contract
 from tests.drivers.pace import settle
+from tests.protocols.robomaster.text_client import ADDRESS
 
 DOCS = Path(__file__).parents[4] / "docs/protocols"
 PAGES = {page.stem: page for page in (DOCS / "robomaster.md", DOCS / "robomaster.zh.md")}
@@ -90,7 +91,7 @@ async def test_the_transcripts_are_true(
         await settle()
         said = re.findall(r"[^;]+;", bytes(events._buffer).decode())
         events._buffer.clear()
-        return [*said, *pushes.texts(), *(text.replace("127.0.0.9", "127.0.0.1") for text in broadcasts.texts())]
+        return [*said, *pushes.texts(), *(text.replace(ADDRESS, "127.0.0.1") for text in broadcasts.texts())]
 
     wrong, reported, answer = [], [], ""
     for line in transcripts(page)[index]:
