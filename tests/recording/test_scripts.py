@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 from pathlib import Path
 
 import pytest
 
+from roboglot.testing.addresses import free_addresses
 from tests.docs.docs_terminal import terminal
 from tests.recording.scripts import SCRIPTS, Script, play
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])  # workers run in parallel
-ADDRESS = f"127.0.196.{1 + WORKER}"
+ADDRESS = free_addresses(1)
 
 
 async def ended(script: Script, folder: Path, body: str, record: str) -> list[tuple[int, str]]:
@@ -21,12 +20,11 @@ async def ended(script: Script, folder: Path, body: str, record: str) -> list[tu
         return await play(script, user)
 
 
-def shown(script: Script, ended: list[tuple[int, str]]) -> list[str]:
-    """Return the lines that must be the same."""
-    texts = [f"{status} {re.sub(script.random or '$^', '', said)}" for status, said in ended]
-    lines = "\n".join(texts).splitlines()
+def shown(script: Script, ended: list[tuple[int, str]]) -> list[tuple[int, list[str]]]:
+    """Return what must be the same: the status of each command and its lines, in any order from two connections."""
     two = script.two_lines or any("program run" in line for line in script.lines)  # blocks, and printed lines
-    return sorted(lines) if two else lines
+    texts = [(status, re.sub(script.random or "$^", "", said).splitlines()) for status, said in ended]
+    return [(status, sorted(lines) if two else lines) for status, lines in texts]
 
 
 @pytest.mark.parametrize(
@@ -46,6 +44,15 @@ async def test_a_script_ends_the_same_beside_the_recording(
     now = await ended(script, tmp_path / "now", f"recording:{file}", "")
     assert any(said for _, said in then)
     assert shown(script, now) == shown(script, then)
+
+
+def test_lines_from_two_connections_may_come_in_any_order() -> None:
+    saved, printed_first, block_first = (0, "hello is saved"), (0, "hello\none: begins"), (0, "one: begins\nhello")
+    two = SCRIPTS["program-list"]
+    assert shown(two, [saved, printed_first]) == shown(two, [saved, block_first])
+    assert shown(two, [saved, printed_first]) != shown(two, [printed_first, saved])
+    one = SCRIPTS["start-rest"]
+    assert shown(one, [printed_first]) != shown(one, [block_first])
 
 
 def test_all_four_protocols_have_their_share_of_scripts() -> None:
