@@ -46,7 +46,7 @@ async def test_a_script_ends_the_same_beside_the_recording(
     assert shown(script, now) == shown(script, then)
 
 
-def test_lines_from_two_connections_may_come_in_any_order() -> None:
+def test_lines_of_two_connections_come_in_any_order() -> None:
     saved, printed_first, block_first = (0, "hello is saved"), (0, "hello\none: begins"), (0, "one: begins\nhello")
     two = SCRIPTS["program-list"]
     assert shown(two, [saved, printed_first]) == shown(two, [saved, block_first])

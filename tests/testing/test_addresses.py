@@ -10,7 +10,7 @@ import pytest
 from roboglot.testing import addresses
 
 
-def test_processes_at_once_share_no_address_and_no_port(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_processes_share_no_address_or_port(monkeypatch: pytest.MonkeyPatch) -> None:
     given = [(addresses.free_addresses(3), addresses.free_port())]
     for name in ("_given", "_blocks", "_shares"):  # the kernel holds our claims, as it does another process's
         monkeypatch.setattr(addresses, name, type(getattr(addresses, name))())
@@ -21,7 +21,7 @@ def test_processes_at_once_share_no_address_and_no_port(monkeypatch: pytest.Monk
     assert len({(port - addresses.PORTS.start) // size for port in ports}) == 2
 
 
-def test_addresses_in_a_row_have_free_ports_until_given_back() -> None:
+def test_addresses_in_a_row_are_free() -> None:
     first = addresses.free_addresses(2)
     with socket.create_server((str(ip_address(first) + 2), addresses.PROBED[0])):
         further = addresses.free_addresses(2)
