@@ -7,6 +7,7 @@ import gc
 import importlib
 import importlib.util
 import inspect
+import os
 import re
 import socket
 import sys
@@ -21,6 +22,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from hypothesis.internal.constants_ast import Constants
 
+from roboglot.cli.warm import installation
 from tests import warm_start
 
 settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -32,6 +34,7 @@ settings.load_profile("same")
 if importlib.util.find_spec("sniffio") is None:
     sys.modules["sniffio"] = None  # type: ignore[assignment]
 
+os.environ.setdefault(installation.WARM, "0")  # no process outlives the tests, and workers are measured as they are
 warm_start.install()
 gc.disable()  # until all tests are collected: there is no garbage yet, and looking for it takes a sixth of that time
 

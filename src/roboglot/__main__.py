@@ -11,9 +11,20 @@ def _look_elsewhere_last() -> None:
     sys.path.sort(key=lambda folder: folder in others)
 
 
+def _start_warm(words: list[str]) -> None:
+    """Run a command that starts robots of its own in a fork of the warm parent, if there is one; else return."""
+    if words[:1] in (["test"], ["lesson"]) or (words[:1] == ["program"] and "--own" in words):
+        from roboglot.cli.warm import command
+
+        status = command.run(command.COMMAND, words)
+        if status is not None:
+            command.end_like(status)
+
+
 def run() -> None:
     """Load the command line and run it; SIGINT has Python's own handler again once it is loaded."""
     _look_elsewhere_last()
+    _start_warm(sys.argv[1:])
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -24,6 +24,7 @@ from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
     from roboglot.shards.fleet_host import FleetHost
+    from roboglot.shards.forking import Nursery
     from roboglot.shards.plan import FleetPlan
     from roboglot.shards.wishes import Answer, Row, Verb
 
@@ -57,21 +58,25 @@ def up(
     data: Data = None,
 ) -> None:
     """Start a fleet and keep it up until Ctrl-C; what robots store stays in its folder."""
-    from roboglot.hosting.exclusive import FolderInUse
-    from roboglot.hosting.logs import set_up_logging
-    from roboglot.shards.forking import NotWarm
+    from roboglot.shards.forking import NotWarm, launched
 
-    set_up_logging(verbose=False)
-    folder = _folder(data)
-    asked = _Asked(worlds, robots_each, template, first_address)
-    try:
-        plan = _plan(folder, asked, replan=replan)
-        if detached and on in ("", "local"):
-            raise ValueError("--detached is for a cluster: --on ray://HOST")
-        with _where(on):
-            sys.exit(asyncio.run(_serve(lambda: _fleet_host(plan, folder, memory_max << 20, on, detached), folder)))
-    except (ValueError, OSError, FolderInUse, NotWarm, MissingExtra) as error:
-        sys.exit(f"roboglot fleet: {error}")
+    began = time.monotonic()
+    with launched(wanted=not on) as nursery:  # it loads while we import what a plan needs
+        from roboglot.hosting.exclusive import FolderInUse
+        from roboglot.hosting.logs import set_up_logging
+
+        set_up_logging(verbose=False)
+        folder = _folder(data)
+        asked = _Asked(worlds, robots_each, template, first_address)
+        try:
+            plan = _plan(folder, asked, replan=replan)
+            if detached and on in ("", "local"):
+                raise ValueError("--detached is for a cluster: --on ray://HOST")
+            where = _Where(on, detached, memory_max << 20, nursery)
+            with _joined(on):
+                sys.exit(asyncio.run(_serve(lambda: _fleet_host(plan, folder, where), folder, began)))
+        except (ValueError, OSError, FolderInUse, NotWarm, MissingExtra) as error:
+            sys.exit(f"roboglot fleet: {error}")
 
 
 @app.command("list")
@@ -234,7 +239,16 @@ def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     return kept
 
 
-def _where(on: str) -> AbstractContextManager[None]:
+class _Where(NamedTuple):
+    """Options of the shards' machines."""
+
+    on: str
+    detached: bool
+    memory_max: int  # bytes
+    nursery: Nursery | None
+
+
+def _joined(on: str) -> AbstractContextManager[None]:
     """Return a context in the cluster ``on``, if given. Raises MissingExtra, OSError."""
     if not on:
         return nullcontext()
@@ -243,22 +257,22 @@ def _where(on: str) -> AbstractContextManager[None]:
     return joined(on)
 
 
-def _fleet_host(plan: FleetPlan, folder: Path, memory_max: int, on: str, detached: bool) -> FleetHost:
-    if on:
+def _fleet_host(plan: FleetPlan, folder: Path, where: _Where) -> FleetHost:
+    if where.on:
         from roboglot.shards.cluster import ClusterFleet
 
-        return ClusterFleet(plan, folder, on, lasting=detached)
+        return ClusterFleet(plan, folder, where.on, lasting=where.detached)
     from roboglot.shards.supervisor import Supervisor
 
-    return Supervisor(plan, folder, memory_max=memory_max)
+    return Supervisor(plan, folder, memory_max=where.memory_max, nursery=where.nursery)
 
 
-async def _serve(fleet_host: Callable[[], FleetHost], folder: Path) -> int:
+async def _serve(fleet_host: Callable[[], FleetHost], folder: Path, began: float) -> int:
     from roboglot.shards.classes import FleetClasses
     from roboglot.shards.desk import FleetDesk
     from roboglot.shards.overview import Overview
 
-    began, stop = time.monotonic(), asyncio.Event()
+    stop = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
     supervisor = fleet_host()

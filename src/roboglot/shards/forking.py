@@ -10,8 +10,9 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -27,11 +28,52 @@ class NotWarm(RuntimeError):
     """The nursery did not come up."""
 
 
-class Forks:
-    """The nursery of a supervisor. ``born`` and ``dead`` are called with a shard's number and its pid or status."""
+class Nursery(NamedTuple):
+    """A nursery that was started, and our end of its control socket."""
 
-    def __init__(self, born: Callable[[int, int], None], dead: Callable[[int, int], None]) -> None:
-        self._born, self._dead = born, dead
+    process: subprocess.Popen[bytes]
+    control: socket.socket
+
+    def abandon(self) -> None:
+        """End it, if it has not ended."""
+        with self.process, self.control:
+            self.process.kill()
+
+
+def launch() -> Nursery:
+    """Start a nursery, which loads while the caller goes on. Raises OSError."""
+    ours, theirs = pair()
+    with theirs:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "roboglot.shards.nursery", str(theirs.fileno())],
+            pass_fds=[theirs.fileno()],
+            env=os.environ | ENVIRONMENT,
+            stdin=subprocess.DEVNULL,
+        )
+    return Nursery(process, ours)
+
+
+@contextlib.contextmanager
+def launched(*, wanted: bool) -> Iterator[Nursery | None]:
+    """Start a nursery, if wanted; at the end it has ended, used or not. Raises OSError."""
+    nursery = launch() if wanted else None
+    try:
+        yield nursery
+    finally:
+        if nursery is not None:
+            nursery.abandon()
+
+
+class Forks:
+    """The nursery of a supervisor. ``born`` and ``dead`` are called with a shard's number and its pid or status.
+
+    ``nursery``: one that loads already, instead of the first.
+    """
+
+    def __init__(
+        self, born: Callable[[int, int], None], dead: Callable[[int, int], None], nursery: Nursery | None = None
+    ) -> None:
+        self._born, self._dead, self._launched = born, dead, nursery
         self._control: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._living: set[int] = set()
@@ -46,18 +88,10 @@ class Forks:
 
     def open(self) -> None:
         """Start the nursery; ``warm`` waits for it."""
-        ours, theirs = pair()
-        environment = os.environ | ENVIRONMENT
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "roboglot.shards.nursery", str(theirs.fileno())],
-            pass_fds=[theirs.fileno()],
-            env=environment,
-            stdin=subprocess.DEVNULL,
-        )
-        theirs.close()
-        ours.setblocking(False)
-        self._control = ours
-        asyncio.get_running_loop().add_reader(ours, self._hear)
+        nursery, self._launched = self._launched or launch(), None
+        self._process, self._control = nursery
+        self._control.setblocking(False)
+        asyncio.get_running_loop().add_reader(self._control, self._hear)
 
     async def warm(self) -> float:
         """Wait until the nursery can fork; return its loading time, s. Raises NotWarm."""

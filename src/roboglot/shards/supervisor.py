@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from roboglot.hosting.exclusive import lock_folder
-from roboglot.shards.forking import Forks, NotWarm
+from roboglot.shards.forking import Forks, NotWarm, Nursery
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.shard import SETTINGS
@@ -68,14 +68,14 @@ class Supervisor:
     ``start`` returns when every shard is ready or has failed; ``close`` ends them.
     """
 
-    def __init__(self, plan: FleetPlan, folder: Path, *, memory_max: int = 0) -> None:
+    def __init__(self, plan: FleetPlan, folder: Path, *, memory_max: int = 0, nursery: Nursery | None = None) -> None:
         """``memory_max``: bytes per shard; 0: unlimited. Raises FolderInUse if another program uses the folder."""
         self._memory_max = memory_max
         self.plan, self.folder = plan, folder
         self._lock = lock_folder(folder)
         self.shards = {p.name: Shard(n, p, folder / "shards" / p.name) for n, p in enumerate(plan.shards, start=1)}
         self._by_number = {shard.number: shard for shard in self.shards.values()}
-        self._forks = Forks(self._born, self._dead)
+        self._forks = Forks(self._born, self._dead, nursery)
         self._turn: asyncio.Task[None] | None = None
         self._watch: asyncio.TimerHandle | None = None
         self._changed = asyncio.Event()  # set and cleared with every change of a state

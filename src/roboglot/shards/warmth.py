@@ -7,7 +7,7 @@ import importlib
 import os
 import pkgutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 PACKAGES = ("runtime", "simulation", "autonomy", "storage", "protocols", "programs", "console", "access")
 SELDOM = (  # modules that few shards need, or that are programs of their own
@@ -46,7 +46,7 @@ class Threaded(RuntimeError):
 def warm() -> None:
     """Load everything, then freeze it, so that garbage collection copies no shared pages. Raises Threaded."""
     gc.disable()
-    for name in _modules():
+    for name in modules_of(PACKAGES):
         try:
             importlib.import_module(name)
         except ModuleNotFoundError as missing:  # the extra is not installed; code that needs it reports that
@@ -87,8 +87,9 @@ def refuse_threads() -> None:
         raise Threaded(f"a module started a thread when it was imported; {len(os.listdir(TASKS))} run")
 
 
-def _modules() -> Iterator[str]:
-    for package in PACKAGES:
+def modules_of(packages: Iterable[str]) -> Iterator[str]:
+    """Import packages of roboglot; return the names of their modules as well that are not imported yet."""
+    for package in packages:
         name = f"roboglot.{package}"
         yield name
         for path in getattr(importlib.import_module(name), "__path__", ()):

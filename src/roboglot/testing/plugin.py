@@ -8,6 +8,7 @@ lockstep, for asyncio tests: ``clock``, ``forward``, ``fleet``, ``world``, ``rob
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import AsyncIterator, Callable, Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,6 +66,21 @@ def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
     if hook is not None and isinstance(marked, set):
         marked.discard("roboglot")
         hook.mark_rewrite("roboglot.testing")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes(specs: list[object]) -> None:
+    """Start pytest-xdist's local workers in forks of the warm parent, which have everything imported."""
+    from roboglot.cli.warm import installation
+    from roboglot.cli.warm.command import PYTHON
+
+    if not installation.is_wanted(os.environ):
+        return
+    import execnet
+
+    for number, spec in enumerate(specs):
+        if getattr(spec, "popen", None) and not getattr(spec, "python", None):
+            specs[number] = execnet.XSpec(f"{spec}//python={PYTHON}")
 
 
 @pytest.fixture

@@ -1,0 +1,160 @@
+"""Claims: what starts robots of its own answers <= 0.3 s after it was asked for, forked from the warm parent.
+
+Cold and forked in turns, with the memory of the process that has the robot (PSS) when it has answered:
+`roboglot program run --own` until it prints, and the test kit's first `robot_server` of a pytest-xdist worker until
+REST answers. Beside them what needs no parent, because its process is warm: the worker's second `robot_server`, and
+the studio's *simulate first* until its first news.
+
+    scripts/bench starts [--rounds 3]
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from _claim import Claims
+
+from roboglot.cli.warm import installation
+from roboglot.cli.warm.command import socket_path
+from roboglot.programs.rehearsing import Scene
+from roboglot.rehearsal import Rehearsals
+
+OWN = "print('hello')\nimport time\ntime.sleep(600)\n"
+TEST = """
+import os, time
+import pytest
+
+def memory():
+    with open("/proc/self/smaps_rollup") as lines:
+        return next(int(line.split()[1]) / 1024 for line in lines if line.startswith("Pss:"))
+
+@pytest.fixture
+def began():
+    return time.monotonic()
+
+@pytest.mark.world("empty")
+@pytest.mark.parametrize("turn", (1, 2))
+def test_it(began, robot_server, rest, turn):
+    rest.get_power_status()
+    with open(os.environ["FIGURES"], "a") as file:
+        file.write(f"{time.monotonic() - began} {memory()}\\n")
+"""
+SOURCE = "print('hello')\n"
+PATIENCE = 60.0
+
+
+def memory(pid: int) -> float:
+    """A process's share of the machine's memory, MB."""
+    text = Path(f"/proc/{pid}/smaps_rollup").read_text()
+    return next(int(line.split()[1]) / 1024 for line in text.splitlines() if line.startswith("Pss:"))
+
+
+def children(pid: int) -> list[int]:
+    """Processes that this one has started."""
+    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+class Place:
+    """A runtime folder of our own, so that no other parent of this installation is in the way."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "PYTHONWARNINGS": "ignore"}
+        self.socket = socket_path(self.environment)
+
+    def surroundings(self, *, warm: bool) -> dict[str, str]:
+        return self.environment | {installation.WARM: "1" if warm else "0"}
+
+    def open(self) -> float:
+        """Start the parent; return the time until it listens, s."""
+        began = time.monotonic()
+        log = (self.folder / "parent.log").open("wb")
+        command = [sys.executable, "-m", "roboglot.cli.warm.parent", str(self.socket)]
+        self.parent = subprocess.Popen(command, env=self.environment, stdout=log, stderr=log)
+        while not self.socket.exists() and self.parent.poll() is None:
+            time.sleep(0.01)
+        return time.monotonic() - began
+
+    def own(self, *, warm: bool) -> tuple[float, float]:
+        """`program run --own` until it prints: s, MB of the process with the robot."""
+        program = self.folder / "own.py"
+        program.write_text(OWN)
+        command = [sys.executable, "-m", "roboglot", "program", "run", str(program), "--own", "--world", "empty"]
+        began = time.monotonic()
+        with subprocess.Popen(command, env=self.surroundings(warm=warm), stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            passed = time.monotonic() - began
+            share = memory(children(self.parent.pid)[0] if warm else process.pid)
+            process.terminate()
+        return passed, share
+
+    def worker(self, *, warm: bool) -> list[tuple[float, float]]:
+        """First and second `robot_server` of a worker: s, MB."""
+        (self.folder / "test_it.py").write_text(TEST)
+        figures = self.folder / "figures"
+        figures.write_text("")
+        environment = self.surroundings(warm=warm) | {"FIGURES": str(figures)}
+        command = [sys.executable, "-m", "pytest", "-q", "-n", "1", "-p", "no:cacheprovider", "test_it.py"]
+        subprocess.run(command, env=environment, cwd=self.folder, stdout=subprocess.DEVNULL, check=True)
+        first, second = (tuple(map(float, line.split())) for line in figures.read_text().splitlines())
+        return [(first[0], first[1]), (second[0], second[1])]
+
+
+async def simulated() -> list[float]:
+    """*Simulate first* in a process that has played one before: s until its first news."""
+    rehearsals, times, news = Rehearsals(), [], asyncio.Event()
+    for _ in range(4):
+        began = time.monotonic()
+        news.clear()
+        scene = Scene("empty", "cyberdog2")
+        playing = asyncio.ensure_future(rehearsals.play(SOURCE, scene, speed=0, notice=lambda _: news.set()))
+        await asyncio.wait_for(news.wait(), PATIENCE)
+        times.append(time.monotonic() - began)
+        await playing
+    await rehearsals.close()
+    return times
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--rounds", type=int, default=3)
+    rounds, claims = parser.parse_args().rounds, Claims()
+    with tempfile.TemporaryDirectory() as name:
+        place = Place(Path(name))
+        print(f"the parent loads for {place.open():.2f} s and takes {memory(place.parent.pid):.0f} MB alone")
+        figures: dict[str, list[tuple[float, float]]] = {}
+
+        for _ in range(rounds):
+            for warm, how in ((False, "cold"), (True, "forked")):
+                own, (first, second) = place.own(warm=warm), place.worker(warm=warm)
+                for what, found in (
+                    (f"program --own, {how}", own),
+                    (f"first robot_server, {how}", first),
+                    ("second robot_server", second),
+                ):
+                    figures.setdefault(what, []).append(found)
+        place.parent.kill()
+        place.parent.wait()
+    for what, every in figures.items():
+        seconds, share = statistics.median(s for s, _ in every), statistics.median(mb for _, mb in every)
+        if what.endswith("cold"):
+            print(f"reference: {what} {seconds:.2f} s, {share:.0f} MB")
+        else:
+            claims.at_most(what, seconds, 0.3, f"s {share:.0f} MB")
+    cold, *later = asyncio.run(simulated())
+    print(f"reference: the first simulation of a process that has loaded nothing {cold:.2f} s")
+    claims.at_most("simulate first, later", statistics.median(later), 0.3, "s")
+    claims.finish()
+
+
+if __name__ == "__main__":
+    main()

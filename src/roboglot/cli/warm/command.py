@@ -1,0 +1,162 @@
+"""Starts a command in the warm parent of this installation, and stands for it: signals go in, its status comes out.
+
+Without a parent the command starts cold, as ever, and a parent is started for the next one. ``python -m
+roboglot.cli.warm.command -c CODE`` is ``python -c CODE`` of a warm interpreter, for workers of pytest-xdist.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import resource
+import shlex
+import signal
+import socket
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import FrameType
+
+from roboglot.cli.warm import installation
+
+COMMAND, CODE = "command", "code"
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2)
+LIMITS = (resource.RLIMIT_NOFILE, resource.RLIMIT_CPU, resource.RLIMIT_AS, resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)
+PYTHON = f"{shlex.quote(sys.executable)} -m {__spec__.name if __spec__ else __name__}"  # instead of ``python``
+LENGTH = 8  # bytes before a message, its length
+MESSAGE_MAX = 4 << 20
+BROKEN = 70  # exit status if the parent was killed
+
+
+def run(kind: str, words: list[str]) -> int | None:
+    """Run a command in the parent; return its exit status, negative for a signal. None: there is no parent."""
+    if not installation.is_wanted(os.environ):
+        return None
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # what comes from now on is for the command
+    try:
+        path = socket_path(os.environ)
+        parent = _connected(path, kind, words)
+        if parent is not None:
+            with parent:
+                return _stand_for_it(parent, before)
+    except OSError:
+        return None  # commands start cold where there is no place for a socket
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    launch(path)
+    return None
+
+
+def socket_path(environment: Mapping[str, str]) -> Path:
+    """Return the socket of this installation's parent. Raises OSError."""
+    return installation.folder_of(environment) / f"{installation.name_of(environment)}.socket"
+
+
+def end_like(status: int) -> None:
+    """End this process as the one it stood for."""
+    if status < 0:
+        with contextlib.suppress(OSError, ValueError):  # some signals have no default action that ends
+            signal.signal(-status, signal.SIG_DFL)
+            os.kill(os.getpid(), -status)
+        status = 128 - status
+    os._exit(status)
+
+
+def launch(path: Path) -> None:
+    """Start a parent for the next command, unless one is being started. It ends by itself."""
+    import subprocess
+
+    with contextlib.suppress(OSError), open(path.with_suffix(".log"), "wb") as log:
+        if _is_locked(path.with_suffix(".lock")):
+            return
+        subprocess.Popen(
+            [sys.executable, "-m", "roboglot.cli.warm.parent", str(path)],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            cwd="/",
+            start_new_session=True,
+        ).returncode = 0  # it outlives us
+
+
+def _is_locked(path: Path) -> bool:
+    with open(path, "a", encoding="utf-8") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
+def _connected(path: Path, kind: str, words: list[str]) -> socket.socket | None:
+    """Return a connection on which the command was started; None if no parent has these sources."""
+    parent = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        parent.connect(bytes(path))
+        wish = json.dumps(_wish(kind, words)).encode()
+        socket.send_fds(parent, [len(wish).to_bytes(LENGTH)], [0, 1, 2])
+        parent.sendall(wish)
+        if parent.recv(1) == b"+":
+            return parent
+    except OSError:  # none listens, it ends just now, or one of our descriptors is closed
+        pass
+    parent.close()
+    return None
+
+
+def _wish(kind: str, words: list[str]) -> dict[str, object]:
+    """Return all that the command would have inherited from this process. Raises OSError."""
+    os.umask(umask := os.umask(0o077))
+    return {
+        "stamp": installation.stamp(),
+        "kind": kind,
+        "words": words,
+        "folder": os.getcwd(),
+        "environment": dict(os.environ),
+        "umask": umask,
+        "ignored": [number for number in SIGNALS if signal.getsignal(number) == signal.SIG_IGN],
+        "limits": [(kind, *resource.getrlimit(kind)) for kind in LIMITS],
+        "processors": sorted(os.sched_getaffinity(0)),
+    }
+
+
+def _stand_for_it(parent: socket.socket, mask: set[int | signal.Signals]) -> int:
+    """Pass signals on, those of ``mask`` excepted, until the command has ended; return its status."""
+
+    def pass_on(number: int, _: FrameType | None) -> None:
+        with contextlib.suppress(OSError):
+            parent.send(bytes([number]))
+
+    def pause(_: int, frame: FrameType | None) -> None:
+        pass_on(signal.SIGSTOP, frame)
+        os.kill(os.getpid(), signal.SIGSTOP)
+        pass_on(signal.SIGCONT, frame)
+
+    for number in SIGNALS:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, pass_on)
+    signal.signal(signal.SIGTSTP, pause)
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    try:
+        answer = parent.recv(LENGTH)
+    except OSError:
+        answer = b""
+    if not answer:
+        sys.stderr.write("roboglot: the process from which this one was forked has ended\n")
+        return BROKEN
+    return int.from_bytes(answer, signed=True)
+
+
+def main(words: list[str]) -> None:
+    """Be ``python`` with these arguments, of which ``-u`` is of no use and ``-c CODE`` is the last but its words."""
+    code = words[words.index("-c") + 1 :]
+    status = run(CODE, code)
+    if status is None:
+        os.execv(sys.executable, [sys.executable, *words])
+    end_like(status)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

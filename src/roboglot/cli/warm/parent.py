@@ -1,0 +1,288 @@
+"""The process from which commands start warm: everything is imported, one thread, no event loop.
+
+``python -m roboglot.cli.warm.parent SOCKET``: loads, then forks a command for each connection and reports its end.
+One runs for each user and installation. It ends after ``IDLE`` s without commands, or when its sources have changed;
+its commands end with it, and each with its connection, however they end.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import fcntl
+import importlib
+import json
+import os
+import select
+import signal
+import socket
+import struct
+import sys
+import time
+import types
+from pathlib import Path
+from typing import NoReturn, TypedDict
+
+from roboglot.cli import main as run_command
+from roboglot.cli import run_to_end
+from roboglot.cli.warm import installation
+from roboglot.cli.warm.command import BROKEN, CODE, LENGTH, MESSAGE_MAX
+from roboglot.shards.warmth import ENVIRONMENT, modules_of, refuse_threads, warm
+
+IDLE = 300.0  # s
+SLOW_MAX = 2.0  # s for a caller to say what it wants
+LAST_SECONDS = 3.0  # s between SIGTERM and SIGKILL for a command that has lost its caller
+CALLERS_MAX = 64
+COMMANDS = ("roboglot.cli.program", "typer.main", "typer.rich_utils")
+PACKAGES = ("clients", "recording")  # beside those of all robots; not the test kit, whose modules pytest rewrites
+PR_SET_NAME, PR_SET_PDEATHSIG = 15, 1
+PEER = struct.Struct("3i")  # pid, uid, gid
+DESCRIPTORS_MAX = 1 << 16
+
+
+class Wanted(TypedDict):
+    """A command and what it would have inherited from its caller."""
+
+    stamp: str
+    kind: str
+    words: list[str]
+    folder: str
+    environment: dict[str, str]
+    umask: int
+    ignored: list[int]
+    limits: list[tuple[int, int, int]]
+    processors: list[int]
+
+
+class WarmParent:
+    """The listening socket and the running commands, each with its caller."""
+
+    def __init__(self, path: Path, lock: int, stamp: str) -> None:
+        """Listen at ``path``; ``lock`` is held while we do; ``stamp`` is of the sources that were loaded."""
+        self._path, self._lock, self._stamp = path, lock, stamp
+        self._callers: dict[int, tuple[int, socket.socket]] = {}  # by descriptor: process and connection
+        self._ending: dict[int, float] = {}  # process and when it is killed, s
+        self._libc = ctypes.CDLL(None, use_errno=True)
+        self._wake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        signal.signal(signal.SIGCHLD, _ignore)
+        signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+        path.unlink(missing_ok=True)  # of a killed one: we have the lock
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        listening.bind(bytes(path))
+        listening.listen(CALLERS_MAX)
+        self._listening: socket.socket | None = listening
+
+    def serve(self) -> None:
+        """Serve until there was nothing to do for ``IDLE`` s, or until the last command of old sources has ended."""
+        poll = select.poll()
+        poll.register(self._wake, select.POLLIN)
+        if self._listening is not None:
+            poll.register(self._listening, select.POLLIN)
+        idle_since = time.monotonic()
+        while self._listening is not None or self._callers or self._ending:
+            busy = bool(self._callers or self._ending)
+            ready = {descriptor for descriptor, _ in poll.poll(LAST_SECONDS * 1e3 if busy else IDLE * 1e3)}
+            if ready or busy:
+                idle_since = time.monotonic()
+            elif time.monotonic() - idle_since >= IDLE:
+                self._stop_listening()
+                continue
+            with contextlib.suppress(BlockingIOError):
+                os.read(self._wake, 4096)
+            for descriptor in ready & self._callers.keys():
+                if not self._hear(descriptor):
+                    poll.unregister(descriptor)
+                    self._let_go(descriptor)
+            for descriptor in self._reap():
+                poll.unregister(descriptor)
+                self._callers.pop(descriptor)[1].close()
+            self._kill_late()
+            if self._listening is not None and self._listening.fileno() in ready:
+                self._accept(poll)
+
+    def _accept(self, poll: select.poll) -> None:
+        assert self._listening is not None
+        caller, _ = self._listening.accept()
+        descriptors: list[int] = []
+        caller.settimeout(SLOW_MAX)
+        try:
+            wanted = self._read(caller, descriptors)
+            if wanted["stamp"] != self._stamp:
+                poll.unregister(self._listening)
+                self._stop_listening()  # before the answer: the next one may start then
+                caller.send(b"-")
+            elif len(self._callers) < CALLERS_MAX:
+                pid = self._fork(wanted, descriptors)
+                self._callers[caller.fileno()] = (pid, caller)
+                poll.register(caller, select.POLLIN)
+                caller.send(b"+")
+                return
+        except (OSError, ValueError, KeyError) as error:
+            sys.stderr.write(f"cannot start a command: {error}\n")
+        finally:
+            for descriptor in descriptors:
+                os.close(descriptor)
+        if caller.fileno() not in self._callers:
+            caller.close()
+
+    def _read(self, caller: socket.socket, descriptors: list[int]) -> Wanted:
+        """Return what a caller wants; its descriptors are added. Raises OSError, ValueError."""
+        credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, PEER.size)
+        if PEER.unpack(credentials)[1] != os.getuid():
+            raise PermissionError("the caller is another user")
+        head, given, _, _ = socket.recv_fds(caller, LENGTH, 3)
+        descriptors += given
+        length, text = int.from_bytes(head), b""
+        if len(head) != LENGTH or length > MESSAGE_MAX or len(given) != 3:
+            raise ValueError("this is no wish")
+        while len(text) < length:
+            if not (more := caller.recv(min(1 << 16, length - len(text)))):
+                raise ValueError("the caller has gone")
+            text += more
+        wanted: Wanted = json.loads(text)
+        return wanted
+
+    def _fork(self, wanted: Wanted, descriptors: list[int]) -> int:
+        refuse_threads()
+        parent, pid = os.getpid(), os.fork()
+        if pid == 0:
+            signal.set_wakeup_fd(-1)
+            self._libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+            self._libc.prctl(PR_SET_NAME, b"roboglot", 0, 0, 0)
+            if os.getppid() != parent:  # it died before that was set
+                os._exit(BROKEN)
+            become(wanted, descriptors)
+        return pid
+
+    def _hear(self, descriptor: int) -> bool:
+        """Send the command the signals that its caller got; return False if the caller has gone."""
+        pid, caller = self._callers[descriptor]
+        try:
+            numbers = caller.recv(64)
+        except OSError:
+            return False
+        for number in numbers:
+            _signal(pid, number)
+        return bool(numbers)
+
+    def _let_go(self, descriptor: int) -> None:
+        """End a command whose caller has gone."""
+        pid, caller = self._callers.pop(descriptor)
+        caller.close()
+        self._ending[pid] = time.monotonic() + LAST_SECONDS
+        for number in (signal.SIGCONT, signal.SIGTERM):
+            _signal(pid, number)
+
+    def _kill_late(self) -> None:
+        for pid, at in self._ending.items():
+            if time.monotonic() >= at:
+                _signal(pid, signal.SIGKILL)
+
+    def _reap(self) -> list[int]:
+        """Report what has ended; return the callers' descriptors."""
+        ended = {}
+        with contextlib.suppress(ChildProcessError):
+            while (found := os.waitpid(-1, os.WNOHANG))[0]:
+                ended[found[0]] = os.waitstatus_to_exitcode(found[1])
+                self._ending.pop(found[0], None)
+        done = [descriptor for descriptor, (pid, _) in self._callers.items() if pid in ended]
+        for descriptor in done:
+            pid, caller = self._callers[descriptor]
+            with contextlib.suppress(OSError):
+                caller.send(ended[pid].to_bytes(LENGTH, signed=True))
+        return done
+
+    def _stop_listening(self) -> None:
+        assert self._listening is not None
+        self._path.unlink(missing_ok=True)
+        self._listening.close()
+        self._listening = None
+        os.close(self._lock)
+
+
+def become(wanted: Wanted, descriptors: list[int]) -> NoReturn:
+    """Become the command, in the fork: with all that its caller would have given it."""
+    try:
+        os.setsid()
+        for number, descriptor in enumerate([os.dup(given) for given in descriptors]):
+            os.dup2(descriptor, number)
+        os.closerange(3, min(os.sysconf("SC_OPEN_MAX"), DESCRIPTORS_MAX))
+        for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}:
+            with contextlib.suppress(OSError, ValueError):
+                signal.signal(number, signal.SIG_IGN if number in wanted["ignored"] else signal.SIG_DFL)
+        if signal.SIGINT not in wanted["ignored"]:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        for kind, soft, hard in wanted["limits"]:
+            _limit(kind, soft, hard)
+        os.sched_setaffinity(0, wanted["processors"])
+        os.umask(wanted["umask"])
+        os.chdir(wanted["folder"])
+        os.environ.clear()
+        os.environ.update(wanted["environment"])
+        sys.stdin, sys.stdout = os.fdopen(0, encoding="utf-8"), os.fdopen(1, "w", buffering=1, encoding="utf-8")
+        sys.stderr = os.fdopen(2, "w", buffering=1, encoding="utf-8", errors="backslashreplace")
+        run_to_end(lambda: (_run_code if wanted["kind"] == CODE else _run_command)(wanted["words"]))
+    except BaseException as error:  # noqa: BLE001 - a forked child has no caller to raise to
+        sys.excepthook(*sys.exc_info())
+        os._exit(130 if isinstance(error, KeyboardInterrupt) else 1)
+
+
+def _signal(pid: int, number: int) -> None:
+    """Signal a command that was not reaped yet, so that its number is its own; its group, where a terminal would."""
+    with contextlib.suppress(OSError, ValueError):
+        if number == signal.SIGTERM:
+            os.kill(pid, number)
+            return
+        try:
+            os.killpg(pid, number)
+        except ProcessLookupError:  # it has not begun yet
+            os.kill(pid, number)
+
+
+def _ignore(number: int, frame: types.FrameType | None) -> None:
+    """Do nothing: without a handler, nothing would be written to the wake-up descriptor."""
+
+
+def _limit(kind: int, soft: int, hard: int) -> None:
+    import resource
+
+    with contextlib.suppress(OSError, ValueError):  # a limit that we have lower ourselves
+        resource.setrlimit(kind, (soft, hard))
+
+
+def _run_command(words: list[str]) -> None:
+    sys.argv = [str(installation.PACKAGE / "__main__.py"), *words]
+    run_command()
+
+
+def _run_code(words: list[str]) -> None:
+    """Do what ``python -c`` does."""
+    code, *arguments = words
+    sys.argv, sys.path[0] = ["-c", *arguments], ""
+    package = sys.modules["roboglot"]  # a plugin of pytest's, which would warn that it is too late to rewrite it
+    package.__doc__ = f"{package.__doc__} PYTEST_DONT_REWRITE"
+    module = types.ModuleType("__main__")
+    sys.modules["__main__"] = module
+    exec(compile(code, "<string>", "exec"), module.__dict__)
+
+
+def main(path: Path) -> None:
+    """Load everything unless another parent is there or comes, then serve."""
+    lock = os.open(path.with_suffix(".lock"), os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return
+    for kind in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(kind, signal.SIG_IGN)
+    stamp = installation.stamp()
+    for name in (*COMMANDS, *modules_of(PACKAGES)):
+        with contextlib.suppress(ModuleNotFoundError):  # of an extra that is not installed
+            importlib.import_module(name)
+    warm()
+    WarmParent(path, lock, stamp).serve()
+
+
+if __name__ == "__main__":
+    os.environ |= ENVIRONMENT  # before numpy is imported
+    main(Path(sys.argv[1]))

@@ -1,0 +1,188 @@
+"""Commands that start in forks of a warm parent: they end as if started cold, and leave nothing behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from roboglot.cli.warm import installation
+from roboglot.cli.warm.command import socket_path
+from tests.warm_start import COLD
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks of a warm parent are there on Linux only")
+
+PATIENCE = 120.0
+SAY = "import os, sys; print(os.getppid(), sys.argv[1:]); sys.exit(3)"
+WAIT = "import os, time; print(os.getppid(), os.getpid(), flush=True); time.sleep(600)"
+LIGHT = """
+import os, pathlib, sys
+from roboglot.cli.warm import parent as warm_parent
+warm_parent.COMMANDS = warm_parent.PACKAGES = ()
+warm_parent.IDLE = float(os.environ.get("IDLE", warm_parent.IDLE))
+warm_parent.warm = lambda: None
+serve = warm_parent.WarmParent.serve
+warm_parent.WarmParent.serve = lambda parent: (print("up", flush=True), serve(parent))
+warm_parent.main(pathlib.Path(sys.argv[1]))
+"""
+ANNOUNCE = "import os, signal\nsignal.signal(signal.SIGINT, lambda *_: os.write(1, b'heard\\n'))\n"
+
+
+class Place:
+    """One user's runtime folder, with commands that start from its parent."""
+
+    def __init__(self, folder: Path) -> None:
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), installation.WARM: "1", COLD: "1"}
+        self.parents: list[subprocess.Popen[str]] = []
+
+    def start(self, code: str, *words: str, **environment: str) -> subprocess.Popen[str]:
+        """Start ``python -c`` from the warm parent."""
+        command = [sys.executable, "-m", "roboglot.cli.warm.command", "-u", "-c", code, *words]
+        whole = self.environment | environment
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=whole)
+
+    def open(self) -> int:
+        """Start a parent that has loaded nothing, wait until it listens; return its process id."""
+        command = [sys.executable, "-c", LIGHT, str(socket_path(self.environment))]
+        parent = subprocess.Popen(command, env=self.environment, stdout=subprocess.PIPE, text=True)
+        self.parents.append(parent)
+        assert parent.stdout is not None
+        assert parent.stdout.readline() == "up\n"
+        return parent.pid
+
+    def close(self) -> None:
+        for parent in self.parents:
+            with parent:
+                parent.kill()
+
+    def parent(self) -> int:
+        """Return the process id of the parent that commands come from."""
+        with self.start(SAY) as process:
+            return int(process.communicate(timeout=PATIENCE)[0].split()[0])
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Iterator[Place]:
+    place = Place(tmp_path)
+    place.open()
+    yield place
+    place.close()
+
+
+def test_status_words_and_output_are_the_commands(place: Place) -> None:
+    process = place.start(SAY, "--word", "ä")
+    out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, err) == (3, "")
+    assert out.split(maxsplit=1)[1] == "['--word', 'ä']\n"
+    assert place.start("raise SystemExit('no')").communicate(timeout=PATIENCE) == ("", "no\n")
+
+
+def test_a_command_has_its_callers_folder_and_environment(place: Place, tmp_path: Path) -> None:
+    code = "import os; print(os.getcwd(), os.environ['WORD'], oct(os.umask(0)), os.environ.get('GRPC_VERBOSITY'))"
+    process = place.start(f"import os; os.chdir({str(tmp_path)!r}); " + code, WORD="here")
+    assert process.communicate(timeout=PATIENCE)[0].split() == [str(tmp_path), "here", oct(umask()), "None"]
+
+
+def umask() -> int:
+    os.umask(found := os.umask(0))
+    return found
+
+
+def test_a_signal_to_the_caller_reaches_the_command(place: Place) -> None:
+    with place.start(ANNOUNCE + WAIT) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.readline() == "heard\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == -signal.SIGTERM
+
+
+def test_a_killed_caller_leaves_no_command(place: Place) -> None:
+    with place.start(WAIT) as process:
+        assert process.stdout is not None
+        pid = int(process.stdout.readline().split()[1])
+        process.kill()
+        until(lambda: not is_running(pid))
+
+
+def test_killed_parent_leaves_no_command_no_lock(place: Place) -> None:
+    with place.start(WAIT) as process:
+        assert process.stdout is not None
+        parent, pid = map(int, process.stdout.readline().split())
+        os.kill(parent, signal.SIGKILL)
+        assert process.wait(PATIENCE) != 0
+        assert process.stderr is not None
+        assert "has ended" in process.stderr.read()
+    until(lambda: not is_running(pid))
+    assert place.open() == place.parent() != parent  # the dead one's socket is still there
+
+
+def test_changed_sources_end_the_parent(place: Place) -> None:
+    changed = "from roboglot.cli.warm import installation as i, command as w\ni.stamp = lambda: 'changed'\n"
+    asked = [sys.executable, "-c", changed + "w.launch = print\nw.run(w.CODE, ['pass'])"]
+    launched = subprocess.run(asked, env=place.environment, capture_output=True, text=True, check=True).stdout
+    assert launched.strip() == str(socket_path(place.environment))
+    assert place.parents[0].wait(PATIENCE) == 0
+    assert place.open() == place.parent()
+
+
+def test_one_parent_is_enough(place: Place) -> None:
+    command = [sys.executable, "-c", LIGHT, str(socket_path(place.environment))]
+    assert subprocess.run(command, env=place.environment, capture_output=True, text=True, check=True).stdout == ""
+    assert place.parent() == place.parents[0].pid
+
+
+def test_an_idle_parent_ends_and_its_socket_goes(tmp_path: Path) -> None:
+    place = Place(tmp_path)
+    place.environment["IDLE"] = "0.01"
+    place.open()
+    assert place.parents[0].wait(PATIENCE) == 0
+    assert not socket_path(place.environment).exists()
+    place.close()
+
+
+@pytest.mark.slow
+def test_a_program_on_its_own_robot_starts_warm(tmp_path: Path) -> None:
+    """The first run is cold and starts a parent; a later one is its child."""
+    place, program = Place(tmp_path), tmp_path / "hello.py"
+    program.write_text("print('hello')\n")
+    command = [sys.executable, "-m", "roboglot", "program", "run", str(program), "--own", "--world", "empty"]
+    for _ in range(2):
+        done = subprocess.run(command, env=place.environment, capture_output=True, text=True, check=True)
+        assert done.stdout == "hello\n"
+        until(socket_path(place.environment).exists)
+    os.kill(place.parent(), signal.SIGKILL)
+
+
+def test_another_users_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "roboglot").mkdir(mode=0o755)
+    with pytest.raises(PermissionError):
+        installation.folder_of({"XDG_RUNTIME_DIR": str(tmp_path)})
+
+
+@pytest.mark.parametrize(
+    ("environment", "wanted"), [({}, True), ({"CI": "true"}, False), ({"ROBOGLOT_WARM": "0"}, False)]
+)
+def test_no_parent_is_started_in_ci(environment: dict[str, str], wanted: bool) -> None:
+    assert installation.is_wanted(environment) is wanted
