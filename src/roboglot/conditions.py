@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import keyword
 import re
-from dataclasses import dataclass
 from datetime import date, time
+
+from roboglot.values import dataclass
 
 AMOUNT_MAX = 10_000  # of units in "now + 5minutes"
 CONDITION_MAX = 256  # characters

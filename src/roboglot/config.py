@@ -10,7 +10,7 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import UTC, tzinfo
 from ipaddress import IPv4Address, ip_address
 from pathlib import Path
@@ -21,6 +21,7 @@ from zoneinfo import ZoneInfo
 import msgspec
 
 from roboglot.misfits import misfit
+from roboglot.values import dataclass
 
 RECORDING = "recording:"  # prefix of the body of a recorded robot
 ROBOTS_MAX = 100

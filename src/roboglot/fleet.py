@@ -11,7 +11,6 @@ import json
 import platform
 import re
 from collections.abc import Awaitable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
@@ -51,6 +50,7 @@ from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
 from roboglot.storage.transactions import Transactions
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.recording.files import Origin

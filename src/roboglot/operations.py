@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Awaitable, Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
 import msgspec
 
 from roboglot.misfits import KINDS, misfit
+from roboglot.values import dataclass
 
 K = TypeVar("K", bound=Hashable)
 Handler = TypeVar("Handler", bound=Callable[..., Awaitable[object]])

@@ -14,7 +14,7 @@ import math
 import threading
 import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar
 
 from roboglot.config import RobotConfig
@@ -43,6 +43,7 @@ from roboglot.programs.functions.table import call as call_function
 from roboglot.programs.library.modules import HEADER_LINES
 from roboglot.programs.rehearsing import Act, Hit, Played, Refusal, Scene, Spot, Step, Tried
 from roboglot.storage.database import Database
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 from roboglot.model.admission import Proof, ProofKind
 from roboglot.model.errors import RobotError
 from roboglot.storage.opening import open_private
 from roboglot.storage.transactions import Connection
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 SCHEMA = "roboglot.storage.schema.sessions"

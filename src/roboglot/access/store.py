@@ -7,7 +7,6 @@ Several programs use it at once, so every change is one transaction that increme
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import StrEnum
 from ipaddress import ip_address
 from pathlib import Path
@@ -17,6 +16,7 @@ from roboglot.access.secrets import new_token, password_hash, token_hash
 from roboglot.operations import Right
 from roboglot.storage.opening import open_private
 from roboglot.storage.transactions import Connection, Transactions
+from roboglot.values import dataclass
 
 FILE = "access.db"  # in the data folder
 SCHEMA = "roboglot.storage.schema.access"

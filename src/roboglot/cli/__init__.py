@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import gc
 import importlib
 import io
 import os
@@ -117,6 +118,7 @@ def _obey(name: str) -> None:
     elif name in COMMANDS:
         app = loaded(name)
         sys.argv[:2] = [f"roboglot {name}"]
+        gc.enable()
         app(prog_name=f"roboglot {name}")
     else:
         sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")

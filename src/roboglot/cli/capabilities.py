@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +21,7 @@ from roboglot.model.components.component import Component
 from roboglot.protocols import DOORS
 from roboglot.protocols.door import DoorType
 from roboglot.storage.database import Database
+from roboglot.values import dataclass
 
 BODIES = ("universal", "robomaster_ep", "cyberdog2", "hermes")
 # For each driver, a URL without a robot and what the driver announces.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +10,7 @@ import typer
 
 from roboglot.protocols import DOORS
 from roboglot.protocols.door import Contract
+from roboglot.values import dataclass
 from roboglot.wire.contracts import Row
 
 CONTRACTS = {contract.name: contract for door in DOORS for contract in door.contracts}

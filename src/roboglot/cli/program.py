@@ -11,7 +11,6 @@ import re
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Coroutine
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -25,6 +24,7 @@ from roboglot.clients.visual import TextLink
 from roboglot.config import RobotConfig
 from roboglot.hosting.visible import visible
 from roboglot.protocols.visual.config import VisualConfig
+from roboglot.values import dataclass
 
 ROBOT = "ws://127.0.0.1:50053"
 FRAMES, LOG, DEBUG, RUNS = "/programs", "/log", "/debug", "/runs"

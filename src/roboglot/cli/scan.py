@@ -11,7 +11,6 @@ import shlex
 import ssl
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
-from dataclasses import dataclass
 from ipaddress import ip_address, ip_network
 from typing import Annotated
 
@@ -21,6 +20,7 @@ from roboglot.clients.errors import ClientError
 from roboglot.clients.robomaster.datagrams import discover
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.model.clock import RealClock
+from roboglot.values import dataclass
 
 ADDRESSES_MAX = 4096
 AT_ONCE_MAX = 64

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import dataclasses
 import errno
+import gc
 import inspect
 import math
 import os
@@ -188,6 +189,7 @@ def _robots(texts: list[str]) -> list[dict[str, object]]:
 
 async def _serve(config: Config, *, open_console: bool) -> int:
     """Run until a signal; return the exit status."""
+    gc.disable()  # until the robots are there: a tenth of their start
     from roboglot.runtime import Runtime
 
     stop = asyncio.Event()
@@ -207,6 +209,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
     try:
         warn_if_open(config)
         await runtime.start()
+        gc.enable()
         page = runtime.console.address if runtime.console is not None and runtime.console.port else ""
         announce(config, {name: doors.endpoints for name, doors in runtime.doors.items()}, page)
         print("ready", flush=True)
@@ -226,6 +229,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
         print(f"roboglot up: {error}", file=sys.stderr)
         return 1
     finally:
+        gc.enable()
         await runtime.close()
     return 0
 

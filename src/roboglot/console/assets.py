@@ -8,9 +8,10 @@ import hashlib
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
+
+from roboglot.values import dataclass
 
 FOLDER = Path(__file__).parent / "web"
 TYPES = {

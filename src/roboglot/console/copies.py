@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import shlex
-from dataclasses import dataclass
 from itertools import pairwise
 
 from roboglot.console.wire_log import readable
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols.door import Endpoint
+from roboglot.values import dataclass
 
 LABELS = {  # names of the endpoint for requests, by door
     "slamware": "Slamware REST",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.operations import Operation
 from roboglot.protocols.door import Endpoint
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.console.recordings import Recordings

@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Any
 
 from roboglot.console.settings import EXCERPT_MAX, PAYLOAD_MAX, WIRE_BYTES_MAX, WIRE_MAX, WIRE_SECONDS
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Exchange
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ from roboglot.datasets.drive_log import (
 )
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
+from roboglot.values import dataclass
 
 RANGE_MIN, LEAST_NO_ECHO = 0.03, 5.0  # m
 OFFSET_SAME = 0.01  # m, rad: apparent motion of a fixed laser by rounding

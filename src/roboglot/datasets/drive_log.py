@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose
 from roboglot.model.sensing import LaserScan
+from roboglot.values import dataclass
 
 FILE_BYTES_MAX = 4_000_000_000
 SCANS_MAX = 2_000_000

@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from roboglot.datasets.drive_log import BadDriveLog
 from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.values import dataclass
 
 RELATIONS_MAX = 1_000_000
 NEAR_SECONDS = 0.5  # s between a relation's time stamp and the nearest pose

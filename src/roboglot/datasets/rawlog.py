@@ -12,7 +12,6 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +27,7 @@ from roboglot.datasets.drive_log import (
 )
 from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
+from roboglot.values import dataclass
 
 SCAN, ODOMETRY, MOVEMENT, POSE = "CObservation2DRangeScan", "CObservationOdometry", "CActionRobotMovement2D", "CPose2D"
 NAME_BEGINS = rb"(?:[\x80-\xff](?:mrpt::\w+::)?|[\x05-\x40]\0\0\0)"  # the length takes one byte, or four in old files

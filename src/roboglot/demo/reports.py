@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.values import dataclass
 
 APART = 0.05  # m by which two reports may differ …
 DRIFT = 0.015  # … plus this per metre driven, since two of them come from odometry, which drifts

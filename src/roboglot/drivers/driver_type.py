@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar, cast
 
 from roboglot.drivers.driver import Driver
 from roboglot.model.components.component import Component
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 T = TypeVar("T")
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from roboglot.hosting.visible import VisibleFormatter
 from roboglot.model.client_context import concerned
+from roboglot.values import dataclass
 
 NOISY = ("uvicorn", "websockets", "httpx", "grpc", "asyncio", "numba")
 LINES_MAX = 50  # of a kind about one robot in PERIOD

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from roboglot.model.components.sensing.camera import Frame
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from av import VideoCodecContext

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 
 from roboglot.model.components.sensing.microphone import BLOCK
 from roboglot.model.sound import SAMPLE_RATE, SoundBlock
+from roboglot.values import dataclass
 
 BITRATE = 32_000  # bit/s
 

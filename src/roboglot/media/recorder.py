@@ -10,7 +10,6 @@ import contextlib
 import io
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -20,6 +19,7 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.errors import Busy, Refused, RobotError
 from roboglot.model.feed import Viewer
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from av.container import OutputContainer

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Generic, TypeVar
 
@@ -36,6 +35,7 @@ from roboglot.model.components.sensing.microphone import BLOCK
 from roboglot.model.errors import RobotError
 from roboglot.model.feed import Viewer
 from roboglot.model.sound import SAMPLE_RATE
+from roboglot.values import dataclass
 from roboglot.wire.ice import offer_loopback
 
 log = logging.getLogger(__name__)

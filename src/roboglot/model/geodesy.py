@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.components.sensing.gps import Gps, GpsFix, GpsReading
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 EQUATOR = 6_378_137.0  # m, WGS-84
 FLATTENING = 1 / 298.257223563

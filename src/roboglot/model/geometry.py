@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from msgspec import Struct
+
+from roboglot.values import dataclass
 
 POSITION_MAX = 10_000.0  # m from the origin of its map to a place that is asked for
 

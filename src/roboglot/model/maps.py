@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from roboglot.extras import lazy
 from roboglot.model.geometry import Point, Pose
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

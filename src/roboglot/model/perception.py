@@ -5,11 +5,11 @@ In a picture, x runs from 0 (left edge) to 1 (right edge) and y from 0 (top) to 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Generic, TypeVar
 
 from roboglot.model.geometry import Point, Pose
+from roboglot.values import dataclass
 
 T = TypeVar("T")
 LINE_POINTS = 10

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar
 
 from roboglot.model.actions import Actions
@@ -15,6 +15,7 @@ from roboglot.model.events import EventStream
 from roboglot.model.inputs.outside import Outside
 from roboglot.model.stand_in import StandIn
 from roboglot.model.tap import Tap
+from roboglot.values import dataclass
 
 C = TypeVar("C", bound=Component)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from roboglot.extras import lazy
 from roboglot.model.geometry import ORIGIN, Orientation, Pose, Twist, Vector3
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

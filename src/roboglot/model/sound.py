@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from roboglot.extras import lazy
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from roboglot.model.perception import JOINTS, SkeletonSeen, Sport
+from roboglot.values import dataclass
 
 GAP_MAX = 1.0  # s without a usable skeleton after which an unfinished repetition is discarded
 _INDEX = {name: number for number, name in enumerate(JOINTS)}

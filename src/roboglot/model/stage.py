@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from roboglot.model.components.interaction.armor import PlatePlace
 from roboglot.model.components.sensing.touch import TouchKind
 from roboglot.model.geometry import Point, Pose, Vector3
 from roboglot.model.perception import Emotion, Gesture, Sport, TagKind
 from roboglot.model.sound import Sound
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

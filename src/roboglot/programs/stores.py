@@ -7,8 +7,9 @@ store fails; methods that end in ``_now`` block and are for start-up.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol
+
+from roboglot.values import dataclass
 
 LOG_MAX = 1000
 """Entries kept per program; the oldest go first."""

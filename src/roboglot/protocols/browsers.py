@@ -11,12 +11,12 @@ import logging
 import re
 import socket
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from roboglot.config import is_loopback
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 

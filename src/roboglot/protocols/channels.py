@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 from roboglot.model.inputs.outside import CAME, GONE, Outside
 from roboglot.operations import Right
+from roboglot.values import dataclass
 
 Send = Callable[[str], None]
 Room = Callable[[], Awaitable[None]]

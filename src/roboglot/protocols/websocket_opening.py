@@ -6,7 +6,6 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from contextvars import copy_context
-from dataclasses import dataclass
 from http import HTTPStatus
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from roboglot.model.client_context import ask_for
 from roboglot.protocols.browsers import Browsers, of_texts
 from roboglot.protocols.channels import Channel
 from roboglot.protocols.websocket_writer import Writer
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from websockets.http11 import Request

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from roboglot.model.tap import Exchange
 from roboglot.recording import foxglove, messages
 from roboglot.recording.readings import READINGS
 from roboglot.recording.redaction import Redaction
+from roboglot.values import dataclass
 
 SCAN_BYTES = 1500  # assumed for a queued value of unknown size
 NANO = 1_000_000_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from struct import Struct, pack
 from typing import IO, Any
@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 from roboglot.recording.entries import KINDS, NANO, Entry, encoded
 from roboglot.recording.redaction import Redaction
 from roboglot.recording.standing import REPEATED, Standing
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 LIBRARY = "roboglot"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+
+from roboglot.values import dataclass
 
 # Values that a client makes up in each session: UUIDs, Unix times; sequence numbers and frame ids in two protocols.
 _FRESH = rb"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}|\b1[5-9]\d{8}(?:\d{3}){0,3}\b"

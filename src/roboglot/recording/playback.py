@@ -14,7 +14,7 @@ import re
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import AsyncIterator, Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from roboglot.recording.matching import Normal, normal, rewritten, without_numbe
 from roboglot.recording.reader import Asked, BadRecording, Recording, pair, read_recording
 from roboglot.recording.redaction import FIELDS, Redaction
 from roboglot.recording.timeline import Timeline
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 OFF = 0.1  # tolerance of a request's number: absolute

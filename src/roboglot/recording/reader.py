@@ -6,7 +6,7 @@ import json
 import logging
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,6 +18,7 @@ from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.recording.messages import decode_exchange, decode_input
 from roboglot.recording.standing import REPEATED
+from roboglot.values import dataclass
 from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
 
 log = logging.getLogger(__name__)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.sensing.barometer import Barometer, BarometerReading
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from roboglot.recording.ring import Ring
 from roboglot.recording.sampler import POSE_PERIOD, Sampler, Stamps
 from roboglot.recording.thread import WriterThread
 from roboglot.recording.truth import TruthSampler
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 MARK_MAX = 500  # characters

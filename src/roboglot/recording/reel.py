@@ -8,7 +8,6 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 from typing import IO, NamedTuple
@@ -20,6 +19,7 @@ from mcap.stream_reader import breakup_chunk
 from mcap.summary import Summary
 
 from roboglot.recording.reader import BadRecording, parts, stream
+from roboglot.values import dataclass
 from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
 
 UNPACKED_MAX = 256 << 20  # bytes per chunk

@@ -9,9 +9,10 @@ from __future__ import annotations
 import asyncio
 from bisect import bisect_right, insort
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.model.clock import Clock, Timer
+from roboglot.values import dataclass
 
 EARLIER = 0.25  # s for which an answer waits for pushes recorded before it
 

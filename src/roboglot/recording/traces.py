@@ -6,7 +6,6 @@ import json
 import re
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from roboglot.model.inputs.outside import ANSWER, CAME, GONE
 from roboglot.model.tap import Direction
 from roboglot.recording.entries import NANO
 from roboglot.recording.reader import Record, read_messages
+from roboglot.values import dataclass
 
 AROUND = 5  # messages shown before the first difference
 SHOWN_MAX = 300  # characters per message

@@ -8,9 +8,9 @@ renewal, first updates the row with the count, so that only one of them happens 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 from roboglot.storage.transactions import Connection, Transactions
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,11 +9,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 
 from roboglot.storage.homes import Homes
 from roboglot.storage.residence import LEASE, PERIOD, uptime
 from roboglot.storage.transactions import DatabaseError
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 GAP_MAX = 2.0  # s without a check after which silence is counted from zero

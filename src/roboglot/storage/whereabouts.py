@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from dataclasses import dataclass
 
 from roboglot.storage.homes import Home, Homes
 from roboglot.storage.transactions import DatabaseError
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 PERIOD = 1.0  # s between two checks of a connected robot

@@ -9,8 +9,9 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+
+from roboglot.values import dataclass
 
 READY_SECONDS_MAX = 60.0
 STOP_SECONDS_MAX = 10.0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.clients.errors import LinkLost
 from roboglot.clients.visual import TextLink
 from roboglot.model.clock import RealClock
+from roboglot.values import dataclass
 
 SECONDS_MAX = 60.0
 SAVING = {"mode": "single", "condition": "now", "style": "", "describe": ""}

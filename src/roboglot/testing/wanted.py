@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
 from roboglot.config import RobotConfig
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import pytest

@@ -12,11 +12,11 @@ import contextlib
 import logging
 import ssl
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
 from roboglot.transport.seldom import Seldom
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 seldom = Seldom(log)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import errno
 from collections.abc import Callable
-from dataclasses import dataclass
 from ipaddress import IPv4Network
 from typing import Protocol
 
 from roboglot.access.tunnel.connector import Connector, NotTrusted, Refused, Trust
+from roboglot.values import dataclass
 
 AGAIN_AFTER = 1.0  # s
 SOON = 0.5  # s between two look-ups of a robot that no program runs at present

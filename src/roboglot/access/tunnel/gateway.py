@@ -15,7 +15,6 @@ import secrets
 import socket
 import ssl
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from ipaddress import IPv4Address
 from pathlib import Path
@@ -38,6 +37,7 @@ from roboglot.transport.metered import Metered
 from roboglot.transport.pipe import join
 from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort, server_context
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 seldom = Seldom(log)

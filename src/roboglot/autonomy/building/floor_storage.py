@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import zlib
-from dataclasses import dataclass
 
 import msgspec
 import numpy as np
@@ -18,6 +17,7 @@ from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 

@@ -7,7 +7,7 @@ cells of its former place no longer count.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations
 
 import numpy as np
@@ -27,6 +27,7 @@ from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.events import JackChanged
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 REACH = 1.1  # m from base_link within which a lifted object's legs stand
 NEAREST = 10  # legs tried as corners

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.autonomy.following.thing_finder import moved_thing, thing_at
 from roboglot.autonomy.following.trail import (
@@ -27,6 +27,7 @@ from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.perception import PersonSeen, Sighting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
+from roboglot.values import dataclass
 
 DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
 OUT_OF_SIGHT = 0.6  # s after which the robot stops and searches where the person was last seen

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import uuid
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from roboglot.autonomy.landmarks.finder import pose_by_landmarks
 from roboglot.autonomy.landmarks.pose_update import pose_fixed
@@ -18,6 +18,7 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 KEY = "laser_landmarks.updating"
 SURE = 0.5  # quality of localization from which strips are placed

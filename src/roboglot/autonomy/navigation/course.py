@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +21,7 @@ from roboglot.model.components.motion.navigation import NavigationOptions
 from roboglot.model.errors import NotLocalized, RobotError
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner

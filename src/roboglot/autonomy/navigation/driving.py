@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from msgspec.structs import astuple
 
@@ -24,6 +24,7 @@ from roboglot.model.errors import Blocked, InvalidGoal
 from roboglot.model.events import RobotDisplaced
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 MOVE_MAX = 1000.0  # m in one move
 TURN_MAX = 1000.0  # rad in one move

@@ -6,12 +6,13 @@ Knows no obstacle.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.autonomy.navigation.route import Route
 from roboglot.autonomy.navigation.speed_profile import APPROACH_GAIN, BRAKING_SHARE
 from roboglot.model.components.motion.base import BaseLimits
 from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
+from roboglot.values import dataclass
 
 PERIOD = 0.04  # s between two commands
 LOOKAHEAD, LOOKAHEAD_SECONDS = 0.12, 0.2  # m, and m per m/s, of look-ahead along the path

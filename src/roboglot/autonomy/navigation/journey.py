@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.events import RobotBlocked
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 BLOCKED_SECONDS = 180.0  # s of waiting before BaseBlocked is published
 

@@ -6,7 +6,6 @@ Floors and ramps are no obstacles: only surfaces too steep for wheels and too hi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from roboglot.model.components.motion.gripper import Gripper, GripperStatus
 from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
 from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside that an object in the gripper covers
 

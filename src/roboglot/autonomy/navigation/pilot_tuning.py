@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from roboglot.model.components.motion.navigation import Tracks
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,7 @@ from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Point, Pose
+from roboglot.values import dataclass
 
 MARGIN = 0.05  # m of clearance beyond the hull in plans
 REACH = 0.5  # m beyond the hull within which obstacles add cost

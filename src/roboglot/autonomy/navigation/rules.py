@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +22,7 @@ from roboglot.model.components.mapping.annotations import (
 )
 from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.geometry import Point
+from roboglot.values import dataclass
 
 WALL_HALF = 0.75 * RESOLUTION  # m beside a virtual wall that are closed, so that no diagonal passes
 TRACK_HALF = 1.5 * RESOLUTION  # m beside a track that count as on it

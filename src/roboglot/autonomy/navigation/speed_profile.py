@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+from roboglot.values import dataclass
 
 BRAKING_SHARE = 0.8  # of the possible deceleration that plans use; the rest covers the base's lag
 APPROACH_GAIN = 6.0  # 1/s; near the goal the speed is this times the remaining distance

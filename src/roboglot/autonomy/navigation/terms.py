@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.motion.navigation import Tracks
+from roboglot.values import dataclass
 
 Shunned = Sequence[tuple[NDArray[np.float64], float]]
 

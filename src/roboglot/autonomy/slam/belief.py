@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from roboglot.autonomy.slam.scan_points import ScanReader
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import LostReason
 from roboglot.model.geometry import ORIGIN, Pose
+from roboglot.values import dataclass
 
 SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: lower bounds of the variances
 SET_BY_CLIENT = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose set by a client

@@ -7,7 +7,6 @@ points on free floor are set aside, and the remaining points have to fit more cl
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.kernels.matching import gaps
 from roboglot.kernels.occupancy import CROSSING, FITTING, FLOATING, HIDDEN, verdicts
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 SLACK = 0.15  # m by which a point may miss the map's surfaces
 JUDGED_POINTS_MAX, ALL_POINTS = 120, 500

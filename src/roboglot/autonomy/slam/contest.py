@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.slam.walls import on_walls
 from roboglot.kernels.matching import gaps
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 CONTRADICTION = 0.015  # m between both poses from which they are compared
 ALONG, STILL = 0.05, 0.004  # m per m driven, m: the error of wheels without slip in one step

@@ -6,7 +6,6 @@ import logging
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from roboglot.autonomy.slam.odometry.noise import LearntNoise
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 

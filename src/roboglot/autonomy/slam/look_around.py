@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
+from roboglot.values import dataclass
 
 DIRECTIONS = 24  # tried
 BESIDE, BEFORE, STOP_BEFORE = 0.08, 0.2, 0.12  # m beside and before the hull that stay free

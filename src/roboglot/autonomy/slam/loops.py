@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,7 @@ from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.slam.straightening import Edge, Straightening
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 

@@ -6,7 +6,6 @@ Needs the kernels, so it is imported once they are loaded.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from roboglot.kernels.placing import PlaceSearch, pyramid, turned_offsets
 from roboglot.kernels.relocation import correlate, likelihood_field
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.values import dataclass
 
 ITERATIONS_MAX = 8
 MATCH_POINTS_MAX = 400

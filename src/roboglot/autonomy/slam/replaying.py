@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from time import thread_time
 
 from roboglot.autonomy.slam.belief import Belief
@@ -15,6 +14,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.events import Event, LocalizationLost, LocalizationRecovered, LoopClosed
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Description, Robot
+from roboglot.values import dataclass
 
 RADIUS = 0.3  # m, for a robot of unknown hull
 

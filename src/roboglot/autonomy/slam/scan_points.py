@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.sensing import LaserScan
+from roboglot.values import dataclass
 
 RAYS_MAX = 8192
 NEARBY = 12.0  # m

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 STEPS_MAX = 500_000  # scans; beyond this the older half is dropped
 STANDING_PERIOD = 10.0  # s between two steps while standing

@@ -7,12 +7,12 @@ between points of the floor and points where rays passed through its plane.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 STEP_MIN, STEP_MAX = 0.04, 0.25  # m: the height of one step, up or down
 FLOOR = 0.025  # m: anything within this height is floor

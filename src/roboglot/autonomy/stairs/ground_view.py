@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.sensing.time_of_flight import TimeOfFlight
 from roboglot.model.geometry import Pose, Vector3
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 LOOKS_MAX = 15  # kept; the oldest is dropped first
 SURE = 0.93  # of a sensor's range within which floor would have been seen

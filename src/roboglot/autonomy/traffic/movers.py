@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.obstacles import unexplained
 from roboglot.model.geometry import Point, Pose
+from roboglot.values import dataclass
 
 LINK = 0.25  # m between neighbouring echoes of one object
 WIDE_MAX = 0.9  # m; anything wider is neither a robot nor a person

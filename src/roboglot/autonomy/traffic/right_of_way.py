@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.navigation.route import SPACING
 from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.autonomy.traffic.movers import Mover  # it needs the kernels

@@ -6,8 +6,9 @@ import contextlib
 import os
 import socket
 import struct
-from dataclasses import dataclass
 from pathlib import Path
+
+from roboglot.values import dataclass
 
 LISTENING = "0A"  # of /proc/net/tcp
 ANY = "0.0.0.0"

@@ -9,7 +9,6 @@ import asyncio
 import ipaddress
 import re
 from collections.abc import AsyncGenerator, Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import grpc
@@ -18,6 +17,7 @@ from roboglot.clients.errors import LinkLost, TimedOut
 from roboglot.model.clock import Clock
 from roboglot.model.tap import LOST, Line
 from roboglot.transport.wakes import prompt_wakes
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, client_options
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.clients.errors import ClientError, LinkLost
@@ -36,6 +35,7 @@ from roboglot.clients.robomaster.search import Search
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Viewer
 from roboglot.model.tap import Line
+from roboglot.values import dataclass
 from roboglot.wire.robomaster.annexb import AccessUnit
 from roboglot.wire.robomaster.replies import Reply
 from roboglot.wire.robomaster.telemetry import Telemetry
@@ -52,6 +52,9 @@ class Ports:
     audio: int = 40922
     event: int = 40925
     push: int = PUSH_PORT
+
+
+PORTS = Ports()
 
 
 class LinkState(StrEnum):
@@ -75,7 +78,7 @@ class RoboMasterClient:
         host: str,
         *,
         clock: Clock | None = None,
-        ports: Ports = Ports(),
+        ports: Ports = PORTS,
         pushes: PushPort | None = None,
         local: str | None = None,
         reconnect: bool = True,

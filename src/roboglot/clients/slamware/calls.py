@@ -10,7 +10,6 @@ import functools
 import inspect
 import re
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
-from dataclasses import dataclass
 from types import NoneType
 from typing import Any, ParamSpec, TypeVar
 from urllib.parse import quote, urlencode
@@ -21,6 +20,7 @@ from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot
 from roboglot.clients.slamware.http import Answer, HttpLink
 from roboglot.misfits import misfit
 from roboglot.model.tap import LOST, Line
+from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap, decode_explore_map
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, decode_stcm, encode_stcm
 

@@ -7,7 +7,7 @@ requests, which change nothing, are ever sent twice.
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import cast
 
 import httptools
@@ -15,6 +15,7 @@ import httptools
 from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
 from roboglot.model.clock import Clock
 from roboglot.model.tap import Line
+from roboglot.values import dataclass
 
 CONNECTIONS_MAX = 6
 HEAD_MAX = 32 * 1024  # bytes of an answer's status line and headers

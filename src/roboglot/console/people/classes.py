@@ -11,7 +11,7 @@ import contextlib
 import secrets
 import time
 from collections.abc import Awaitable, Callable, Collection
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated, Literal
 
 import msgspec
@@ -25,6 +25,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
 from roboglot.model.robot import Robot
 from roboglot.protocols.lease_desk import LEASE
+from roboglot.values import dataclass
 
 MINUTES_MAX = 600
 NAME_MAX = 30  # characters of a pupil's name

@@ -10,10 +10,11 @@ import hashlib
 import secrets
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from roboglot.access.session_file import KeptSession, SessionFile, seal, unseal
 from roboglot.model.admission import NO_PROOF, Proof
+from roboglot.values import dataclass
 
 COOKIE = "roboglot"
 COOKIE_MAX = 4096  # characters of a Cookie header that are read

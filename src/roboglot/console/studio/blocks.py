@@ -11,7 +11,6 @@ import inspect
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -24,6 +23,7 @@ from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.functions.records import RECORDS
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.language.names import BUILTINS, MODULES
+from roboglot.values import dataclass
 
 DANCE = "dance"  # the group of the choreographer and the dancer
 

@@ -10,7 +10,6 @@ import itertools
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import msgspec
@@ -19,6 +18,7 @@ from roboglot.console.studio.blocks import label_of
 from roboglot.console.studio.mistakes import explain
 from roboglot.model.geometry import Point
 from roboglot.programs.rehearsing import Played, Spot
+from roboglot.values import dataclass
 
 TEXT_MAX = 500
 PLACES_MAX = 20

@@ -11,7 +11,7 @@ import logging
 import secrets
 import time
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
 import msgspec
@@ -19,6 +19,7 @@ import msgspec
 from roboglot.console.studio.class_files import Bag, ClassFiles
 from roboglot.console.studio.class_wishes import Doing, Member
 from roboglot.model.errors import NotFound, Refused
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 CODE_LETTERS, CODE_LENGTH = "ABCDEFGHJKLMNPQRSTUVWXYZ23456789", 6

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from roboglot.console.studio.lessons import FOLDER, Lesson, load
 from roboglot.model.robot import Robot
 from roboglot.programs.rehearsing import Rehearse, SceneOf
 from roboglot.programs.tasks.service import ProgramService
+from roboglot.values import dataclass
 from roboglot.wire.visual.relay import FrameRelay
 
 

@@ -5,13 +5,12 @@ Numbers only, for editors; the functions themselves refuse values out of range.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.programs.functions.audio import BARKS, PIECES
 from roboglot.programs.functions.enums import ENUMS, LED_TARGETS
 from roboglot.programs.functions.moving.limits import LIMITS, OTHERS, TURN_ANGLE, WALK_DURATION
 from roboglot.programs.functions.senses import gestures, people, skeletons
 from roboglot.programs.functions.senses.sensors import TIMEOUT_MAX
+from roboglot.values import dataclass
 
 RELATIVE = ("relatively_force_control_attitude", "relatively_position_control_attitude")
 ATTITUDES = ("absolute_attitude", "transition_standing", *RELATIVE)

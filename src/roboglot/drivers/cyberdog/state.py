@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 from roboglot.extras import lazy
 from roboglot.model.geometry import ORIGIN, STILL, Path, Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, LaserScan, OdometryReading
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

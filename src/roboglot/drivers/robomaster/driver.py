@@ -7,7 +7,7 @@ stops when that connection ends.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import Ports, RoboMasterClient
@@ -26,6 +26,7 @@ from roboglot.model.components.motion.motion_status import MotionStatus
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 ANYWHERE = "discover"  # as a host: the first robot that broadcasts
 SEARCH_SECONDS = 5.0

@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
-from dataclasses import dataclass
 from functools import partial
 from typing import Generic, TypeVar
 
@@ -19,6 +18,7 @@ from roboglot.media.video import beside
 from roboglot.model.clock import Clock
 from roboglot.model.errors import RobotError
 from roboglot.model.feed import Feed
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 RETRY = 1.0  # s between two attempts to open the port

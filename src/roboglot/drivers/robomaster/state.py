@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.model.components.motion.base import WheelSpeeds
 from roboglot.model.components.motion.gimbal import GimbalAngles
 from roboglot.model.components.motion.motion_status import MotionFlags
 from roboglot.model.geometry import ORIGIN, STILL, Orientation, Twist, Vector3
 from roboglot.model.sensing import BatteryState, ImuReading, OdometryReading
+from roboglot.values import dataclass
 
 
 @dataclass(slots=True)

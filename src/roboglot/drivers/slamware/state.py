@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from roboglot.extras import is_there, lazy
 from roboglot.model.geometry import ORIGIN, STILL, Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import BatteryState, ImuReading, LaserScan, OdometryReading
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.events.stream import Event
+from roboglot.values import dataclass
 
 
 class DeliveryNews(StrEnum):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.model.events.stream import Event
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

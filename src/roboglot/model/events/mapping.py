@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from roboglot.model.events.stream import Event
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.model.sensing import LaserScan

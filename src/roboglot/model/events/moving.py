@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from roboglot.model.events.stream import Event
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.model.action import Action

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar, cast
+
+from roboglot.values import dataclass
 
 QUEUE_MAX = 256  # unread events per reader, beyond which the oldest is dropped
 

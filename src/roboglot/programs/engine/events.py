@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 
 import msgspec
+
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,12 +11,12 @@ import asyncio
 import logging
 import secrets
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import msgspec
 
 from roboglot.programs.engine.events import Answer
 from roboglot.programs.stores import JournalEntry, JournalStore
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 

@@ -14,13 +14,14 @@ import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
 from roboglot.programs.worker.zygote import MESSAGE_MAX
+from roboglot.values import dataclass
 
 _BOOT = """
 import os, sys

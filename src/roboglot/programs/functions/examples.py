@@ -5,10 +5,10 @@ from __future__ import annotations
 import importlib.resources
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
 from roboglot.programs.functions.table import ABILITIES
+from roboglot.values import dataclass
 
 # A quick call of each group, as an example of its log.
 _LOGGED = {

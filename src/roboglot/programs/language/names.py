@@ -10,9 +10,9 @@ import builtins
 import difflib
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from roboglot.programs.language.problems import Problem, ProblemKind
+from roboglot.values import dataclass
 
 MODULES = frozenset({"time", "math", "random", "numbers"})
 """Modules that may be imported. ``time`` needs no import, as the vendor's programs have none."""

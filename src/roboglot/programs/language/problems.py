@@ -6,8 +6,9 @@ Knows CPython's syntax messages (a table turns them into sentences) and nothing 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from enum import StrEnum
+
+from roboglot.values import dataclass
 
 
 class ProblemKind(StrEnum):

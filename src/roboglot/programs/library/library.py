@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from roboglot.conditions import BadCondition, parse_interface
 from roboglot.programs.errors import (
@@ -28,6 +28,7 @@ from roboglot.programs.library.modules import (
 )
 from roboglot.programs.stores import ListedProgram, ProgramStore, StoredProgram
 from roboglot.programs.tasks.states import TaskOperation
+from roboglot.values import dataclass
 
 MODULES_MAX = 1000
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.programs.language.places import Places
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

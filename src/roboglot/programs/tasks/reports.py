@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Generic, ParamSpec
 
 from roboglot.programs.errors import ProgramError
 from roboglot.programs.functions.results import StateCode
 from roboglot.programs.stores import LogEntry
 from roboglot.programs.tasks.states import TaskOperation, TaskState
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Collection, Coroutine, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime, tzinfo
 from zlib import crc32
 
@@ -39,6 +39,7 @@ from roboglot.programs.tasks.reports import (
 )
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, state_after
 from roboglot.programs.tasks.task_run import Outcome, RunListeners, TaskRun, in_units
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 EXPECTED = (SandboxUnavailable, EngineError, ValueError, LookupError, ProgramError, StoreError)

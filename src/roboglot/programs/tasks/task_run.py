@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from roboglot.model.client_context import ask_for
 from roboglot.model.errors import RobotError
@@ -53,6 +53,7 @@ from roboglot.programs.tasks.reports import (
 from roboglot.programs.tasks.run_host import RunHost
 from roboglot.programs.tasks.run_log import RunLog
 from roboglot.programs.tasks.states import TaskOperation, TaskState
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 

@@ -13,9 +13,9 @@ import os
 import platform
 import resource
 import signal
-from dataclasses import dataclass
 
 from roboglot.programs.worker import landlock, seccomp
+from roboglot.values import dataclass
 
 _PR_SET_PDEATHSIG, _PR_SET_DUMPABLE, _PR_SET_NO_NEW_PRIVS = 1, 4, 38
 _CLONE_NEWUTS, _CLONE_NEWIPC, _CLONE_NEWUSER, _CLONE_NEWNET = 0x04000000, 0x08000000, 0x10000000, 0x40000000

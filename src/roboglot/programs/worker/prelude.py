@@ -6,11 +6,12 @@ Knows names and fields only; the host makes the calls.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from roboglot.programs.language.names import Names
 from roboglot.programs.worker.values import pack, unpack
+from roboglot.values import dataclass
 
 TIME_CALLS = frozenset({"time.sleep", "time.time", "time.monotonic"})
 """Host calls that every program can make: sleep (s), Unix time (s), and seconds since a fixed moment.

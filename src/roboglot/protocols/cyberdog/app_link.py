@@ -10,7 +10,6 @@ import asyncio
 import logging
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from urllib.parse import unquote
 
@@ -21,6 +20,7 @@ from roboglot.protocols.cyberdog.app_line import DONE, AppLine, Credentials, del
 from roboglot.protocols.cyberdog.frame_queue import Delivery
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.table import Push
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.channel import HEARTBEAT_DEADLINE, HEARTBEAT_PERIOD, LOST_AFTER, PUSH_DEADLINE, PUSH_MAX
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import TypeVar
 
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.stream import Stream
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.codes import Accepted, InBandError
 
 Answer = TypeVar("Answer")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Literal
 
 from roboglot.config import Port
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink
@@ -22,6 +22,7 @@ from roboglot.protocols.cyberdog.chapters.system.updates import Updates
 from roboglot.protocols.cyberdog.frame_queue import FrameQueue
 from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
+from roboglot.values import dataclass
 from roboglot.wire.visual.relay import FrameRelay
 
 

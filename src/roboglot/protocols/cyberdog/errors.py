@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.model import errors
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.chapters.motion.motion import MotionCode
 from roboglot.wire.cyberdog.codes import Feedback, InBandError
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum, IntEnum, auto
 from heapq import heappop, heappush
 
 from roboglot.model.clock import Clock
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.model.clock import Clock
 from roboglot.model.stand_in import StandIn
 from roboglot.protocols.cyberdog.app_link import AppLink
 from roboglot.protocols.cyberdog.frame_queue import KEPT_SECONDS
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, ticks_of
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 

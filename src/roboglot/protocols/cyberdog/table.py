@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.operations import OperationTable
+from roboglot.values import dataclass
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import UNPUBLISHED
 

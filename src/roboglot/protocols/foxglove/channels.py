@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
+from roboglot.values import dataclass
 from roboglot.wire.foxglove.messages import Playback
 
 

@@ -6,7 +6,6 @@ Values are encoded only for subscribed topics, once for all clients.
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
 
 from roboglot.media.video import VideoStream
 from roboglot.model.errors import NotFound
@@ -16,6 +15,7 @@ from roboglot.recording.entries import KINDS, Entry, encoded
 from roboglot.recording.readings import READINGS
 from roboglot.recording.redaction import Redaction
 from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS, Sampler, Stamps
+from roboglot.values import dataclass
 
 CHANNELS_MAX = 200
 CAMERA = "camera"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache, partial
 
 from roboglot.model.errors import NotFound, RobotError
@@ -35,6 +34,7 @@ from roboglot.protocols.robomaster.errors import reply_to
 from roboglot.protocols.robomaster.explain import completed, nearest_command, nearest_values
 from roboglot.protocols.robomaster.shapes import Shape, shape_of
 from roboglot.protocols.robomaster.table import TABLE
+from roboglot.values import dataclass
 from roboglot.wire.robomaster.commands import Command, Malformed, Value, parse
 from roboglot.wire.robomaster.lines import LINE_MAX
 from roboglot.wire.robomaster.replies import Number, Reply

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import groupby
 
 from roboglot.model.clock import Clock
+from roboglot.values import dataclass
 from roboglot.wire.robomaster.replies import Number, Profile
 
 RATE = 5  # Hz, by default

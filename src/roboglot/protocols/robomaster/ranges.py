@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from msgspec import Meta
+
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,6 @@ import inspect
 import types
 import typing
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
@@ -19,6 +18,7 @@ import msgspec
 from roboglot.misfits import misfit
 from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.robomaster.ranges import OnRobots
+from roboglot.values import dataclass
 from roboglot.wire.robomaster.commands import Value, parameters_of
 
 Kinds = dict[str, object]  # parameter name: annotation

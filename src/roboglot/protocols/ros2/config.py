@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.config import Port
+from roboglot.values import dataclass
 
 DOMAIN_MAX = 232
 

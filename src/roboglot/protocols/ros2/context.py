@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action
 from roboglot.model.robot import Robot
 from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.protocols.ros2.vocabulary import DOOR
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.config import Port
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

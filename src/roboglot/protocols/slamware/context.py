@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
@@ -15,6 +13,7 @@ from roboglot.protocols.slamware.chapters.platform.event_log import EventLog
 from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
 from roboglot.protocols.slamware.chapters.statistics.lifetime_totals import Totals
 from roboglot.protocols.slamware.chapters.system.laser import Laser
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,6 @@ The vendor's robots put the text into the reason phrase; we send it there and as
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.model.errors import (
     Blocked,
     Busy,
@@ -20,6 +18,7 @@ from roboglot.model.errors import (
     RobotError,
     Unreachable,
 )
+from roboglot.values import dataclass
 
 REASON_MAX = 160  # characters of a reason phrase
 

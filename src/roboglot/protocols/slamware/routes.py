@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from urllib.parse import unquote
 
+from roboglot.values import dataclass
 from roboglot.wire.contracts import Row
 
 PATH_MAX = 1024  # characters

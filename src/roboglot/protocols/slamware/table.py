@@ -8,11 +8,11 @@ What it returns is the answer: None an empty 200 (null where it may be something
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware.routes import BEYOND
+from roboglot.values import dataclass
 
 TABLE: OperationTable[str] = OperationTable("slamware")
 

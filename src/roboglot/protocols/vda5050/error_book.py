@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.robot import Robot
 from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.values import dataclass
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 log = logging.getLogger(__name__)

@@ -6,10 +6,11 @@ Follows chapter 6.1 of the standard. Knows no robot and no clock: who drives say
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.values import dataclass
 from roboglot.wire.vda5050.orders import Action, Edge, Node, OrderMessage, OrderPart
 from roboglot.wire.vda5050.versions import ErrorKind
 

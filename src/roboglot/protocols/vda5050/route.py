@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
 from roboglot.model.actions import Action as RobotAction
@@ -20,6 +20,7 @@ from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected, kind_of
 from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, OrderBook
 from roboglot.protocols.vda5050.table import operation_of
+from roboglot.values import dataclass
 from roboglot.wire.vda5050.orders import Action, Edge, Node
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.model.robot import Robot
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.visual.answers import Answers
+from roboglot.values import dataclass
 from roboglot.wire.visual.requests import Request
 
 

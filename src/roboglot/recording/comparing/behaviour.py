@@ -10,13 +10,14 @@ import re
 import statistics
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.model.tap import Exchange
 from roboglot.recording.comparing.comparison import MISSING, Comparison, Row, compare_order
 from roboglot.recording.comparing.masks import How, Mask, is_volatile
 from roboglot.recording.comparing.trees import kind_of, leaves, tree
 from roboglot.recording.reader import pair
+from roboglot.values import dataclass
 
 MAGNITUDE = 10.0  # times; larger differences suggest another unit
 SMALL = 1e-3  # below this, numbers have no magnitude

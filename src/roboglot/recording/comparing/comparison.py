@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 
 from roboglot.model.tap import Direction, Exchange
@@ -12,6 +12,7 @@ from roboglot.recording.comparing.masks import Mask
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.matching import normal
 from roboglot.recording.reader import Asked, pair
+from roboglot.values import dataclass
 
 SHOWN_MAX = 20  # differences kept per operation
 VALUE_MAX = 80  # characters of a value in a report

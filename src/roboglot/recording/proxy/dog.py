@@ -11,7 +11,6 @@ import os
 import ssl
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from roboglot.recording.proxy.ends import Crossing, End, Place
 from roboglot.recording.proxy.relay import Book
 from roboglot.recording.proxy.sniffers import Note, Sniffer
 from roboglot.transport.tls import server_context
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.channel import APP_NAME, APP_PORT, ROBOT_NAME
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb

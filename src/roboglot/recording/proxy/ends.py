@@ -6,12 +6,12 @@ import asyncio
 import logging
 import ssl
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import cast
 
 from roboglot.model.clock import Clock
 from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsCall, TlsPort
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 seldom = Seldom(log)

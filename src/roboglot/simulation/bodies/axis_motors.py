@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action
 from roboglot.model.clock import Clock
+from roboglot.values import dataclass
 
 SETTLED = math.radians(0.1)  # an axis returning to its centre rests within this
 LOOK = 0.02  # s between checks whether a motion has ended

@@ -7,7 +7,6 @@ The sections that the physics needs (hull, base, legs) are here; every other sec
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal, TypeVar
 
 from msgspec import Struct
@@ -16,6 +15,7 @@ from roboglot.model.components.motion.gaits import Gait
 from roboglot.model.components.motion.legs import LegLimits
 from roboglot.model.robot import Description
 from roboglot.simulation.bodies.quantities import Fraction, NotNegative, Positive
+from roboglot.values import dataclass
 
 S = TypeVar("S", bound=Struct)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 from roboglot.model.components.motion.feet import Foot, Footfall, Foothold
 from roboglot.model.components.motion.gaits import GAITS, Gait
 from roboglot.model.components.motion.legs import FootLift
+from roboglot.values import dataclass
 
 RAISING = 0.2  # s to raise a foot that stays in the air
 DUTY = 0.55  # of a step for which a foot stands

@@ -7,7 +7,7 @@ file needs a change (docs/components.md).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
@@ -22,6 +22,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.schedule import Duty
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.environment import Environment

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from roboglot.model.components.motion.feet import Footfall
 from roboglot.model.components.motion.legs import CENTRED, FootLift, Step
@@ -16,6 +15,7 @@ from roboglot.model.components.motion.posture import Posture
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Pose, Twist
 from roboglot.simulation.bodies.footfalls import FootfallCycle, Swings, lifted
 from roboglot.simulation.bodies.support import GRAVITY
+from roboglot.values import dataclass
 
 CROUCH, PUSH, RECOVER = 0.20, 0.08, 0.25  # s: to bend before a jump, to stretch, to straighten after it
 DIP = 0.08  # m by which it bends

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from operator import length_hint
+
+from roboglot.values import dataclass
 
 CYCLE_MAX = 100  # ticks after which the order of calls repeats at the latest
 Entry = tuple[int, Callable[..., None], float]  # rank, function, s since its last call

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.geometry import Pose
@@ -21,6 +20,7 @@ from roboglot.simulation.world.description import (
     Spot,
     Wall,
 )
+from roboglot.values import dataclass
 
 DOCK_WIDTH, DOCK_DEPTH, DOCK_HEIGHT = 0.36, 0.12, 0.45
 SHAFT_WALL = 0.10

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import TagKind
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

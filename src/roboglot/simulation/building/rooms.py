@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from roboglot.simulation.building.blueprint import Rectangle, holes_of, shaft_of
 from roboglot.simulation.world.description import Floor, Lift, Spot
+from roboglot.values import dataclass
 
 CELL = 0.25  # m
 CELLS_MAX = 200  # along one side; larger floors get larger cells

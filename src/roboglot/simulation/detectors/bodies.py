@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.detectors.glance import PIXEL_NOISE, Floats, Glance
 from roboglot.simulation.people import figure
 from roboglot.simulation.people.people import Walker
+from roboglot.values import dataclass
 
 PEOPLE_RANGE, GESTURE_RANGE, ROBOT_RANGE = 15.0, 5.0, 8.0  # m
 PERSON_HEIGHT, FACE_HEIGHT, ROBOT_HEIGHT = 0.06, 0.045, 0.03  # smallest share of the picture's height

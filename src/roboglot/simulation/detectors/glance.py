@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from roboglot.simulation.people.people import Walker
 from roboglot.simulation.rendering.projection import View
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.sightlines import Obstacles, SightLines
+from roboglot.values import dataclass
 
 Floats = NDArray[np.float64]
 BOX_NOISE = 0.003  # of a box's size, one standard deviation

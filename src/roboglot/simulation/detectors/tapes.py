@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.perception import Colour
 from roboglot.simulation.world.description import Floor, Line
+from roboglot.values import dataclass
 
 Floats = NDArray[np.float64]
 SPACING = 0.02  # m between points

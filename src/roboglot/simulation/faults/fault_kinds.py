@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -47,6 +46,7 @@ from roboglot.simulation.components.system.disk import SimulatedDisk
 from roboglot.simulation.components.system.network import SimulatedNetwork
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.truth import Truth
+from roboglot.values import dataclass
 
 Undo = Callable[[], object]
 C = TypeVar("C", bound=Component)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import STILL, Point, Twist
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.radio.radio import Radio
 from roboglot.simulation.world.description import Gadget, WorldDescription
+from roboglot.values import dataclass
 
 
 @dataclass(slots=True)

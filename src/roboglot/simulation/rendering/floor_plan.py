@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from roboglot.kernels.raster_rooms import ROOMS_MAX, label, look
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.blueprint import Solid, SolidKind
 from roboglot.simulation.world.description import Floor, Wall
+from roboglot.values import dataclass
 
 CELL = 0.1  # m
 CELLS_MAX = 1000  # along one side; larger floors get larger cells

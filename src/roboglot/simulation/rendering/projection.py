@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.perception import Box
 from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.values import dataclass
 
 Floats = NDArray[np.float64]
 NEAREST = 0.05  # m before the lens from which on things appear

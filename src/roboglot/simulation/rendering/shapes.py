@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.kernels.posing import pose
+from roboglot.values import dataclass
 
 Floats = NDArray[np.float64]
 Rgb = tuple[int, int, int]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -43,6 +43,7 @@ from roboglot.simulation.rendering.textures import Masks
 from roboglot.simulation.rendering.views import REACH, Eye, Figure, Ground, Instant, Scene
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
+from roboglot.values import dataclass
 
 FAR_AWAY = 60.0  # m beyond which people are not drawn
 FLOOR_LIGHT = 0.95

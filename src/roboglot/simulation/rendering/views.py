@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.simulation.bodies.hull import Hull

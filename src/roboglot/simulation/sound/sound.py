@@ -6,7 +6,6 @@ Truth, world frame; knows no microphone and no clock. No echoes.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from roboglot.model.geometry import Point
 from roboglot.model.sound import SAMPLE_RATE, Sound
 from roboglot.simulation.radio.radio import crossed, walls_of
 from roboglot.simulation.world.description import WorldDescription
+from roboglot.values import dataclass
 
 SPEED = 343.0  # m/s
 NEAREST = 0.25  # m: nearer sources do not sound louder

@@ -6,7 +6,6 @@ Knows no blaster.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.support import GRAVITY
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from roboglot.model.geometry import Pose
@@ -18,6 +17,7 @@ from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.randomness import Chances
 from roboglot.simulation.world.sight import Sight
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise, product
 
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.simulation.building.blueprint import Solid, solids_of
 from roboglot.simulation.building.rooms import Rooms, rooms_of
 from roboglot.simulation.world.description import Spot, WorldDescription
+from roboglot.values import dataclass
 
 CONTACT_GAP = 0.005  # m between hull and dock at start
 BESIDE = 0.3  # m between robots that start side by side

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.model.components.component import Component
@@ -15,6 +15,7 @@ from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.world.description import Person
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.physics import Physics

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from roboglot.simulation.building.props import Props
 from roboglot.simulation.people import figure
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.world.description import WorldDescription
+from roboglot.values import dataclass
 
 Floats = NDArray[np.float64]
 FEET_TO_HEAD = (0.15, 0.6, 1.2)  # m above the floor

@@ -10,7 +10,6 @@ import contextlib
 import logging
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 
@@ -50,6 +49,7 @@ from roboglot.simulation.world.randomness import Chances
 from roboglot.simulation.world.sight import Sight
 from roboglot.simulation.world.sightlines import SightLines
 from roboglot.simulation.world.truth import Truth
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors

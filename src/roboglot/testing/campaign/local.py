@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -20,6 +19,7 @@ import msgspec
 
 from roboglot.shards.warmth import ENVIRONMENT
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, play_trial
+from roboglot.values import dataclass
 
 END_SECONDS_MAX = 10.0
 ATTEMPTS_MAX = 3  # for a trial whose process dies

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from importlib.metadata import version
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from roboglot.testing.scenarios.files import Found, read, with_seed
+from roboglot.values import dataclass
 
 WHY_MAX = 500  # characters kept of a reason
 

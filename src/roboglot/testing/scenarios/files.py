@@ -11,6 +11,7 @@ import msgspec
 
 from roboglot.misfits import misfit
 from roboglot.testing.wanted import SPEED, Wanted, WantedFault
+from roboglot.values import dataclass
 
 BYTES_MAX = 1 << 20
 Seconds = Annotated[float, msgspec.Meta(gt=0, le=86_400)]
@@ -166,7 +167,7 @@ class Scenario(_Strict, frozen=True, forbid_unknown_fields=True):
     about: str = ""
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Found:
     """A scenario and its file."""
 

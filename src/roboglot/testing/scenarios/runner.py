@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,6 +12,7 @@ from roboglot.testing.scenarios.checks import Checker
 from roboglot.testing.scenarios.files import Found
 from roboglot.testing.scenarios.steps import StepFailed, Steps
 from roboglot.testing.server import RobotServer
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from roboglot.values import dataclass
 
 ACCESS_UNIT_MAX = 4 << 20  # bytes; anything longer is not video
 _START = re.compile(rb"\x00\x00\x01")

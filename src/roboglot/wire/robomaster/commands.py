@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
+from roboglot.values import dataclass
 from roboglot.wire.robomaster.replies import Reply
 
 SEQ_MAX = 2**64 - 1

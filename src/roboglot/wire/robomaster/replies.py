@@ -7,8 +7,9 @@ exceptions that every known client needs: three decimals, and no ``;`` after the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
+
+from roboglot.values import dataclass
 
 
 class Reply(StrEnum):

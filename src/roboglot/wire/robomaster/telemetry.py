@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from ipaddress import IPv4Address
+
+from roboglot.values import dataclass
 
 TEXT_MAX = 8192  # most bytes of a datagram that are read
 TARGETS_MAX = 128

@@ -6,7 +6,8 @@ A topic's messages have the key ``DOMAIN/TOPIC/TYPE/HASH``; each node, publisher
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+
+from roboglot.values import dataclass
 
 _ATTACHMENT = struct.Struct("<qqB16s")
 RELIABLE, KEPT, SENSORS = "::,10:,:,:,,", ":1:,1:,:,:,,", "2::,5:,:,:,,"  # QoS in the syntax of liveliness tokens

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from typing import Any
+
+from roboglot.values import dataclass
 
 KINDS, RECORD = ("task", "module"), "record"  # programs of an account; history of its robots
 ITEMS_MAX = 20_000  # programs per answer

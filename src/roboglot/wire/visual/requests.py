@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import NoReturn
 
 from roboglot.conditions import BadCondition, parse_cycle, parse_interface, parse_moment
+from roboglot.values import dataclass
 from roboglot.wire.visual.codes import FeedbackState
 
 FRAME_MAX = 4_000_000  # characters

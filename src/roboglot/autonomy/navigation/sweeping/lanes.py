@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.model.components.mapping.annotations import Area
 from roboglot.model.geometry import Point
+from roboglot.values import dataclass
 
 STRETCH_MIN = 0.15  # m; shorter open stretches are left out
 LANES_MAX = 2000

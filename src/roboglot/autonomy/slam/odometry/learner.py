@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from roboglot.autonomy.slam.matcher import Match
 from roboglot.autonomy.slam.odometry.noise import Doubt, LearntBias, LearntNoise
 from roboglot.model.components.sensing.odometry import OdometryNoise
 from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.values import dataclass
 
 LEARNS_AFTER = 1.0  # m after a contradiction before corrections are used for learning again
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.components.sensing.odometry import OdometryNoise
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 RISE, FALL = 0.2, 0.02  # weight of a surprise, of a confirmation
 UNKNOWN_WHEELS = 3.0  # times the nominal noise, until matches have shown otherwise

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.clients.robomaster.calls import Chapter
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from roboglot.clients.errors import BadAnswer
 from roboglot.clients.robomaster.calls import Chapter, on_off
+from roboglot.values import dataclass
 from roboglot.wire.robomaster.telemetry import ChassisAttitude, ChassisStatus, status_of
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from roboglot.clients.errors import RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
@@ -13,6 +12,7 @@ from roboglot.model.components.system.link import Link
 from roboglot.model.errors import NotFound
 from roboglot.model.events import AdapterLevelChanged
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 from roboglot.wire.robomaster.telemetry import RAW_MAX, AdapterLevel
 
 COUNT_MAX, PORTS = 6, 2

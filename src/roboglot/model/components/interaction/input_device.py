@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 
 from roboglot.model.components.component import Component
 from roboglot.model.errors import InvalidGoal
+from roboglot.values import dataclass
 
 NAMED_KEYS = ("space", "tab", "shift", "ctrl", "alt", "caps")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 FREQUENCY_MIN, FREQUENCY_MAX = 0.05, 20.0  # Hz
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 MEMBERS_MAX = 100
 NAME_MAX = 64  # characters

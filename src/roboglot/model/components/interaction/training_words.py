@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 TRAINING = "training"  # the resource that teaching holds
 WORDS_MAX = 100

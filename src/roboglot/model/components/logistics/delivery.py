@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.motion.navigation import Tracks
+from roboglot.values import dataclass
 
 
 class OrderKind(StrEnum):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Point, Pose
+from roboglot.values import dataclass
 
 CLAIMS_MAX = 200
 CLAIM_MAX = 100  # characters

@@ -6,12 +6,13 @@ import itertools
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import StrEnum
 
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
+from roboglot.values import dataclass
 
 LINES_MAX, AREAS_MAX, MARKS_MAX = 10_000, 2_000, 2_000
 CURVE_STEP = 0.1  # m between the points that make up a curve

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
 from roboglot.model.events import LostReason
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 GOOD_FIT = 0.5  # quality from which the pose counts as known
 LOCALIZATION = "localization"  # the resource held while searching for the robot's pose

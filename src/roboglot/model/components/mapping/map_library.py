@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.model.components.component import Component
 from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

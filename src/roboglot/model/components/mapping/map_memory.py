@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.maps import PointOfInterest
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

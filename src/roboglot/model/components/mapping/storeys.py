@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.maps import PointOfInterest
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

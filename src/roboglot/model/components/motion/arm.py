@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 ARM = "arm"  # the resource of all actions that move the arm
 

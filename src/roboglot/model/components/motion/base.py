@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 
 from msgspec import Struct
 
 from roboglot.model.components.component import Component
 from roboglot.model.errors import Blocked, Refused
 from roboglot.model.geometry import STILL, Twist
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

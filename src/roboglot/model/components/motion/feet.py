@@ -5,10 +5,10 @@ Knows no gait by name and no vendor's order of legs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.geometry import Vector3
+from roboglot.values import dataclass
 
 FOOTFALLS_MAX = 1000  # of one order
 FOOTFALL_SECONDS_MIN = 0.02

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.geometry import Twist
+from roboglot.values import dataclass
 
 FOOT_LIFT_MIN, FOOT_LIFT_MAX = 0.005, 0.10  # m
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 GIMBAL = "gimbal"  # the resource of all actions that turn the gimbal
 

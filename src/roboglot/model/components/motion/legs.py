@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
@@ -18,6 +17,7 @@ from roboglot.model.components.motion.gaits import Gait
 from roboglot.model.components.motion.motions import Motion
 from roboglot.model.components.motion.posture import Posture
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Twist
+from roboglot.values import dataclass
 
 __all__ = ["LEGS", "STEPS_MAX", "BodyPose", "Choreography", "FootLift", "LegLimits", "Legs", "Posture", "Step"]
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

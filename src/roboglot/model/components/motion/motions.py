@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.components.motion.feet import TROT, Foot, Footfall
 from roboglot.model.components.motion.posture import Posture
 from roboglot.model.geometry import ORIGIN, Pose
+from roboglot.values import dataclass
 
 
 class Motion(StrEnum):

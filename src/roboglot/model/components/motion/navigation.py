@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Path, Point
+from roboglot.values import dataclass
 
 
 class Tracks(StrEnum):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
 from roboglot.model.components.mapping.annotations import Area
 from roboglot.model.geometry import Point
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

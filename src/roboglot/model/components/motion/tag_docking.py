@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import ORIGIN, Point, Pose
+from roboglot.values import dataclass
 
 
 class Mark(StrEnum):

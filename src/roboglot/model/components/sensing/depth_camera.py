@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from roboglot.extras import lazy
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Orientation, Vector3
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

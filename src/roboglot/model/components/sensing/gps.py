@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from enum import IntEnum
 
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 
 class GpsFix(IntEnum):

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Pose
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

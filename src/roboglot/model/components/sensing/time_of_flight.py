@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from roboglot.extras import lazy
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Vector3
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

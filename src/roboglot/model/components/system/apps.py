@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import BinaryIO
 
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 APPS_MAX = 50
 APP_BYTES_MAX = 500 * 1000**2

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 
 from roboglot.model.action import Action
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 BLUETOOTH = "bluetooth"  # the resource of scanning, connecting and updating
 SCAN_SECONDS_MAX = 60.0

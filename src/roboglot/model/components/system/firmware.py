@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from roboglot.model.action import Action
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 FIRMWARE = "firmware"  # the resource of updates and reboots
 PACKAGE_BYTES_MAX = 4 * 1024**3

@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from msgspec.structs import astuple
 
@@ -31,6 +30,7 @@ from roboglot.model.errors import Busy, InvalidGoal
 from roboglot.model.events import ActionChanged, ControlChanged, ControlRefused, LinkChanged
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 PERSON = "a person"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
+from roboglot.values import dataclass
 
 SYSTEM_LOG = "system log"  # the resource of an upload
 LINES_MAX = 2000

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from roboglot.model.components.motion.feet import (
     TROT,
@@ -30,6 +30,7 @@ from roboglot.programs.functions.moving.outcomes import report_outcome
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
+from roboglot.values import dataclass
 
 SEQUENCE = 400  # MotionId
 GAIT_UNIT = 0.03  # s: the robot's unit for a gait's duration, contrary to the manual

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import uuid
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
@@ -21,6 +20,7 @@ from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.values import dataclass
 
 LOOK = 0.02  # s between two checks of a door's position
 PINCH_BACK = 0.3  # of its travel by which a stalled door opens again

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated
 
 from msgspec import Meta, Struct
@@ -19,6 +18,7 @@ from roboglot.simulation.bodies.axis_motors import SETTLED, Axis
 from roboglot.simulation.bodies.hull import LEVEL, Hull
 from roboglot.simulation.bodies.quantities import Offset, Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.values import dataclass
 
 FOLLOWING = 6.0  # 1/s: the gimbal's turn rate back to the chassis' front, per rad of offset
 STEERING = 4.0  # 1/s: the same of a chassis that follows the gimbal

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from msgspec import Struct
 
 from roboglot.model.clock import Clock
@@ -12,6 +10,7 @@ from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import AdapterLevelChanged, EventStream
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Count, Positive
+from roboglot.values import dataclass
 
 
 class SensorAdaptersSection(Struct, frozen=True, forbid_unknown_fields=True):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -26,6 +25,7 @@ from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.components.motion.gimbal_axes import GimbalSection
 from roboglot.simulation.rendering.studio import Studio
 from roboglot.simulation.rendering.views import Eye, Instant, Scenery
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.simulation.rendering.picture import Renderer

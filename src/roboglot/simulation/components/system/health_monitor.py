@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from roboglot.model.components.component import Component
@@ -25,6 +24,7 @@ from roboglot.model.events import BrakeChanged, EmergencyStopChanged
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.values import dataclass
 
 PERIOD = 10  # ticks
 EMPTY = 0.05  # charge below which the battery is an error

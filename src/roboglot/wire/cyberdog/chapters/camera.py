@@ -6,11 +6,11 @@ Both directions use the same forms; a message with only a ``uid`` asks the robot
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 import msgspec
 
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.text import Int32, NotJson, read_json
 
 DEFAULT_UID = "default_uid"  # uid of an app that gives none

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable
 from contextlib import aclosing
-from dataclasses import dataclass
 
 import msgspec
 
 from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, check
 from roboglot.clients.errors import BadAnswer, TimedOut
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.codes import Code, FileError
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Awaitable, Callable, Iterable
-from dataclasses import dataclass
 
 import msgspec
 
@@ -20,6 +19,7 @@ from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Busy
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters.motion import ActionInfo, Result, State
 
 PERIOD = 0.1  # s between two polls

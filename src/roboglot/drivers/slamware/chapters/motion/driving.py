@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
 
 from msgspec.structs import astuple
 
@@ -22,6 +21,7 @@ from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Blocked, Busy, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 PERIOD = 0.05  # s between two looks at odometry
 MOVE_MAX, TURN_MAX, LIFETIME_MAX = 1000.0, 1000.0, 86_400.0  # m, rad, s

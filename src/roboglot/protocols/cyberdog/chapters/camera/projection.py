@@ -6,7 +6,6 @@ The camera is a pinhole. Boxes are shares of the picture; places are base_link, 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.perception import Box
 from roboglot.model.sensing import LaserScan
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

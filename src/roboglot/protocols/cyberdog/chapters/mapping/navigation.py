@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.localization import GOOD_FIT, Localization, Region
@@ -21,6 +20,7 @@ from roboglot.protocols.cyberdog.chapters.mapping.task_state import Task
 from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.errors import codes_of
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult
 
 GIVE_UP_AFTER = 120.0  # s

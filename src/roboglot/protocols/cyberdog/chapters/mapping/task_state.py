@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Set
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action
 from roboglot.protocols.cyberdog.stream import Stream
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult, TaskState, TaskType
 
 log = logging.getLogger(__name__)

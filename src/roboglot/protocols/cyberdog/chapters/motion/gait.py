@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base
@@ -37,6 +36,7 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
 )
 from roboglot.protocols.cyberdog.chapters.motion.readiness import machine_state, posture_of, refusal_of
 from roboglot.protocols.cyberdog.errors import codes_of
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.chapters.motion.motion import (
     Motion,
     MotionCode,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.driving import BASE, Driving
@@ -14,6 +13,7 @@ from roboglot.model.geometry import STILL, Orientation, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.motion.climbing import WayAhead
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import FIGURES, POSES, SEEING, WALK_STANDS, WALKS
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
 SOURCE = "cyberdog"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import msgspec
@@ -21,6 +20,7 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.chapters.people.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.table import TABLE
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
 
 AUTOMATIC = 200  # ``relative_pos`` that leaves the choice to the robot

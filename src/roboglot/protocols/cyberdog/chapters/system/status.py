@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from roboglot.model.components.energy.battery import Battery
@@ -23,6 +22,7 @@ from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.cyberdog.vocabulary import percent, wifi_strength
+from roboglot.values import dataclass
 from roboglot.wire.cyberdog.chapters.system import LEGS
 from roboglot.wire.cyberdog.codes import Code, SelfCheck
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb

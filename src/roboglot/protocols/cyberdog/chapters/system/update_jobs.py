@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
 
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.firmware import (
@@ -33,6 +32,7 @@ from roboglot.protocols.cyberdog.chapters.system.updates import (
     package_of,
 )
 from roboglot.protocols.cyberdog.stream import Stream
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 CODES: tuple[tuple[type[Exception], int], ...] = (  # first match wins

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.events import LoopClosed, MapReplaced
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

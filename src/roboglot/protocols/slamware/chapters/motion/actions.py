@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -38,6 +37,7 @@ from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import action_word
+from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters import motion as wire
 from roboglot.wire.slamware.chapters.motion import (
     ActionFactory,

@@ -6,7 +6,7 @@ An elevator area's centre line runs from the front door to the rear one; the man
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 
 import msgspec
@@ -25,6 +25,7 @@ from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d
+from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters.artifact import Identifier, MetadataError, number
 from roboglot.wire.slamware.chapters.multi_floor import PoseRelation
 from roboglot.wire.slamware.geometry import Pose3D

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TypeVar
 
 import msgspec
@@ -21,6 +21,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.protocols.slamware.chapters.artifact.drawing import AREA_USAGES, area_of, line_of
+from roboglot.values import dataclass
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters import artifact
 from roboglot.wire.slamware.chapters.slam import stcm_layers

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import BinaryIO
 
+from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters.firmware.packages import BadPackage, entry_of
 
 MANIFEST = "AndroidManifest.xml"

@@ -8,10 +8,10 @@ y first: 0 unknown, 1..127 free (127 most certain), 128..255 occupied (a negativ
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from roboglot.extras import lazy
+from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 
 MAGIC = b"STCM"

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 
 from roboglot.extras import lazy
+from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters.slam.explore_map import CELLS_MAX, BadMap, ExploreMap
 from roboglot.wire.slamware.chapters.slam.stcm import Layer, Pairs, Reader, pack_pairs, pack_text
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Metres, Radians

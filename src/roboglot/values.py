@@ -1,0 +1,184 @@
+"""Dataclasses whose methods are compiled at their first use. Knows no robot.
+
+``dataclasses`` compiles up to seven methods of every class while it is imported: a third of a start, and most of the
+four hundred classes are not used in it. Here a class gets its fields and slots at once; ``__init__`` and its kin are
+that library's own, made when they are first looked up. For type checkers it is that library's decorator.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from types import MemberDescriptorType
+from typing import TYPE_CHECKING, TypeVar, cast
+
+C = TypeVar("C", bound=type)
+
+
+class _Factory:
+    """Default of a parameter whose value a function makes."""
+
+    def __repr__(self) -> str:
+        return "<factory>"
+
+
+FACTORY = _Factory()
+
+
+class _Later:
+    """Method of a class that is made when it is looked up for the first time, and then replaces this."""
+
+    __slots__ = ("_frozen", "_name", "_owner")
+
+    def __init__(self, owner: type, name: str, *, frozen: bool) -> None:
+        self._owner, self._name, self._frozen = owner, name, frozen
+
+    def __get__(self, instance: object, _class: type | None = None) -> object:
+        method = _method(self._owner, self._name, frozen=self._frozen and self._name == "__init__")
+        setattr(self._owner, self._name, method)
+        return method if instance is None else method.__get__(instance)
+
+
+if TYPE_CHECKING:
+    from dataclasses import dataclass as dataclass
+
+    from _typeshed import DataclassInstance
+else:
+
+    def dataclass(
+        plain: C | None = None,
+        /,
+        *,
+        frozen: bool = False,
+        slots: bool = False,
+        eq: bool = True,
+        kw_only: bool = False,
+        order: bool = False,
+    ) -> C | Callable[[C], C]:
+        """Do what the library's decorator does with these options, as late as possible."""
+        if order:
+            return dataclasses.dataclass(plain, frozen=frozen, slots=slots, eq=eq, kw_only=kw_only, order=True)
+
+        def decorate(plain: C) -> C:
+            own = {*vars(plain)} - ({"__hash__"} if _is_unhashable_by_eq(plain) else set())
+            made = dataclasses.dataclass(init=False, repr=False, eq=False, slots=slots, kw_only=kw_only)(plain)
+            _give_methods(made, own, frozen=frozen, eq=eq)
+            if frozen:
+                _freeze(made, own, slots=slots)
+            return made
+
+        return decorate if plain is None else decorate(plain)
+
+
+def _is_unhashable_by_eq(plain: type) -> bool:
+    """Return whether Python took ``__hash__`` away because the class defines ``__eq__``."""
+    return "__eq__" in vars(plain) and vars(plain).get("__hash__") is None
+
+
+def _give_methods(made: type, own: set[str], *, frozen: bool, eq: bool) -> None:
+    """Give a class those methods that it has not defined."""
+    names = ["__init__", "__repr__"]
+    if eq:
+        names.append("__eq__")
+        if frozen:
+            names.append("__hash__")
+        elif "__hash__" not in own:
+            setattr(made, "__hash__", None)  # noqa: B010
+    for name in names:
+        if name not in own:
+            setattr(made, name, _Later(made, name, frozen=frozen))
+
+
+def _freeze(made: type, own: set[str], *, slots: bool) -> None:
+    """Refuse assignments to the fields of a class."""
+    if own & {"__setattr__", "__delattr__"}:
+        raise TypeError(f"{made.__name__} is frozen and has assignments of its own")
+    names = frozenset(field.name for field in dataclasses.fields(made))
+
+    def set_attribute(self: object, name: str, value: object) -> None:
+        if type(self) is made or name in names:
+            raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
+        object.__setattr__(self, name, value)
+
+    def delete_attribute(self: object, name: str) -> None:
+        if type(self) is made or name in names:
+            raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
+        object.__delattr__(self, name)
+
+    given: dict[str, Callable[..., object]] = {"__setattr__": set_attribute, "__delattr__": delete_attribute}
+    if slots:  # pickle and copy would assign
+        given |= {"__getstate__": _state, "__setstate__": _restore}
+    for name, method in given.items():
+        if name not in own:
+            setattr(made, name, method)
+
+
+def _state(self: DataclassInstance) -> list[object]:
+    return [getattr(self, field.name) for field in dataclasses.fields(self)]
+
+
+def _restore(self: DataclassInstance, state: list[object]) -> None:
+    for field, value in zip(dataclasses.fields(self), state, strict=True):
+        object.__setattr__(self, field.name, value)
+
+
+def _method(owner: type, name: str, *, frozen: bool) -> Callable[..., object]:
+    """Return a method for the fields of ``owner``: the library's, from a class made for it alone."""
+    if name == "__init__":
+        method = _initialiser(owner, frozen=frozen)
+    else:
+        fields = [(field.name, object, _like(field)) for field in dataclasses.fields(owner)]
+        alone = dataclasses.make_dataclass(
+            owner.__name__,
+            fields,
+            namespace={"__doc__": ""},  # the library would word one, slowly
+            init=False,
+            repr=name == "__repr__",
+            eq=name == "__eq__",
+            unsafe_hash=name == "__hash__",
+        )
+        method = cast("Callable[..., object]", vars(alone)[name])
+    method.__qualname__, method.__module__ = f"{owner.__qualname__}.{name}", owner.__module__
+    return method
+
+
+def _like(field: dataclasses.Field[object]) -> object:
+    return dataclasses.field(repr=field.repr, hash=field.hash, compare=field.compare, default=None)
+
+
+def _initialiser(owner: type, *, frozen: bool) -> Callable[..., object]:
+    """Return ``__init__``; for frozen classes it sets slots by their descriptors, faster than the library's."""
+    known: dict[str, object] = {"_factory": FACTORY, "_set": object.__setattr__}
+    in_order: list[str] = []
+    by_name: list[str] = []
+    lines: list[str] = []
+    for field in dataclasses.fields(owner):
+        name = value = field.name
+        made = field.default_factory is not dataclasses.MISSING
+        if made:
+            known[f"_make_{name}"] = field.default_factory
+            value = f"_make_{name}() if {name} is _factory else {name}" if field.init else f"_make_{name}()"
+        elif field.default is not dataclasses.MISSING:
+            known[f"_default_{name}"] = field.default
+            value = name if field.init else f"_default_{name}"
+        elif not field.init:
+            continue
+        if field.init:
+            default = "=_factory" if made else f"=_default_{name}" if f"_default_{name}" in known else ""
+            (by_name if field.kw_only else in_order).append(name + default)
+        slot = getattr(owner, name, None)
+        if not frozen:
+            lines.append(f"self.{name} = {value}")
+        elif isinstance(slot, MemberDescriptorType):
+            known[f"_set_{name}"] = slot.__set__
+            lines.append(f"_set_{name}(self, {value})")
+        else:
+            lines.append(f"_set(self, {name!r}, {value})")
+    if hasattr(owner, "__post_init__"):
+        lines.append("self.__post_init__()")
+    parameters = ", ".join(["self", *in_order, *(["*", *by_name] if by_name else [])])
+    exec("\n ".join([f"def __init__({parameters}):", *(lines or ["pass"])]), known)
+    method = cast("Callable[..., object]", known["__init__"])
+    method.__annotations__ = {field.name: field.type for field in dataclasses.fields(owner) if field.init}
+    method.__annotations__["return"] = None
+    return method

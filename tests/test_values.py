@@ -1,0 +1,142 @@
+"""A dataclass of ``roboglot.values`` does what the library's does; its methods are compiled at their first use."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import inspect
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import pytest
+
+from roboglot import values
+
+BOTH = pytest.mark.parametrize("dataclass", [values.dataclass, dataclasses.dataclass], ids=["ours", "library"])
+
+
+@values.dataclass(frozen=True, slots=True)
+class Point:
+    """Kept in a file by pickle."""
+
+    x: float
+    y: float = 0.0
+
+
+def made(dataclass: Callable[..., Any], **options: bool) -> type:
+    """Return a class with every kind of field."""
+
+    @dataclass(slots=True, **options)
+    class Base:
+        name: str
+        count: int = 2
+
+    @dataclass(slots=True, **options)
+    class Thing(Base):
+        words: list[str] = dataclasses.field(default_factory=list)
+        late: float = dataclasses.field(init=False, default=1.5)
+        hidden: str = dataclasses.field(default="", repr=False, compare=False)
+
+        def __post_init__(self) -> None:
+            object.__setattr__(self, "late", self.count / 2)
+
+    return Thing
+
+
+@BOTH
+@pytest.mark.parametrize("options", [{}, {"frozen": True}, {"kw_only": True}, {"eq": False}], ids=str)
+def test_class_behaves_as_the_library_s(dataclass: Callable[..., Any], options: dict[str, bool]) -> None:
+    thing = made(dataclass, **options)
+    signature = "(name: 'str', count: 'int' = 2, words: 'list[str]' = <factory>, hidden: 'str' = '') -> None"
+    if options.get("kw_only"):
+        signature = signature.replace("(name", "(*, name")
+    assert str(inspect.signature(thing)) == signature
+    one, other = thing(name="a", count=5), thing(name="a", count=5, hidden="x")
+    assert one.late == 2.5
+    assert repr(one).endswith(".Thing(name='a', count=5, words=[], late=2.5)")
+    assert one.words is not other.words
+    assert (one == other) is options.get("eq", True)
+    assert one != "a"
+    assert dataclasses.asdict(dataclasses.replace(one, count=7))["late"] == 3.5
+    assert dataclasses.asdict(one) == {"name": "a", "count": 5, "words": [], "late": 2.5, "hidden": ""}
+    assert thing.__slots__ == ("words", "late", "hidden")
+    with pytest.raises(TypeError, match=r"missing 1 required"):
+        thing()
+    with pytest.raises(TypeError, match=r"unexpected keyword argument 'colour'"):
+        thing(name="a", colour="red")
+
+
+@BOTH
+def test_frozen_values_are_refused_changes_and_hashable(dataclass: Callable[..., Any]) -> None:
+    @dataclass(frozen=True, slots=True)
+    class Pair:
+        left: int
+        right: int = 1
+
+    pair = Pair(4)
+    with pytest.raises(dataclasses.FrozenInstanceError, match="cannot assign to field 'left'"):
+        pair.left = 5
+    with pytest.raises(dataclasses.FrozenInstanceError, match="cannot delete field 'left'"):
+        del pair.left
+    assert {pair: 1}[Pair(4, 1)] == 1
+    assert hash(pair) == hash((4, 1))
+    match pair:
+        case Pair(left, right):
+            assert (left, right) == (4, 1)
+    assert msgspec.json.decode(msgspec.json.encode(pair), type=Pair) == pair
+
+
+@BOTH
+def test_values_that_change_have_no_hash(dataclass: Callable[..., Any]) -> None:
+    @dataclass(slots=True)
+    class Count:
+        number: int
+
+    @dataclass(slots=True, eq=False)
+    class Seat:
+        number: int
+
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(Count(1))
+    seat = Seat(1)
+    assert {seat: 2}[seat] == 2
+    assert seat != Seat(1)
+
+
+@BOTH
+def test_methods_of_the_class_remain_its_own(dataclass: Callable[..., Any]) -> None:
+    @dataclass(frozen=True, slots=True)
+    class Word:
+        text: str
+
+        def __eq__(self, other: object) -> bool:
+            return isinstance(other, Word) and self.text.lower() == other.text.lower()
+
+        def __hash__(self) -> int:
+            return hash(self.text.lower())
+
+        def __repr__(self) -> str:
+            return f"<{self.text}>"
+
+    assert len({Word("Ja"), Word("ja")}) == 1
+    assert repr(Word("ja")) == "<ja>"
+
+
+def test_values_are_copied_and_pickled() -> None:
+    point = Point(1.0, 2.0)
+    assert copy.copy(point) == copy.deepcopy(point) == pickle.loads(pickle.dumps(point)) == point
+
+
+def test_nothing_is_compiled_before_it_is_used() -> None:
+    @values.dataclass(frozen=True, slots=True)
+    class Unused:
+        number: int
+
+    assert isinstance(vars(Unused)["__init__"], values._Later)
+    assert Unused(3) == Unused(3)
+    assert inspect.isfunction(vars(Unused)["__init__"])
+    assert inspect.isfunction(vars(Unused)["__eq__"])
+    assert isinstance(vars(Unused)["__repr__"], values._Later)
+    assert inspect.signature(Unused.__init__).parameters.keys() == {"self", "number"}
