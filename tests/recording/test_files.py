@@ -20,7 +20,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from roboglot.recording.entries import NANO, Entry
-from roboglot.recording.files import Attachment, Files, Limits, OpenChunk, Origin, PartWriter
+from roboglot.recording.files import Attachment, Channel, Files, Limits, OpenChunk, Origin, PartWriter
 from roboglot.recording.mending import mend
 from roboglot.recording.reader import parts, read_messages, records
 from roboglot.recording.redaction import Redaction
@@ -322,20 +322,26 @@ def test_chunks_are_the_librarys(messages: list[str | tuple[int, int, bytes]]) -
         stream = io.BytesIO()
         writer: Any = Writer(stream)
         writer.start()
-        chunk = OpenChunk(writer)
+        chunk = OpenChunk(writer, stream, level=3)  # the library's
         schema = writer.register_schema("x", "jsonschema", b"{}")
-        channels = [writer.register_channel(f"/{number}", "json", schema) for number in range(3)]
+
+        numbered = [writer.register_channel(f"/{number}", "json", schema) for number in range(3)]
+        channels = [Channel(number, lambda _at, value: value) for number in numbered]
         for message in messages:
             if isinstance(message, str) or message[0] == len(channels):
-                chunk.hand_over()
+                chunk.write()
                 writer.flush()
             if isinstance(message, str):
                 continue
             number, at, data = message
             if number == len(channels):
-                channels.append(writer.register_channel("/late", "json", schema))
-            (chunk.add if ours else writer.add_message)(channels[number], at, data, at + 5, number)
-        chunk.hand_over()
+                late = writer.register_channel("/late", "json", schema)
+                channels.append(Channel(late, lambda _at, value: value))
+            if ours:
+                chunk.add(channels[number], at, data, at + 5, number)
+            else:
+                writer.add_message(channels[number].number, at, data, at + 5, number)
+        chunk.write()
         writer.finish()
         files.append(stream.getvalue())
     assert files[0] == files[1]

@@ -30,12 +30,16 @@ class Entry(NamedTuple):
         return len(self.value.payload) + 500 if isinstance(self.value, Exchange) else SCAN_BYTES
 
 
+Put = Callable[[Entry], object]
+Encode = Callable[[int, Any], bytes]  # of a time (ns) and a value
+
+
 @dataclass(frozen=True, slots=True)
 class EntryKind:
     """Encoding of one kind of value."""
 
     schema: str
-    encode: Callable[[int, Any], bytes]
+    encode: Encode
 
     @property
     def is_protobuf(self) -> bool:
@@ -71,12 +75,18 @@ KINDS = {
 }
 
 
+def encoding_of(kind: str, redaction: Redaction) -> Encode:
+    """Return the function that makes a message of a value of this kind, with secrets redacted."""
+    encode = KINDS[kind].encode
+    if kind == "exchange":
+        return lambda at, value: encode(at, redaction.exchange(value))
+    if kind == "action":
+        return lambda at, value: redaction(encode(at, redaction.action(value)))
+    if KINDS[kind].is_protobuf:
+        return encode
+    return lambda at, value: redaction(encode(at, value))
+
+
 def encoded(entry: Entry, redaction: Redaction) -> bytes:
     """Return an entry as a message, with secrets redacted."""
-    kind, value = KINDS[entry.kind], entry.value
-    if entry.kind == "exchange":
-        value = redaction.exchange(value)
-    elif entry.kind == "action":
-        value = redaction.action(value)
-    data = kind.encode(entry.at, value)
-    return data if kind.is_protobuf or entry.kind == "exchange" else redaction(data)
+    return encoding_of(entry.kind, redaction)(entry.at, entry.value)

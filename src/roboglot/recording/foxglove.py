@@ -45,7 +45,6 @@ TYPES: dict[str, type[Message]] = {
     "foxglove.SceneUpdate": SceneUpdate_pb2.SceneUpdate,
 }
 
-RANGES = bytes([6 << 3 | 2])  # the field of a scan
 UPRIGHT = b"\x1a\x0b\x12\x09\x21" + Struct("<d").pack(1.0)  # a scan's pose: no turn
 _three_doubles = Struct("<3d")
 _one_double, _two_doubles = Struct("<Bd").pack, Struct("<BdBd").pack
@@ -86,7 +85,12 @@ def _place(message: PoseMessage, pose: Pose, z: float = 0.0) -> None:
 def _time_field(nanoseconds: int) -> bytes:
     """Return field 1, a Timestamp."""
     seconds, nanos = divmod(nanoseconds, 1_000_000_000)
-    return _field(1, (b"\x08" + _varint(seconds) if seconds else b"") + (b"\x10" + _varint(nanos) if nanos else b""))
+    return _field(1, _seconds_field(seconds) + (b"\x10" + _varint(nanos) if nanos else b""))
+
+
+@lru_cache(maxsize=16)
+def _seconds_field(seconds: int) -> bytes:
+    return b"\x08" + _varint(seconds) if seconds else b""
 
 
 @lru_cache(maxsize=4096)
@@ -97,7 +101,12 @@ def _text_fields(*texts: str) -> bytes:
 
 def _field(number: int, data: bytes) -> bytes:
     """Return a field of bytes, a string or a message."""
-    return (number << 3 | 2).to_bytes(1, "little") + _varint(len(data)) + data
+    return _field_head(number, len(data)) + data
+
+
+@lru_cache(maxsize=1024)
+def _field_head(number: int, size: int) -> bytes:
+    return bytes([number << 3 | 2]) + _varint(size)
 
 
 def _doubles(first: int, a: float, second: int, b: float) -> bytes:
@@ -145,7 +154,7 @@ def encode_scan(at: int, value: tuple[str, LaserScan]) -> bytes:
     start = scan.angle_min
     end = start + scan.angle_increment * (len(ranges) - 1)
     angles = _two_doubles(33, start, 41, end) if start and end else _doubles(4, start, 5, end)[1:]
-    return b"".join((_time_field(at), _text_fields(frame), UPRIGHT, angles, RANGES, _varint(ranges.nbytes), ranges))
+    return b"".join((_time_field(at), _text_fields(frame), UPRIGHT, angles, _field_head(6, ranges.nbytes), ranges))
 
 
 def _varint(number: int) -> bytes:

@@ -231,7 +231,7 @@ class Recorder:
             return
         video, photos = self._config.video, self._config.photos
         self._samplers = [Sampler(robot, self._put, video=video, photos=photos) for robot in self._robots.values()]
-        self._truth = TruthSampler(self._stage, self._put) if self._stage and self._config.truth else None
+        self._truth = TruthSampler(self._stage) if self._stage and self._config.truth else None
         if self._outside is not None:
             self._looking.append(self._outside.listen(self._note_input))
         self._handler = _LogHandler(self)
@@ -265,10 +265,14 @@ class Recorder:
             self._beat(beat)
 
     def _beat(self, number: int) -> None:
+        found: list[Entry] = []
         for sampler in self._samplers:
-            sampler.beat(number)
+            sampler.beat(number, found.append)
         if self._truth is not None:
-            self._truth.beat(number, self._stamp()[0])
+            self._truth.beat(number, self._stamp()[0], found.append)
+        for writing in (self._thread, self._ring_thread):
+            if writing is not None:
+                writing.put_all(found)
         thread = self._thread
         if thread is None or thread.failure or not thread.dropped:
             return

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
 from typing import Any
 
 from roboglot.model.components.energy.battery import Battery
@@ -20,7 +19,7 @@ from roboglot.model.inputs.outside import Input
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 from roboglot.model.tap import Exchange
-from roboglot.recording.entries import Entry
+from roboglot.recording.entries import Entry, Put
 from roboglot.recording.messages import plain
 from roboglot.recording.readings import readings_of
 from roboglot.recording.redaction import FILES, without_picture
@@ -29,7 +28,6 @@ POSE_PERIOD = 0.1  # s
 CAMERA_PERIOD = 1.0  # s between two checks for a camera
 STATE_BEATS = 10  # poses between two readings of values that change rarely
 MAP_BEATS = 50
-Put = Callable[[Entry], object]
 
 
 class Stamps:
@@ -55,7 +53,10 @@ class Sampler:
         """``video``: record the camera; ``photos``: record photos of a real robot, too."""
         self._robot, self._put, self._photos = robot, put, photos
         self._stamps = Stamps(robot)
-        self._topic = f"/{robot.id}"
+        self._topic, self._pose_topic, self._scan_topic = f"/{robot.id}", f"/{robot.id}/pose", f"/{robot.id}/scan"
+        self._map, self._odom, self._base, self._laser = (
+            f"{robot.id}/{frame}" for frame in ("map", "odom", "base_link", "laser")
+        )
         self._before: dict[str, object] = {}
         self._scan_mount: Pose = ORIGIN
         self._shown = False
@@ -86,10 +87,10 @@ class Sampler:
         self._before.clear()
         self._shown = False
 
-    def beat(self, number: int) -> None:
-        """Sample poses; every ``STATE_BEATS`` beats the other values, too."""
+    def beat(self, number: int, put: Put | None = None) -> None:
+        """Sample poses; every ``STATE_BEATS`` beats the other values, too. ``put`` gets them, if given."""
         at, wall = self._stamps.now()
-        self._note_places(at, wall)
+        self._note_places(at, wall, put or self._put)
         if number % STATE_BEATS == 0:
             self._note_state(at, wall)
         if number % MAP_BEATS == 0:
@@ -121,7 +122,7 @@ class Sampler:
 
     def _note_scan(self, scan: LaserScan, wall: int) -> None:
         self._scan_mount = scan.mount
-        self._send("scan", "scan", (f"{self._robot.id}/laser", scan), self._stamps.at(scan.stamp), wall)
+        self._put(Entry(self._scan_topic, "scan", self._stamps.at(scan.stamp), wall, (self._laser, scan)))
 
     async def _film(self) -> None:
         from roboglot.media.video import VideoStream  # the libraries are an extra
@@ -136,28 +137,28 @@ class Sampler:
 
     # -- readings ------------------------------------------------------------------------------------------------------
 
-    def _note_places(self, at: int, wall: int) -> None:
-        robot, name = self._robot, self._robot.id
+    def _note_places(self, at: int, wall: int, put: Put) -> None:
+        robot = self._robot
         if not was_heard(robot):
             return
-        frames: list[tuple[str, str, Pose]] = []
         odometry = robot[Odometry].reading.pose if Odometry in robot else None
         pose = robot[Localization].pose if Localization in robot else None
         if pose is not None:
-            self._send("pose", "pose", (f"{name}/map", pose), at, wall)
+            put(Entry(self._pose_topic, "pose", at, wall, (self._map, pose)))
+        if (place := odometry or pose) is None:
+            return
+        frames = [(self._odom, self._base, place), (self._base, self._laser, self._scan_mount)]
+        if pose is not None:
             origin = ORIGIN if odometry is None else pose.compose(odometry.inverse())
-            frames.append((f"{name}/map", f"{name}/odom", origin))
-        if (place := odometry or pose) is not None:
-            frames.append((f"{name}/odom", f"{name}/base_link", place))
-            frames.append((f"{name}/base_link", f"{name}/laser", self._scan_mount))
-            self._put(Entry("/tf", "transforms", at, wall, tuple(frames)))
+            frames.insert(0, (self._map, self._odom, origin))
+        put(Entry("/tf", "transforms", at, wall, tuple(frames)))
 
     def _note_state(self, at: int, wall: int) -> None:
         robot = self._robot
         if not self._shown:
             self._shown = True
             plate = robot.description
-            figure = (robot.id, f"{robot.id}/base_link", ORIGIN, plate.radius, plate.height, True)
+            figure = (robot.id, self._base, ORIGIN, plate.radius, plate.height, True)
             self._send("body", "scene", (figure,), at, wall)
         if Battery in robot and was_heard(robot):
             self._send_changed("battery", "battery", plain(robot[Battery].state), at, wall)
@@ -179,7 +180,7 @@ class Sampler:
             mapping = self._robot[Mapping]
             if self._before.get("map") != mapping.revision and (grid := mapping.grid).width:
                 self._before["map"] = mapping.revision
-                self._send("map", "grid", (f"{self._robot.id}/map", grid), at, wall)
+                self._send("map", "grid", (self._map, grid), at, wall)
 
     def _send_changed(self, topic: str, kind: str, value: object, at: int, wall: int) -> None:
         if self._before.get(topic) != value:

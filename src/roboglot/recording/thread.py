@@ -63,6 +63,20 @@ class WriterThread:
             self._weight += weight
             return True
 
+    def put_all(self, entries: Sequence[Entry]) -> None:
+        """Queue entries of one instant; locks once for all."""
+        if self._patient:
+            for entry in entries:
+                self.put(entry)
+            return
+        weight = sum([entry.weight for entry in entries])
+        with self._lock:
+            if self.failure or self._ending or self._full(weight):
+                self.dropped += len(entries)
+            else:
+                self._queue += entries
+                self._weight += weight
+
     def settle(self, patience: float = 10.0) -> None:
         """Return when everything queued now is in the sink, or after ``patience`` s."""
         with self._room:

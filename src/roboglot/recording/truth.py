@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
 from roboglot.model.stage import Stage
-from roboglot.recording.entries import Entry
+from roboglot.recording.entries import Entry, Put
 from roboglot.recording.messages import plain
 
 SELDOM_BEATS = 5
@@ -15,25 +14,25 @@ THING = 0.1, 0.2
 
 
 class TruthSampler:
-    """Samples the stage; ``put`` gets the entries."""
+    """Samples the stage."""
 
-    def __init__(self, stage: Stage, put: Callable[[Entry], object]) -> None:
-        self._stage, self._put = stage, put
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
         self._before: object = None
 
     def again(self) -> None:
         """Report standing values again."""
         self._before = None
 
-    def beat(self, number: int, at: int) -> None:
+    def beat(self, number: int, at: int, put: Put) -> None:
         """Sample once; ``at``: ns since 1970."""
         wall = time.time_ns()
         for placed in self._stage.robots:
-            self._put(Entry(f"/truth/{placed.name}/pose", "pose", at, wall, ("world", placed.pose)))
+            put(Entry(f"/truth/{placed.name}/pose", "pose", at, wall, ("world", placed.pose)))
         if number % SELDOM_BEATS == 0:
-            self._look_around(at, wall)
+            self._look_around(at, wall, put)
 
-    def _look_around(self, at: int, wall: int) -> None:
+    def _look_around(self, at: int, wall: int, put: Put) -> None:
         stage = self._stage
         figures = tuple(
             (placed.name, "world", placed.pose, *size, False)
@@ -41,8 +40,8 @@ class TruthSampler:
             for placed in placed_there
         )
         if figures:
-            self._put(Entry("/truth/figures", "scene", at, wall, figures))
+            put(Entry("/truth/figures", "scene", at, wall, figures))
         state = {"faults": plain(list(stage.faults)), "obstacles": plain(list(stage.obstacles))}
         if state != self._before:
             self._before = state
-            self._put(Entry("/truth/state", "state", at, wall, state))
+            put(Entry("/truth/state", "state", at, wall, state))
