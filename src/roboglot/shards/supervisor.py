@@ -22,7 +22,7 @@ from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.shard import SETTINGS
 
 log = logging.getLogger(__name__)
-STARTING_MAX = max(2, os.cpu_count() or 2)  # at the same time; more would only compete for processors
+STARTING_MAX = 2 * max(2, os.cpu_count() or 2)  # at the same time; a shard waits for the disk half of its start
 SILENCE_MAX = 10.0  # s without a heartbeat after which a shard counts as hung
 START_MAX = 60.0  # s for a shard to become ready
 STOP_MAX = 12.0  # s for it to close
