@@ -110,7 +110,8 @@ class AccessConfig:
 
     ``local``: programs on this machine need no credentials. Limits: ``requests`` and ``bytes`` (both directions) per
     second and client, simultaneous ``connections`` per address and door of a robot, ``logins`` (wrong passwords) per
-    minute and address. ``gateway``: "HOST:PORT" for `roboglot connect`; empty: none.
+    minute and address. ``gateway``: "HOST:PORT" for `roboglot connect`; empty: none. ``people``: the folder with the
+    list of who may do what; empty: the data folder.
     """
 
     on: bool = False
@@ -120,6 +121,7 @@ class AccessConfig:
     connections: Limit = 64
     logins: Limit = 10
     gateway: str = ""
+    people: str = ""
     tls: TlsConfig = field(default_factory=TlsConfig)
 
 

@@ -19,6 +19,7 @@ from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig
 from roboglot.operations import Right
 from roboglot.shards.classes import FleetClasses
+from roboglot.shards.plan import checked, plan_fleet
 from tests.console.conftest import ADDRESS, OTHER_ADDRESS, Shown
 from tests.console.test_classes import asked, grid, opened, world
 from tests.console.test_studio_socket import SAVE, Page
@@ -101,3 +102,49 @@ async def test_an_old_class_lets_nobody_in(tmp_path: Path, monkeypatch: pytest.M
         await grid(teacher, name="Anna")
         status, answer, _ = await signed(shown, name="Ben", code=code)
         assert (status, answer["error"]) == (401, "this class is over, unless its teacher comes back")
+
+
+async def test_rights_that_are_gained_reach_open_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    (tmp_path / "w").mkdir()
+    store = open_store(tmp_path / "w")
+    store.allow("127.0.0.1", [Grant("*", frozenset({Right.SEE}))])
+    access = AccessConfig(on=True, local=False)
+    async with (
+        world(tmp_path, "w", ADDRESS, shared=False, access=access) as shown,
+        connect(shown.url.replace("http", "ws") + "/live", max_size=None) as page,
+        asyncio.timeout(60),
+    ):
+
+        async def rights() -> list[str]:
+            while True:
+                text = await page.recv()
+                if isinstance(text, str) and (message := json.loads(text))["type"] == "hello":
+                    return [right for robot in message["robots"] for right in robot["rights"]]
+
+        assert await rights() == ["see"]
+        store.allow("127.0.0.1", [Grant("*", frozenset({Right.DRIVE}))])
+        assert shown.runtime.guard is not None
+        shown.runtime.guard.reload()  # it looks by itself once a second
+        assert await rights() == ["see", "drive"]
+    store.close()
+
+
+async def test_one_list_lets_people_into_all_worlds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    plan = plan_fleet(2, 1, {"access": {"local": False}}, tmp_path)
+    asking = checked(plan.shards[1]).access
+    assert asking == checked(plan.shards[0]).access
+    store = open_store(tmp_path)
+    store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
+    async with (
+        world(tmp_path, "w1", ADDRESS, shared=False, access=asking) as first,
+        world(tmp_path, "w2", OTHER_ADDRESS, shared=False, access=asking) as second,
+    ):
+        assert [(await signed(one, name="mx", password=PASSWORD))[0] for one in (first, second)] == [200, 200]
+        store.revoke("mx")
+        for one in (first, second):
+            assert one.runtime.guard is not None
+            one.runtime.guard.reload()
+            assert (await signed(one, name="mx", password=PASSWORD))[0] == 401
+    store.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
@@ -15,6 +16,7 @@ from roboglot.access.session_file import KeptSession, SessionFile, seal
 from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig
 from roboglot.console.people.sessions import LIFETIME, Sessions
+from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, ProofKind
 from roboglot.operations import Right
 from tests.console.conftest import ADDRESS, Shown
@@ -125,3 +127,41 @@ async def test_a_class_goes_on_after_a_restart(tmp_path: Path, monkeypatch: pyte
         async with asyncio.timeout(60):  # they are put out one by one
             while await names(shown, *again) != ["mx", "", ""]:  # also who did not come back with a page
                 pass
+
+
+def lesson(url: str, cookie: str, **wish: object) -> dict[str, Any]:
+    """Return the class of the console's own page after a wish of its teacher."""
+    data = json.dumps(wish).encode() if wish else None
+    with urlopen(Request(f"{url}/api/class", data=data, headers={"Cookie": cookie}), timeout=60) as reply:
+        found: dict[str, Any] = json.loads(reply.read())
+        return found
+
+
+async def test_consoles_class_takes_pupils_after_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    asking = AccessConfig(on=True, local=False)
+    (tmp_path / "w").mkdir()
+    store = open_store(tmp_path / "w")
+    store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
+    store.close()
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+        _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
+        code = str((await asyncio.to_thread(lesson, shown.url, teacher, do="open", name="7b"))["code"])
+        _, anna, _ = await signed(shown, name="Anna", code=code)
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+        teacher = f"roboglot-{shown.url.rpartition(':')[2]}={teacher.partition('=')[2]}"
+        assert (await signed(shown, name="Anna", code=code))[:2] == (200, anna)
+        assert (await signed(shown, name="Cem", code=code))[0] == 200
+        left = await asyncio.to_thread(lesson, shown.url, teacher)
+        assert (left["code"], left["name"]) == (code, "7b")
+        assert [pupil["name"] for pupil in left["pupils"]] == ["Anna", "Cem"]
+        assert await asyncio.to_thread(lesson, shown.url, teacher, do="close") == {}
+        assert (await signed(shown, name="Anna", code=code))[0] == 401
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+        assert (await signed(shown, name="Cem", code=code))[0] == 401
+
+
+def test_setting_the_clock_changes_no_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, before = SteadyTime(), time.time()
+    monkeypatch.setattr(time, "time", lambda: before + 86400.0)
+    assert before - 1.0 < now() < before + 3600.0

@@ -61,7 +61,8 @@ class Guard:
     """Guard of all robots. ``start`` begins to follow the list; ``reload`` reads it at once.
 
     ``shared``: a server's database with list and audit of a fleet, closed by its owner; without it, both are files in
-    ``folder``. Raises OSError, ValueError, sqlite3.Error, DatabaseError.
+    ``folder``, the list perhaps in another (``config.people``). Raises OSError, ValueError, sqlite3.Error,
+    DatabaseError.
     """
 
     def __init__(
@@ -75,7 +76,7 @@ class Guard:
     ) -> None:
         self.config = config
         self.now = now
-        self._store = AccessStore(shared) if shared else open_store(folder)
+        self._store = AccessStore(shared) if shared else open_store(Path(config.people) if config.people else folder)
         self._trail = Trail(shared) if shared else open_trail(folder)
         self._own = () if shared else (self._store, self._trail)
         self.audit = audit.Audit(self._trail)
@@ -202,6 +203,7 @@ class RobotAdmission(Admission):
         self._needs: dict[str, Right] = {}
         self._allowed: dict[tuple[str, str], Right] = {}  # the right that sufficed; cleared when rights change
         self._listeners: list[Callable[[str], None]] = []
+        self._gains: list[Callable[[str], None]] = []
         self._releasing: asyncio.Future[None] | None = None
         self._offers: dict[int, tuple[asyncio.Server, Callable[[], asyncio.Protocol]]] = {}
         robot.admission = self
@@ -283,6 +285,10 @@ class RobotAdmission(Admission):
         """See ``Admission.offered``."""
         return self._offers.get(port)
 
+    def on_gained(self, listener: Callable[[str], None]) -> None:
+        """Call ``listener`` with each identity that gains a right."""
+        self._gains.append(listener)
+
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with each identity that loses a right."""
         self._listeners.append(listener)
@@ -297,6 +303,9 @@ class RobotAdmission(Admission):
             lost = rights - self._rights.get(who, NOTHING)
             if lost or (who in replaced and rights):
                 self._stop(who, cut=Right.DRIVE in lost or who in replaced)
+        for who in [who for who, rights in self._rights.items() if rights - before.get(who, NOTHING)]:
+            for listener in self._gains:
+                listener(who)
 
     def settle_control(self) -> None:
         """Release control that was kept over a restart for a client that may no longer drive."""

@@ -62,6 +62,7 @@ class Application:
         self._signing = Signing(desk, self._login, self._classes)
         for robot in desk.robots.values():
             robot.admission.on_lost(self._close_pages_of)
+            robot.admission.on_gained(self._renew_pages_of)
         self._metrics: Metrics | None = None  # from the first scrape onwards
 
     async def close(self) -> None:
@@ -217,6 +218,11 @@ class Application:
     async def _put_out(self, who: str) -> None:
         await self._login.end_all_of(who)
         self._close_pages_of(who)
+
+    def _renew_pages_of(self, who: str) -> None:
+        for page in self.pages:
+            if page.person == who:
+                page.begin_anew()
 
     def _close_pages_of(self, who: str) -> None:
         for listening in [task for task, owner in self._listening.items() if owner == who]:

@@ -97,13 +97,18 @@ class Page:
         self._allowance, self._counted_at = float(MESSAGES_PER_SECOND_MAX), time.monotonic()
         self._due = asyncio.Event()
         self._refused = ""
+        self.person = identity()
+        self._anew = True
 
     # -- out -----------------------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
         """Send until cancelled."""
-        await self._send_message({"type": "hello", **self._desk.hello(), "now": milliseconds()})
         while True:
+            if self._anew:
+                self._anew = False
+                self._sent.clear()
+                await self._send_message({"type": "hello", **self._desk.hello(), "now": milliseconds()})
             await self._due.wait()
             self._due.clear()
             while not self._replies.empty():
@@ -118,6 +123,11 @@ class Page:
     def moving(self) -> bool:
         """True if the page draws a robot and needs updates as often as possible."""
         return self._watch.moving
+
+    def begin_anew(self) -> None:
+        """Send robots and rights again: they have changed."""
+        self._anew = True
+        self._due.set()
 
     def beat(self, number: int) -> None:
         """Trigger an update; a page that is still sending skips it."""

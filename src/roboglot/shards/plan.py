@@ -77,6 +77,8 @@ def plan_fleet(
         settings["robots"] = [
             {**robot, "name": f"{robot.get('name', 'a')}{number}", "address": next(addresses)} for robot in robots
         ]
+        if "access" in template:  # one list of people for all worlds
+            settings["access"] = {"people": str(data), **template["access"]}
         settings["console"] = _console(template, settings["robots"][0]["address"], number)
         settings["seed"] = int(template.get("seed", 1)) + number - 1
         shards.append(ShardPlan(f"w{number}", settings))

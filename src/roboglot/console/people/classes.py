@@ -1,15 +1,14 @@
 """Classes: a teacher opens one for the robots here, pupils join by its code and get a robot each.
 
 With access control, a pupil is a guest with the right to program only that robot, for the lesson. A locked robot moves
-only for the teacher. A class ends with the program; after a restart its pupils, like those of the studio's classes, are
-in the studio's class with its code, with their robots.
+only for the teacher. A class outlives the program, with its pupils' robots, until its time is over.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import secrets
-import time
 from collections.abc import Awaitable, Callable, Collection
 from dataclasses import field
 from typing import Annotated, Literal
@@ -20,6 +19,8 @@ from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem
 from roboglot.console.people.sessions import Session
 from roboglot.console.studio import class_wishes, classroom
+from roboglot.console.studio.class_files import KeptLesson, LessonFile
+from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, Right
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
@@ -85,11 +86,13 @@ class Classes:
         stop: Callable[[str], Awaitable[None]],
         present: Callable[[], Collection[str]],
         put_out: Callable[[str], Awaitable[None]],
-        now: Callable[[], float] = time.monotonic,
+        now: Callable[[], float] | None = None,
     ) -> None:
         self._desk, self._room, self._stop = desk, room, stop
-        self._present, self._put_out, self._now = present, put_out, now
-        self._lesson: Lesson | None = None
+        self._present, self._put_out, self._now = present, put_out, now or SteadyTime()
+        self._file = LessonFile(desk.studio.classes) if desk.studio.classes is not None else None
+        self._writing = asyncio.Lock()
+        self._lesson = self._restored()
         self._studio: dict[str, Lesson] = {}  # classes opened in the studio, in this world or another
 
     # -- pupils --------------------------------------------------------------------------------------------------------
@@ -134,17 +137,46 @@ class Classes:
         proof = await admission.invite(identity, frozenset({Right.PROGRAM}), lesson.until - self._now())
         seat = lesson.seats[identity] = Seat(identity, robot, lesson.code, proof, lesson is not self._lesson)
         self._desk.pupils.add(identity)
+        await self._save(lesson)
         return seat
 
     def _least_used(self, lesson: Lesson) -> str:
         taken = [seat.robot for seat in lesson.seats.values()]
         return min(self._desk.robots, key=taken.count)
 
+    def _restored(self) -> Lesson | None:
+        """Return the class that was open when the program ended, with its pupils and locked robots."""
+        kept = self._file.load() if self._file is not None else None
+        if kept is None or kept.until <= self._now():
+            return None
+        lesson = Lesson(kept.code, kept.name, kept.until)
+        for identity, robot in kept.seats.items():
+            if robot in self._desk.robots:
+                lesson.seats[identity] = Seat(identity, robot, kept.code, None, studio=False)
+                self._desk.pupils.add(identity)
+        for name, here in self._desk.robots.items():
+            if Lease in here and here[Lease].client == TEACHER:
+                self._desk.locked.add(name)
+        return lesson
+
+    async def _save(self, changed: Lesson) -> None:
+        """Write the class of this console's page, if it has changed, or that there is none."""
+        if self._file is None or (self._lesson is not None and changed is not self._lesson):
+            return
+        async with self._writing:
+            now = self._lesson
+            seats = {seat.identity: seat.robot for seat in now.seats.values()} if now is not None else {}
+            kept = KeptLesson(now.code, now.name, now.until, seats) if now is not None else None
+            await asyncio.to_thread(self._file.keep, kept)
+
     def restore(self, session: Session) -> None:
         """Return a pupil, whose session outlived the program, to the class with the same robot."""
         if session.code and session.robot in self._desk.robots:
-            lesson = self._studio.setdefault(session.code, Lesson(session.code, "", 0.0))
-            lesson.seats[session.name] = Seat(session.name, session.robot, session.code, None, studio=True)
+            lesson = self._lesson if self._lesson is not None and session.code == self._lesson.code else None
+            if lesson is None:
+                lesson = self._studio.setdefault(session.code, Lesson(session.code, "", 0.0))
+            in_studio = lesson is not self._lesson
+            lesson.seats[session.name] = Seat(session.name, session.robot, session.code, None, in_studio)
             self._desk.pupils.add(session.name)
 
     async def end(self, code: str) -> None:
@@ -198,6 +230,7 @@ class Classes:
                 await self._give_back(lesson, seat)
         if wish.do == "close":
             self._lesson = None
+            await self._save(lesson)
             with contextlib.suppress(Refused):
                 await self._room.close(lesson.code)
         return self.look()
@@ -207,6 +240,7 @@ class Classes:
             raise Refused(f"class {self._lesson.code} is open")
         code = "".join(secrets.choice(classroom.CODE_LETTERS) for _ in range(classroom.CODE_LENGTH))
         self._lesson = Lesson(code, wish.name.strip(), self._now() + wish.minutes * 60.0)
+        await self._save(self._lesson)
         await self._room.open(code, wish.name.strip())  # the studio's page uses the same code to join
 
     async def _do_with(self, do: str, name: str) -> None:
@@ -229,6 +263,7 @@ class Classes:
     async def _give_back(self, lesson: Lesson, seat: Seat) -> None:
         """Release a pupil's robot; the pupil must join again."""
         del lesson.seats[seat.identity]
+        await self._save(lesson)
         self._desk.pupils.discard(seat.identity)
         if seat.robot in self._desk.locked and seat.robot not in {left.robot for left in lesson.seats.values()}:
             self._desk.locked.discard(seat.robot)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
 from roboglot.access.session_file import KeptSession, SessionFile, seal, unseal
+from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import NO_PROOF, Proof
 from roboglot.values import dataclass
 
@@ -41,9 +41,9 @@ class Sessions:
     Raises DatabaseError if it cannot be read.
     """
 
-    def __init__(self, file: SessionFile | None = None, now: Callable[[], float] = time.time) -> None:
-        self._file, self._now = file, now
-        left = file.load(now()) if file is not None else []
+    def __init__(self, file: SessionFile | None = None, now: Callable[[], float] | None = None) -> None:
+        self._file, self._now = file, now or SteadyTime()
+        left = file.load(self._now()) if file is not None else []
         self._sessions = {kept.key: Session(NO_PROOF, kept.name, kept.until, kept.robot, kept.code) for kept in left}
         self._sealed = {kept.key: kept.sealed for kept in left}  # proofs of sessions not used since the start
 

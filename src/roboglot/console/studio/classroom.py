@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-import time
 from collections.abc import Awaitable, Callable
 from dataclasses import field
 from typing import Protocol
@@ -18,6 +17,7 @@ import msgspec
 
 from roboglot.console.studio.class_files import Bag, ClassFiles
 from roboglot.console.studio.class_wishes import Doing, Member
+from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.errors import NotFound, Refused
 from roboglot.values import dataclass
 
@@ -143,8 +143,8 @@ class Room(Protocol):
 class Classroom:
     """All classes of one console, or of the consoles of all ``worlds``. What pupils hand in is kept in ``files``."""
 
-    def __init__(self, files: ClassFiles | None = None, now: Callable[[], float] = time.time) -> None:
-        self._files, self._writing, self.now = files, asyncio.Lock(), now
+    def __init__(self, files: ClassFiles | None = None, now: Callable[[], float] | None = None) -> None:
+        self._files, self._writing, self.now = files, asyncio.Lock(), now or SteadyTime()
         self.worlds: dict[str, World] = {}
         self.classes: dict[str, Class] = {}
         for sheet in files.load() if files else []:
