@@ -203,7 +203,7 @@ class WarmParent:
 def become(wanted: Wanted, descriptors: list[int]) -> NoReturn:
     """Become the command, in the fork: with all that its caller would have given it."""
     try:
-        os.setsid()
+        os.setpgid(0, 0)  # in our session, so that the commands of one caller share its part of the processors
         for number, descriptor in enumerate([os.dup(given) for given in descriptors]):
             os.dup2(descriptor, number)
         os.closerange(3, min(os.sysconf("SC_OPEN_MAX"), DESCRIPTORS_MAX))
