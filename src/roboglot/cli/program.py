@@ -344,6 +344,8 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
 
     with tempfile.TemporaryDirectory() as folder:
         database, engine = Database(Path(folder) / "roboglot.db"), Engine()
+        engine.open_soon()
+        await asyncio.sleep(0)  # its process loads while we build the world
         robots = (RobotConfig(body=body),)
         fleet = build_fleet(world, robots, clock=RealClock(speed), seed=1, database=database)
         robot = fleet.robots[robots[0].name]
