@@ -162,6 +162,24 @@ async def test_a_closed_world_stands_still(simulate):
     assert sim.pose == there
 
 
+async def test_a_world_started_again_beats_once():
+    clock = Jumping()
+    world = World(load_world("empty"), [RobotPlacement("a", start=Pose(2, 5))], clock=clock)
+    robot = Robot("a", world.description_of("a"), clock)
+    world.equip(robot)
+    world.start()
+
+    def again(_event):
+        world.close()
+        world.start()
+
+    robot.events.listen(ScanTaken, again)  # in the middle of a tick
+    for _ in range(20):
+        clock.leap(TICK)
+        assert len(clock.waiting) == 1
+    world.close()
+
+
 class Jumping(Clock):
     """A clock whose owner is too slow: time leaps whenever it likes."""
 

@@ -118,7 +118,7 @@ class Pieces(asyncio.Transport):
         self.all.append(b"closed")
 
 
-def test_heads_go_out_with_their_bodies() -> None:
+async def test_heads_go_out_with_their_bodies() -> None:
     head, large = b"HTTP/1.1 200 OK\r\na: b\r\n\r\n", bytes(JOINED_MAX + 1)
     transport = ReasonTransport(pieces := Pieces())
     for data in (head, b"body", b"more", head, b"", head, large):
@@ -131,6 +131,12 @@ def test_heads_go_out_with_their_bodies() -> None:
     transport.write(head)
     transport.close()
     assert pieces.all == [head, b"HTTP/1.1 100 Continue\r\n\r\n", head, b"closed"]
+    pieces.all.clear()
+    transport.write(head)  # of an answer whose body comes later
+    await asyncio.sleep(0)
+    assert pieces.all == [head]
+    transport.write(b"body")
+    assert pieces.all == [head, b"body"]
 
 
 async def test_a_head_alone_is_answered_at_once(bare_client: httpx.AsyncClient) -> None:

@@ -35,7 +35,8 @@ _TOO_LARGE = (
 class ReasonTransport(asyncio.Transport):
     """Passes everything on, but moves the header REASON of a response into its status line.
 
-    A response's head waits for its body: one piece for the system, and for the network, is quicker than two.
+    A response's head waits until the loop's next turn for its body: one piece for the system, and for the network, is
+    quicker than two.
     """
 
     def __init__(self, transport: asyncio.Transport) -> None:
@@ -67,6 +68,7 @@ class ReasonTransport(asyncio.Transport):
         if isinstance(data, bytes) and data.startswith(_STATUS) and not data.startswith(_CONTINUE):
             self.flush()
             self._head = with_reason(data)
+            asyncio.get_running_loop().call_soon(self.flush)  # for a body that comes later
         elif self._head and len(data) <= JOINED_MAX:
             head, self._head = self._head, b""
             self._inner.write(head + data)

@@ -10,7 +10,7 @@ import contextlib
 import logging
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 
 import numpy as np
@@ -200,7 +200,7 @@ class World:
         if self._timer is None:
             self._origin = self._clock.time() - self._ticks * TICK
             self._clock.reached(self.time)
-            self._timer = self._clock.call_at(self._due(), self._beat)
+            self._arm()
 
     def close(self) -> None:
         """Stop."""
@@ -216,33 +216,36 @@ class World:
     def _due(self) -> float:
         return self._origin + (self._ticks + 1) * TICK
 
-    def _beat(self) -> None:
-        self._clock.in_turn(self._advance, first=True)
+    def _arm(self) -> None:
+        self._timer = self._clock.call_at(self._due(), self._beat)
 
-    def _advance(self) -> None:
+    def _beat(self) -> None:
+        self._clock.in_turn(partial(self._advance, self._timer), first=True)
+
+    def _advance(self, fired: Timer | None) -> None:
         """Do a tick that is due; other tasks get their turn before the next one, even if it is due as well.
 
         A machine that is too slow skips robot time instead of catching up.
         """
-        if self._timer is None:
-            return  # closed
+        if self._timer is None or self._timer is not fired:
+            return  # closed, and perhaps started again
         due = int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
         if due > BEHIND_MAX:
             self._origin += (due - 1) * TICK
             self._pace.skip((due - 1) * TICK)
             due = 1
         self._pace.look(self._clock.time())
-        self._clock.in_steps(self._steps(due > 0))
+        self._clock.in_steps(self._steps(due > 0, fired))
 
-    def _steps(self, due: bool) -> Iterator[None]:
+    def _steps(self, due: bool, fired: Timer) -> Iterator[None]:
         """Do the steps of a tick, if it is ``due``, and schedule the next one."""
         if due:
             for _ in self._tick():
                 yield
-                if self._timer is None:
-                    return  # closed meanwhile
+                if self._timer is not fired:
+                    return  # closed meanwhile, and perhaps started again, with a beat of its own
         self._clock.reached(self.time)
-        self._timer = self._clock.call_at(self._due(), self._beat)
+        self._arm()
 
     def _tick(self) -> Iterator[None]:
         self._ticks += 1
