@@ -155,7 +155,7 @@ def rest(served: Served, x: float) -> tuple[int, str]:
 async def test_two_browsers_and_rest_client_contend_for_control(served: Served, open_console: OpenConsole) -> None:
     anna, ben = await open_console("anna"), await open_console("ben")
     await anna.click("text=Take control")
-    await anna.wait_for_selector("text=You alone move this robot.")
+    await anna.wait_for_selector("text=Only you may move this robot.")
     assert served.robot[Lease].taken_by == "console anna"
     await ben.wait_for_selector("text=Only console anna may move this robot.")
     await ben.wait_for_selector("text=Scan fits map")
@@ -228,12 +228,12 @@ async def test_hands_break_and_mend_the_robot(served: Served, open_console: Open
     page = await open_console(view="world")
     await page.click("#tab-faults")
     await page.select_option("form select", "emergency_stop")
-    await page.click("text=Break it")
+    await page.click("button:has-text('Inject')")
     await until(lambda: len(served.runtime.fleet.world.hands.faults) == 1)
     await served.clock.advance(0.2)
     assert served.robot[EmergencyStop].engaged
     await page.wait_for_selector(".banner.bad")
-    await page.click("text=Mend")
+    await page.click("li button:has-text('Clear')")
     await until(lambda: len(served.runtime.fleet.world.hands.faults) == 0)
     await served.clock.advance(0.2)
 

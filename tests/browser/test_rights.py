@@ -43,7 +43,7 @@ BUTTONS = {
     "stop": ("live", "", ".stop"),
     "drive": ("live", "#tab-state", "button:has-text('Take control')"),
     "draw": ("world", "#tab-drawn", "button:has-text('Save the map')"),
-    "break": ("world", "#tab-faults", "button:has-text('Break it')"),
+    "break": ("world", "#tab-faults", "button:has-text('Inject')"),
 }
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
 TRY = "(body) => fetch('/api/sign_in', {method: 'POST', body}).then((reply) => reply.status)"
@@ -133,7 +133,7 @@ async def offered(page: Page, what: str) -> bool:
     await page.wait_for_selector(button)
     off = await page.get_attribute(button, "aria-disabled") == "true"
     if off:
-        assert "needs the right to" in await page.get_attribute(button, "title")
+        assert "lack the right to" in await page.get_attribute(button, "title")
     return not off
 
 
@@ -293,7 +293,7 @@ async def test_pupils_join_by_code_and_the_teacher_leads(guarded: Guarded, open_
     record = "fetch('/api/recording', {method: 'POST', body: '{\"do\": \"start\"}'}).then((r) => r.status)"
     assert await pupils[0].evaluate(record) == 403
     emils = shown[0][0][-1]
-    await teacher.wait_for_selector(".tile:has-text('Frida'):has-text('is here')")
+    await teacher.wait_for_selector(".tile:has-text('Frida'):has-text('here')")
     if folder := os.environ.get("ROBOGLOT_PICTURES"):
         await teacher.screenshot(path=f"{folder}/class.png")
 

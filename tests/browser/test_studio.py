@@ -275,7 +275,7 @@ async def test_simulated_picture_has_the_frame_of_the_map(studio: Open, opened: 
     shown = await page.evaluate("['.world canvas', 'canvas.trace'].map(c => document.querySelector(c).turned)")
     world.hands.place("a", before)
     await page.locator("canvas.trace").locator("xpath=preceding::button[1]").click()
-    await shows(page, "document.querySelector('.notice').innerText", "The simulation is ended.")  # no refusal
+    await shows(page, "document.querySelector('.notice').innerText", "The simulation has ended.")  # no refusal
     assert shown[1] == pytest.approx(shown[0], abs=0.05)
     assert page.errors == []
 
@@ -304,7 +304,7 @@ async def test_key_pressed_without_link_counts_after_reconnection(studio: Open, 
     await shows(page, "document.querySelector('.phase').textContent", "State unknown")
     await until(page, "!document.querySelector('.lit')")
     await page.keyboard.press("F8")
-    await page.wait_for_selector("text=It is done as soon as the connection is back.")
+    await page.wait_for_selector("text=It will be done as soon as the connection is back.")
     broken.clear()
     await until(page, f"{held} === 'say'")
     await context.close()

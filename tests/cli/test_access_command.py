@@ -74,7 +74,7 @@ def test_the_audit_is_printed_and_verified(tmp_path: Path) -> None:
     with open_trail(tmp_path) as trail:
         trail.add([Entry(time.time(), "anna", "10.0.0.7:1", "a", "slamware", "DELETE /x", "done")])
     assert "anna 10.0.0.7:1 DELETE /x done" in call("audit", "--data", str(tmp_path)).stdout
-    assert "1 rows, whole" in call("audit", "--verify", "--data", str(tmp_path)).stdout
+    assert "1 rows are intact" in call("audit", "--verify", "--data", str(tmp_path)).stdout
 
 
 def test_rights_are_read_and_written() -> None:

@@ -31,11 +31,11 @@ def test_verdicts() -> None:
 
 
 def test_refused_requests_are_listed_with_their_reason(text: str) -> None:
-    section = text.partition("### What robomaster is refused on real robots")[2].partition("\n## ")[0]
+    section = text.partition("### Requests of robomaster that real robots refuse")[2].partition("\n## ")[0]
     (row,) = [line for line in section.splitlines() if "`blaster.fire`" in line]
     assert row.endswith("| no Blaster |  | no Blaster |")
     for protocol in (door.name for door in DOORS):
-        chapters, _, refused = text.partition(f"\n## {protocol}\n")[2].partition("\n## ")[0].partition("### What")
+        chapters, _, refused = text.partition(f"\n## {protocol}\n")[2].partition("\n## ")[0].partition("### Requests")
         rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in refused.splitlines()[4:] if line]
         for column, name in enumerate(DRIVERS, 1):
             listed = sum(row[0].count("`") // 2 for row in rows if row[column])
@@ -46,4 +46,4 @@ def test_refused_requests_are_listed_with_their_reason(text: str) -> None:
 def test_what_drivers_announce_is_what_they_add(text: str) -> None:
     """Components except those that autonomy adds, and those that only some robots have."""
     for name in DRIVERS:
-        assert f"## What `{name}` does nearly" in text
+        assert f"## Approximate parts of `{name}`" in text

@@ -19,34 +19,34 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "up": "start the robots with all their doors",
-    "fleet": "many worlds on this machine, each in a process of its own",
-    "demo": "four vendors' clients drive one robot, and a picture of it",
-    "coverage": "how much of each protocol is there",
-    "capabilities": "what each protocol can do on each kind of robot",
+    "fleet": "run many worlds, each in a process of its own",
+    "demo": "let four vendors' clients drive one robot, and draw a picture of it",
+    "coverage": "show how much of each protocol is implemented",
+    "capabilities": "show what each protocol can do on each kind of robot",
     "scan": "find robots on the network and show how to connect to them",
-    "access": "let people, machines and apps drive robots, and no longer",
-    "connect": "a robot behind a gateway as if it were on this machine",
-    "audit": "who changed what with which robot, and what was refused",
-    "lease": "who moves each robot; take control of one or all, give it, release it",
+    "access": "give people, machines and apps rights to robots, or revoke them",
+    "connect": "open the ports of a robot behind a gateway on this machine",
+    "audit": "show who changed what on which robot, and what was refused",
+    "lease": "show who moves each robot; take, give or release control",
     "stop": "stop a robot, or all of them",
-    "reset": "put a simulated robot back where it started, charged and whole",
-    "record": "record everything that robots say, hear and do; show and mend recordings",
-    "rerun": "run the world of a lockstep recording again with the same inputs, to the last byte",
+    "reset": "put a simulated robot back at its start, charged and without faults",
+    "record": "record everything that robots say, hear and do; show and repair recordings",
+    "rerun": "run a lockstep recording again and compare every byte",
     "replay": "send the requests of a recording to a robot again and compare its answers",
-    "export": "a recording as a bag of ROS 2",
-    "compare": "two recordings or robots, and how much of them agrees",
-    "fidelity": "how much the doors agree with what was published of real robots",
+    "export": "write a recording as a bag of ROS 2",
+    "compare": "compare two recordings or robots",
+    "fidelity": "compare the doors with published answers of real robots",
     "test": "play test scenarios (YAML) on simulated robots, with a JUnit report",
-    "campaign": "scenarios with many seeds, on all cores, into one table and one report",
-    "mirror": "live state of any robot in the terminal",
-    "map": "ROS maps to a robot, its map to a ROS map, and maps from recorded drives",
+    "campaign": "play scenarios with many seeds on all cores; one table, one report",
+    "mirror": "show the live state of any robot in the terminal",
+    "map": "import and export maps, build them from recorded drives, merge floors",
     "program": "check, run, save and list block programs, and read their logs",
-    "lesson": "play missions of the studio back: the solution, typical mistakes, a program",
-    "mcp": "robots as tools for agents, by the Model Context Protocol",
-    "cloud": "a back end for block programs: accounts, favourites, records",
+    "lesson": "check missions of the studio, or try a program in one",
+    "mcp": "offer robots as tools to agents over the Model Context Protocol",
+    "cloud": "run a back end for block programs: accounts, favourites, records",
     "cyberdog": "watch, drive and film a CyberDog 2, ours or a real one",
-    "certs": "the certificates that CyberDog clients need",
-    "doctor": "what is missing on this machine, and how to get it",
+    "certs": "write the certificates that CyberDog clients need",
+    "doctor": "show what is missing on this machine, and how to get it",
 }
 FLUSH_FAILED = 120  # Python's own exit status for it
 # Commands whose files have a folder of their own.
@@ -142,7 +142,7 @@ def _tolerate_plain_terminals() -> None:
 def _print_usage() -> None:
     print("usage: roboglot COMMAND [OPTIONS]\n\nOne robot, every protocol.\n")
     for command, meaning in COMMANDS.items():
-        print(f"  {command:10} {meaning}")
+        print(f"  {command:12} {meaning}")
     print("\nroboglot COMMAND --help lists the options of a command.")
 
 

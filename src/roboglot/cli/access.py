@@ -23,19 +23,19 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Let people, machines and apps drive robots, and no longer.",
+    help="Give people, machines and apps rights to robots, or revoke them.",
 )
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder of the robots' data.")]
 Database = Annotated[
-    str, typer.Option(envvar="ROBOGLOT_DATABASE", help="In place of the folder's list: postgresql://host/name.")
+    str, typer.Option(envvar="ROBOGLOT_DATABASE", help="postgresql://host/name, instead of the data folder.")
 ]
-Name = Annotated[str, typer.Argument(help="A name without blanks.")]
-Rights = Annotated[str, typer.Option(help="see, drive, program, edit, admin; several with commas.")]
-Robots = Annotated[str, typer.Option(help="Names of robots with commas; *: all.")]
-Until = Annotated[str, typer.Option(help="An instant: 18:00, or 2027-01-31T18:00.")]
-For = Annotated[str, typer.Option("--for", help="A time from now on: 2h, 45min, 30d.")]
+Name = Annotated[str, typer.Argument(help="The account's name, without blanks.")]
+Rights = Annotated[str, typer.Option(help="see, drive, program, edit, admin; separate several by commas.")]
+Robots = Annotated[str, typer.Option(help="Names of robots, separated by commas; *: all.")]
+Until = Annotated[str, typer.Option(help="End of the rights: 18:00, or 2027-01-31T18:00.")]
+For = Annotated[str, typer.Option("--for", help="Duration of the rights: 2h, 45min, 30d.")]
 
 
 @app.command()
@@ -45,14 +45,14 @@ def add(
     robots: Robots = ALL_ROBOTS,
     until: Until = "",
     lasts: For = "",
-    person: Annotated[bool, typer.Option("--person", help="A person, who has a password.")] = False,
+    person: Annotated[bool, typer.Option("--person", help="For a person; asks for a password.")] = False,
     cyberdog: Annotated[
-        Path | None, typer.Option(help="A CyberDog app: write its own certificate to this folder.")
+        Path | None, typer.Option(help="For a CyberDog app; writes its certificate to this folder.")
     ] = None,
     data: Data = None,
     database: Database = "",
 ) -> None:
-    """Add an account; a machine's token is printed, and known this once."""
+    """Add an account; print a machine's token, which cannot be shown again."""
     with _store(data, database) as store:
         grants = _grants(rights, robots, until, lasts)
         if person:
@@ -70,22 +70,22 @@ def add(
 
 @app.command()
 def allow(
-    address: Annotated[str, typer.Argument(help="Of the client's machine: 10.0.0.7")],
-    robot: Annotated[str, typer.Argument(help="Name of the robot; *: all.")],
+    address: Annotated[str, typer.Argument(help="Address of the client's machine, such as 10.0.0.7.")],
+    robot: Annotated[str, typer.Argument(help="Name of the robot; *: all robots.")],
     rights: Rights = "drive",
     until: Until = "",
     lasts: For = "",
     data: Data = None,
     database: Database = "",
 ) -> None:
-    """Let in whatever comes from an address: for clients that can show neither a token nor a certificate."""
+    """Give rights to an address, for clients that can show neither a token nor a certificate."""
     with _store(data, database) as store:
         store.allow(address, _grants(rights, robot, until, lasts))
 
 
 @app.command()
 def revoke(name: Name, data: Data = None, database: Database = "") -> None:
-    """Remove an account; what it had robots do ends."""
+    """Remove an account; its robots' actions end."""
     with _store(data, database) as store:
         store.revoke(name)
 
@@ -117,10 +117,12 @@ def list_all(data: Data = None, database: Database = "") -> None:
 
 @app.command()
 def copy(
-    database: Annotated[str, typer.Option(envvar="ROBOGLOT_DATABASE", help="To here: postgresql://host/name.")],
+    database: Annotated[
+        str, typer.Option(envvar="ROBOGLOT_DATABASE", help="The server to copy to: postgresql://host/name.")
+    ],
     data: Data = None,
 ) -> None:
-    """Copy the list of a data folder to a PostgreSQL server; names that are there already stay as they are there."""
+    """Copy the list of a data folder to a PostgreSQL server; names that the server already has are not changed."""
     if not database:
         sys.exit("roboglot access: to which --database?")
     with _store(data, "") as source, _store(None, database) as target:

@@ -19,15 +19,15 @@ LOOK_PERIOD = 0.5  # s
 
 
 def command(
-    robot: Annotated[str, typer.Option(help="Only of this robot.")] = "",
-    follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on with what comes.")] = False,
-    check: Annotated[bool, typer.Option("--verify", help="Check that no row was changed or taken away.")] = False,
+    robot: Annotated[str, typer.Option(help="Only rows of this robot.")] = "",
+    follow: Annotated[bool, typer.Option("--follow", "-f", help="Also print new rows as they come.")] = False,
+    check: Annotated[bool, typer.Option("--verify", help="Check that no row was changed or removed.")] = False,
     data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder of the robots' data.")] = None,
     database: Annotated[
-        str, typer.Option(envvar="ROBOGLOT_DATABASE", help="In place of the folder's: postgresql://host/name.")
+        str, typer.Option(envvar="ROBOGLOT_DATABASE", help="postgresql://host/name, instead of the data folder.")
     ] = "",
 ) -> None:
-    """Print the rows, oldest first. Robots with access control (--access) have them."""
+    """Print the rows of the audit, oldest first; it is written with access control (--access)."""
     folder = data or Config().data
     if not database and not (folder / FILE).exists():
         sys.exit(f"roboglot audit: there is none in {folder}: robots keep one with --access")
@@ -35,7 +35,7 @@ def command(
         with open_trail(folder, database) as trail:
             if check:
                 count, digest = trail.verify()
-                print(f"{count} rows, whole; keep this elsewhere to see later that none was cut off: {count} {digest}")
+                print(f"{count} rows are intact; keep this elsewhere to detect rows cut off later: {count} {digest}")
                 return
             last = _print(trail, robot, 0)
             while follow:

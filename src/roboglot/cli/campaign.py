@@ -28,15 +28,21 @@ KEPT_MAX = 10  # trials per scenario that keep recordings, maps and messages
 
 def command(
     paths: Annotated[list[Path], typer.Argument(help="Scenario files, or folders with them.")],
-    seeds: Annotated[int, typer.Option(min=1, max=SEEDS_MAX, help="So many seeds for each scenario.")] = 100,
-    first_seed: Annotated[int, typer.Option(min=0, help="The first of them.")] = 1,
-    workers: Annotated[int, typer.Option(min=0, max=10_000, help="Trials at once; 0: one a processor.")] = 0,
+    seeds: Annotated[int, typer.Option(min=1, max=SEEDS_MAX, help="Number of seeds for each scenario.")] = 100,
+    first_seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 1,
+    workers: Annotated[
+        int, typer.Option(min=0, max=10_000, help="Number of trials at once; 0: one for each processor.")
+    ] = 0,
     on: Annotated[
         str,
-        typer.Option(help="Where, as tasks of Ray: local, ray://HOST, HOST:PORT, auto; else in forked processes."),
+        typer.Option(
+            help="Run trials as tasks of Ray: local, ray://HOST, HOST:PORT or auto; else in forked processes."
+        ),
     ] = "",
-    out: Annotated[Path, typer.Option(help="Of table and report; what is in it is not played again.")] = OUT,
-    longest: Annotated[float, typer.Option(min=1, help="Real seconds after which a trial is ended.")] = 600.0,
+    out: Annotated[
+        Path, typer.Option(help="Folder for table and report; trials already in it are not repeated.")
+    ] = OUT,
+    longest: Annotated[float, typer.Option(min=1, help="Longest duration of a trial, in real seconds.")] = 600.0,
 ) -> None:
     """Play scenarios with many seeds. Ctrl-C keeps the results so far; the same command resumes."""
     from roboglot.testing.campaign.table import OtherCampaign, Table
@@ -103,7 +109,7 @@ def _play(left: list[Trial], table: Table, player: Player) -> bool:
     try:
         player(iter(left), leave, ended)
     except KeyboardInterrupt:
-        print(f"\ninterrupted: {number} of {len(left)} trials were played; the same command goes on", file=sys.stderr)
+        print(f"\ninterrupted: {number} of {len(left)} trials were played; the same command resumes", file=sys.stderr)
         return True
     return False
 

@@ -16,7 +16,7 @@ def command(
     export: Annotated[Path, typer.Option(help="Folder for ca-cert.pem, client-cert.pem and client-key.pem.")],
     data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The robot's data folder.")] = None,
 ) -> None:
-    """Write what a client needs to talk to the robot's gRPC door over mutual TLS."""
+    """Write the certificates and key with which a client connects to the robot's gRPC door over mutual TLS."""
     folder = load_config(None, {"data": str(data) if data else None}).data / "cyberdog"
     ensure_certificates(folder)
     try:

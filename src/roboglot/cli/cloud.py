@@ -22,16 +22,16 @@ def command(
     data: Annotated[Path, typer.Option(help="The SQLite file of accounts, favourites and records.")] = Path("cloud.db"),
     database: Annotated[
         str,
-        typer.Option(envvar="ROBOGLOT_CLOUD_DATABASE", help="In place of the file: postgresql://user@host/database."),
+        typer.Option(envvar="ROBOGLOT_CLOUD_DATABASE", help="postgresql://user@host/database, instead of the file."),
     ] = "",
-    address: Annotated[str, typer.Option(help="Where it listens.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 8030,
+    address: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0: any free one.")] = 8030,
     account: Annotated[
-        str, typer.Option(help="Open this account (or give it a new token), print the token, and end.")
+        str, typer.Option(help="Create this account, or renew its token; print the token and exit.")
     ] = "",
-    host: Annotated[list[str] | None, typer.Option(help="A name of this machine that clients use; repeat it.")] = None,
+    host: Annotated[list[str] | None, typer.Option(help="A host name that clients use; repeat for more.")] = None,
     insecure: Annotated[
-        bool, typer.Option("--insecure", help="Listen outside loopback: tokens pass there without encryption.")
+        bool, typer.Option("--insecure", help="Listen outside loopback, where tokens pass without encryption.")
     ] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
 ) -> None:

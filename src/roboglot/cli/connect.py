@@ -31,21 +31,25 @@ PORT = 50090
 
 def command(
     gateway: Annotated[
-        str, typer.Argument(help="HOST or HOST:PORT of the robots' gateway (\\[access] gateway there).")
+        str, typer.Argument(help="HOST or HOST:PORT of the robots' gateway (their \\[access] gateway).")
     ] = "",
-    robot: Annotated[list[str] | None, typer.Option(help="Its name there; repeat for more. Default: a.")] = None,
+    robot: Annotated[
+        list[str] | None, typer.Option(help="Name of a robot behind the gateway; repeat for more. Default: a.")
+    ] = None,
     token_file: Annotated[Path | None, typer.Option(help="A file with the token; else ROBOGLOT_TOKEN.")] = None,
-    address: Annotated[str, typer.Option(help="Of this machine, for the first robot; the others follow.")] = "",
+    address: Annotated[
+        str, typer.Option(help="Address of this machine for the first robot; the others follow it.")
+    ] = "",
     address_range: Annotated[
-        str, typer.Option(help="A network to take the addresses from: 127.0.1.0/24, or one of AnyIP: 10.99.0.0/24.")
+        str, typer.Option(help="Network for the addresses: 127.0.1.0/24, or with AnyIP 10.99.0.0/24.")
     ] = "",
     registry: Annotated[
-        str, typer.Option(help="Instead of a gateway: the registry's URL or file; follows robots that move.")
+        str, typer.Option(help="URL or file of a registry, instead of a gateway; follows robots that move.")
     ] = "",
     once: Annotated[bool, typer.Option("--once", help="End when a tunnel is lost.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every connection.")] = False,
 ) -> None:
-    """Open robots' vendor ports here, and carry them over one TLS connection each to the gateway."""
+    """Open the vendors' ports of robots on this machine, over one TLS connection each to the gateway."""
     set_up_logging(verbose)
     if bool(gateway) == bool(registry):
         sys.exit("roboglot connect: which robots: those of a gateway, or those of a --registry?")
@@ -59,7 +63,7 @@ def command(
         sys.exit("roboglot connect: a token is needed: --token-file FILE, or ROBOGLOT_TOKEN")
     for place in places:
         if not is_loopback(place):
-            print(f"roboglot connect: everyone who reaches {place} uses your token", file=sys.stderr)
+            print(f"roboglot connect: anyone who can reach {place} acts with your token", file=sys.stderr)
     where = registered(registry) if registry else _one(gateway)
     try:
         run(_keep_all(where, dict(zip(names, places, strict=True)), token.strip(), once=once))

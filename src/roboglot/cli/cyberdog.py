@@ -32,11 +32,14 @@ console = Console(highlight=False)
 
 def command(
     what: Annotated[str, typer.Argument(help=" · ".join(NAMES))],
-    words: Annotated[list[str] | None, typer.Argument(help="What it takes; see below.")] = None,
-    robot: Annotated[str, typer.Option(envvar="ROBOGLOT_CYBERDOG", help="Its address.")] = "127.0.0.1",
+    words: Annotated[list[str] | None, typer.Argument(help="Arguments of the command; see below.")] = None,
+    robot: Annotated[str, typer.Option(envvar="ROBOGLOT_CYBERDOG", help="The dog's address.")] = "127.0.0.1",
     certs: Annotated[Path | None, typer.Option(help="Folder with the client's certificates.")] = None,
-    data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Else those of this data folder.")] = None,
-    plaintext: Annotated[bool, typer.Option("--plaintext", help="Without TLS.")] = False,
+    data: Annotated[
+        Path | None,
+        typer.Option(envvar="ROBOGLOT_DATA", help="Data folder whose certificates are used without --certs."),
+    ] = None,
+    plaintext: Annotated[bool, typer.Option("--plaintext", help="Connect without TLS.")] = False,
     app_port: Annotated[int, typer.Option(help="The port that the robot calls.")] = 8981,
 ) -> None:
     """Talk to a CyberDog 2 as its phone app does.

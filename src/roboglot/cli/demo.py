@@ -23,11 +23,11 @@ PACKAGES = ("httpx", "robomasterpy", "cv2")
 
 def command(
     world: Annotated[str, typer.Option(help="A shipped world, a .toml of yours, or a ROS map (.yaml).")] = "office",
-    address: Annotated[str, typer.Option(help="Where the demo's robot is to live.")] = "127.0.0.1",
+    address: Annotated[str, typer.Option(help="Address of the demo's robot.")] = "127.0.0.1",
     out: Annotated[Path, typer.Option(help="The picture to draw.")] = Path("tour.png"),
     speed: Annotated[float, typer.Option(help="Robot seconds per real second.")] = 1.0,
 ) -> None:
-    """Four independent clients, one after the other, drive the same robot; all four say where it is."""
+    """Let four independent clients drive the same robot, one after the other; all four print its pose."""
     if missing := [package for package in PACKAGES if find_spec(package) is None]:
         raise MissingExtra(in_words("roboglot demo", missing, "demo"))
     if problem := _obstacle(address, out):

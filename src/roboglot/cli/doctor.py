@@ -24,12 +24,12 @@ from roboglot.protocols import DOORS, sections
 
 def command(
     data: Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The robot's data folder.")] = None,
-    config: Annotated[Path | None, typer.Option(help="The TOML file that `roboglot up` is given.")] = None,
+    config: Annotated[Path | None, typer.Option(help="The TOML file of `roboglot up --config`.")] = None,
     security: Annotated[
-        bool, typer.Option("--security", help="What listens where, who may reach it and do what, weak spots.")
+        bool, typer.Option("--security", help="List listeners, who can reach them, rights and weak spots.")
     ] = False,
 ) -> None:
-    """Check this machine; the exit status is 1 if something that is needed is missing."""
+    """Check this machine; exit with 1 if a required part is missing."""
     try:
         settings = load_config(config, {"data": str(data) if data else None}, sections())
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""``roboglot fleet``: many worlds on this machine, each in a process of its own, kept up."""
+"""``roboglot fleet``: run many worlds, each in a process of its own, and restart failed ones."""
 
 from __future__ import annotations
 
@@ -35,29 +35,27 @@ LINES_MAX = 100_000
 HEAD = f"{'shard':6} {'state':9} {'pid':>8} {'robots':>6} {'core':>6} {'MB':>6} {'x real':>7} {'restarts':>8}"
 Data = Annotated[
     Path | None,
-    typer.Option(envvar="ROBOGLOT_FLEET", help="The fleet's folder; `fleet` in the data folder if not given."),
+    typer.Option(envvar="ROBOGLOT_FLEET", help="The fleet's folder; by default `fleet` in the data folder."),
 ]
 
 
 @app.command()
 def up(
-    worlds: Annotated[int, typer.Option(help="How many worlds; needed at the first start.")] = 0,
-    robots_each: Annotated[int, typer.Option(help="Robots in each world, if there is no template.")] = 0,
-    template: Annotated[Path | None, typer.Option(help="A configuration as for `roboglot up`: of every world.")] = None,
-    first_address: Annotated[str, typer.Option(help="Of the first robot; the others follow it.")] = "",
-    memory_max: Annotated[int, typer.Option(min=0, help="MB of a shard that make it start anew; 0: any.")] = 0,
-    replan: Annotated[
-        bool, typer.Option("--replan", help="Forget which robot was moved where, and plan anew.")
-    ] = False,
-    on: Annotated[
-        str, typer.Option(help="Where shards run, as actors of Ray: local, ray://HOST, HOST:PORT, auto.")
-    ] = "",
+    worlds: Annotated[int, typer.Option(help="Number of worlds; needed at the first start.")] = 0,
+    robots_each: Annotated[int, typer.Option(help="Robots in each world, without a template.")] = 0,
+    template: Annotated[Path | None, typer.Option(help="Configuration of every world, as for `roboglot up`.")] = None,
+    first_address: Annotated[str, typer.Option(help="Address of the first robot; the others follow it.")] = "",
+    memory_max: Annotated[
+        int, typer.Option(min=0, help="Memory in MB above which a shard is restarted; 0: no limit.")
+    ] = 0,
+    replan: Annotated[bool, typer.Option("--replan", help="Make a new plan; moves of robots are forgotten.")] = False,
+    on: Annotated[str, typer.Option(help="Run shards as actors of Ray: local, ray://HOST, HOST:PORT or auto.")] = "",
     detached: Annotated[
-        bool, typer.Option("--detached", help="With --on: shards stay when this command ends.")
+        bool, typer.Option("--detached", help="With --on: keep shards running when this command ends.")
     ] = False,
     data: Data = None,
 ) -> None:
-    """Start a fleet and keep it up until Ctrl-C; what robots store stays in its folder."""
+    """Start a fleet and keep it up until Ctrl-C; its robots' data stays in its folder."""
     from roboglot.shards.forking import NotWarm, launched
 
     began = time.monotonic()
@@ -80,7 +78,9 @@ def up(
 
 
 @app.command("list")
-def show(data: Data = None, as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False) -> None:
+def show(
+    data: Data = None, as_json: Annotated[bool, typer.Option("--json", help="Print one JSON text.")] = False
+) -> None:
     """Show every shard with its robots and their addresses."""
     answer = _ask("look", data)
     if as_json:
@@ -95,10 +95,12 @@ def show(data: Data = None, as_json: Annotated[bool, typer.Option("--json", help
 @app.command()
 def top(
     data: Data = None,
-    once: Annotated[bool, typer.Option("--once", help="One table, then end.")] = False,
-    period: Annotated[float, typer.Option(min=0.5, help="Seconds between tables; cores are counted over it.")] = 2.0,
+    once: Annotated[bool, typer.Option("--once", help="Print one table and exit.")] = False,
+    period: Annotated[
+        float, typer.Option(min=0.5, help="Seconds between tables, over which processor time is measured.")
+    ] = 2.0,
 ) -> None:
-    """Show what each shard needs of the machine, and whether it keeps up with robot time."""
+    """Show each shard's processor time and memory, and whether it keeps up with robot time."""
     before = {row.name: (row.cpu, time.monotonic()) for row in _ask("look", data).shards}
     while True:
         time.sleep(period)
@@ -134,34 +136,34 @@ def restart(
     shard: Annotated[str, typer.Argument(help="A shard, or one of its robots; none: all of them.")] = "",
     data: Data = None,
 ) -> None:
-    """Stop and start one shard or all, with the same addresses and what they have stored."""
+    """Restart one shard or all, with the same addresses and stored data."""
     _print(_ask("restart", data, shard=shard))
 
 
 @app.command()
 def reset(shard: Annotated[str, typer.Argument(help="A shard, or one of its robots.")], data: Data = None) -> None:
-    """Start a shard as on its first day: programs, maps and places of its robots are deleted."""
+    """Restart a shard empty: programs, maps and places of its robots are deleted."""
     _print(_ask("reset", data, shard=shard))
 
 
 @app.command()
 def move(
     robot: Annotated[str, typer.Argument()],
-    to: Annotated[str, typer.Argument(help="The shard that it shall live in.")],
+    to: Annotated[str, typer.Argument(help="The shard to move it to.")],
     data: Data = None,
 ) -> None:
-    """Move a robot, its address and what is stored of it to another shard; both start again."""
+    """Move a robot to another shard, with its address and stored data; both shards restart."""
     _print(_ask("move", data, robot=robot, to=to))
 
 
 @app.command()
 def where(
-    robot: Annotated[str, typer.Argument(help="A robot's name; none: all of them.")] = "",
+    robot: Annotated[str, typer.Argument(help="A robot's name; without it, all.")] = "",
     registry: Annotated[
         str, typer.Option(envvar=["ROBOGLOT_REGISTRY", "ROBOGLOT_DATABASE"], help="The registry's URL or file.")
     ] = "",
 ) -> None:
-    """Show which program of which address runs a robot, on any machine, and under which epoch."""
+    """Show the program that runs a robot, on any machine, with its address and epoch."""
     from roboglot.storage.homes import Homes
     from roboglot.storage.opening import open_registry
     from roboglot.storage.transactions import DatabaseError
@@ -186,7 +188,7 @@ def logs(
     lines: Annotated[int, typer.Option("--lines", "-n", min=1, max=LINES_MAX)] = 50,
     data: Data = None,
 ) -> None:
-    """Print the end of a shard's log, also when no fleet is up."""
+    """Print the end of a shard's log, even if no fleet is up."""
     from roboglot.shards.plan import load
     from roboglot.shards.supervisor import LOG_FILE
 
@@ -225,7 +227,7 @@ def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     if kept is not None and not any(asked):
         return kept
     if not asked.worlds:
-        raise ValueError(f"there is no fleet in {folder} yet: how many --worlds?")
+        raise ValueError(f"there is no fleet in {folder} yet: give --worlds")
     try:
         template = tomllib.loads(asked.template.read_text(encoding="utf-8")) if asked.template else {}
     except (OSError, tomllib.TOMLDecodeError) as error:
@@ -235,7 +237,7 @@ def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     if kept is None:
         return plan
     if kept.request != plan.request:
-        raise ValueError(f"the fleet in {folder} is another one: start it without options, or say --replan")
+        raise ValueError(f"the fleet in {folder} has another plan: start it without options, or with --replan")
     return kept
 
 

@@ -20,10 +20,10 @@ FILE_MAX = 64 * 1024
 
 def command(
     files: Annotated[list[Path], typer.Argument(help="Missions (TOML); examples/lessons has twenty.")],
-    program: Annotated[Path | None, typer.Option(help="Try this program instead of what the mission holds.")] = None,
+    program: Annotated[Path | None, typer.Option(help="Try this program instead of the mission's own.")] = None,
     chinese: Annotated[bool, typer.Option("--chinese", help="Give the reasons in Chinese.")] = False,
 ) -> None:
-    """Play missions in their own worlds, as fast as the machine can; the exit status is 1 if one is not as it says."""
+    """Play missions in their own worlds, as fast as the machine can; exit with 1 if a check has another result."""
     try:
         found = [(path.stem, _lesson(path)) for path in files]
         own = None if program is None else _text(program)

@@ -41,10 +41,12 @@ class Way(StrEnum):
 def command(
     way: Annotated[
         Way,
-        typer.Argument(help="import: from the map; export: to it; build: from a log; merge, survey: floors to one."),
+        typer.Argument(
+            help="import MAP, export to it, build from it (a log), merge floors into it, or survey a world."
+        ),
     ],
     ros_map: Annotated[
-        Path, typer.Argument(metavar="MAP", help="A ROS map's yaml file, its image beside it; or a .stcm; or a log.")
+        Path, typer.Argument(metavar="MAP", help="A ROS map's yaml file with its image beside it, a .stcm, or a log.")
     ],
     robot: Annotated[str, typer.Option(help="The robot's Slamware address.")] = "http://127.0.0.1:1448",
     file: Annotated[Path | None, typer.Option(help="A composite map (.stcm) instead of a robot.")] = None,

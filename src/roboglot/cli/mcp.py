@@ -18,7 +18,7 @@ def command(
     ] = None,
     token_file: Annotated[Path | None, typer.Option(help="A file with the token; else ROBOGLOT_TOKEN.")] = None,
 ) -> None:
-    """Serve the tools until the agent hangs up."""
+    """Serve the tools until the agent disconnects."""
     from roboglot.agents.console import ConsoleClient
     from roboglot.agents.server import make_server
 

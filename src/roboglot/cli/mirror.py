@@ -38,7 +38,7 @@ def command(
     url: Annotated[str, typer.Argument(help="slamware://HOST, robomaster://HOST …; as `roboglot scan` prints them.")],
     once: Annotated[bool, typer.Option("--once", help="Print the state once and end.")] = False,
 ) -> None:
-    """Show live state of a robot; Ctrl-C ends."""
+    """Show the live state of a robot until Ctrl-C."""
     with contextlib.suppress(KeyboardInterrupt):
         sys.exit(asyncio.run(_mirror(url, once)))
 

@@ -65,23 +65,25 @@ class Failure(Exception):
 
 
 def command(
-    what: Annotated[What, typer.Argument(help="check needs no robot.")],
-    file: Annotated[Path | None, typer.Argument(help="The program; also a task's id, unless it is read.")] = None,
+    what: Annotated[What, typer.Argument(help="The action; check needs no robot.")],
+    file: Annotated[
+        Path | None, typer.Argument(help="The program's file, or a task's id where no file is read.")
+    ] = None,
     robot: Annotated[str, typer.Option(envvar="ROBOGLOT_PROGRAMS", help="The robot's WebSocket.")] = ROBOT,
-    own: Annotated[bool, typer.Option("--own", help="Run it on a robot started for this alone.")] = False,
-    body: Annotated[str, typer.Option(help="The own robot's body.")] = "cyberdog2",
-    world: Annotated[str, typer.Option(help="The own robot's world.")] = "office",
-    speed: Annotated[float, typer.Option(help="The own robot's clock.")] = 1.0,
-    id: Annotated[str, typer.Option(help="The task's id; else made from the file's name.")] = "",
+    own: Annotated[bool, typer.Option("--own", help="Run it on a new simulated robot.")] = False,
+    body: Annotated[str, typer.Option(help="With --own: the robot's body.")] = "cyberdog2",
+    world: Annotated[str, typer.Option(help="With --own: the robot's world.")] = "office",
+    speed: Annotated[float, typer.Option(help="With --own: robot seconds per real second.")] = 1.0,
+    id: Annotated[str, typer.Option(help="The task's id; by default made from the file's name.")] = "",
     when: Annotated[str, typer.Option(help='"now", "21:30", "now + 5minutes"; with --cycle "30 21 * * *".')] = "now",
     step: Annotated[bool, typer.Option("--step", help="Halt before every statement.")] = False,
-    breaks: Annotated[list[int] | None, typer.Option("--break", help="A line to halt at.")] = None,
-    cycle: Annotated[bool, typer.Option("--cycle", help="Again and again, as --when says.")] = False,
+    breaks: Annotated[list[int] | None, typer.Option("--break", help="Line to halt at; repeat for more.")] = None,
+    cycle: Annotated[bool, typer.Option("--cycle", help="Repeat at the times of --when.")] = False,
     interface: Annotated[
-        str, typer.Option(metavar="NAME(PARAMETERS)", help="Save it as a module that programs call so.")
+        str, typer.Option(metavar="NAME(PARAMETERS)", help="Save it as a module with this interface.")
     ] = "",
     modules: Annotated[bool, typer.Option("--modules", help="List or delete modules instead of tasks.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="List, log or check for machines: one JSON text.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="With list, log or check: print one JSON text.")] = False,
 ) -> None:
     """Check, run, save and list block programs, read their logs; suspend, recover, shut down and delete their tasks."""
     logging.basicConfig(level=logging.WARNING)
@@ -140,7 +142,7 @@ async def _check(file: Path, source: str, *, as_json: bool) -> int:
     for problem in problems:
         print(visible(f"{file}:{problem.line}:{problem.column}: {problem.english} {problem.chinese}"))
     if not problems:
-        print(f"{file}: nothing wrong")
+        print(f"{file}: no errors")
     return 1 if problems else 0
 
 

@@ -42,7 +42,7 @@ def command(
         list[str] | None,
         typer.Argument(help="Addresses or networks (10.0.0.0/24) to probe; RoboMasters broadcast by themselves."),
     ] = None,
-    seconds: Annotated[float, typer.Option(help="How long to listen for RoboMasters.")] = 3.0,
+    seconds: Annotated[float, typer.Option(help="Seconds to listen for RoboMasters.")] = 3.0,
 ) -> None:
     """Find robots on the network."""
     try:
@@ -95,7 +95,7 @@ async def _robomasters(seconds: float) -> list[Found]:
     try:
         heard = await discover(seconds)
     except ClientError as error:
-        print(f"RoboMasters cannot be listened for: {error}", file=sys.stderr)
+        print(f"cannot listen for RoboMasters: {error}", file=sys.stderr)
         return []
     return [Found(f"robomaster://{address}", "DJI RoboMaster EP, free") for address in heard]
 

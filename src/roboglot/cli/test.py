@@ -16,10 +16,10 @@ from roboglot.testing.artifacts import FOLDER
 def command(
     paths: Annotated[list[Path] | None, typer.Argument(help="Scenario files, or folders with them.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write a JUnit report to this file.")] = None,
-    failures: Annotated[Path, typer.Option(help="Where failed scenarios leave recordings, maps, messages.")] = Path(
-        FOLDER
-    ),
-    seed: Annotated[int | None, typer.Option(min=0, help="Play with this seed instead of the files'.")] = None,
+    failures: Annotated[
+        Path, typer.Option(help="Folder for recordings, maps and messages of failed scenarios.")
+    ] = Path(FOLDER),
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed to play with instead of the files'.")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of scenario files.")] = False,
 ) -> None:
     """Play scenarios (given, when, then) on simulated robots: see docs/testing.md."""
@@ -29,7 +29,7 @@ def command(
         print(json.dumps(files.schema(), indent=1))
         return
     if not paths:
-        raise typer.BadParameter("scenario files or folders are needed")
+        raise typer.BadParameter("name scenario files or folders")
     try:
         found = files.find(paths)
         if seed is not None:

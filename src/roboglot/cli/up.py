@@ -43,21 +43,23 @@ def command(
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            help="NAME=BODY, NAME=BODY:X,Y,YAW,FLOOR or NAME=URL of a real one, @ADDRESS if wanted; repeat for more."
-            " Robot a is always there."
+            help="NAME=BODY, NAME=BODY:X,Y,YAW,FLOOR or NAME=URL of a real robot, optionally with @ADDRESS; repeat for"
+            " more. Robot a always exists."
         ),
     ] = None,
     address: Annotated[str | None, typer.Option(help="Address of robot a; the others follow it.")] = None,
     speed: Annotated[float | None, typer.Option(envvar="ROBOGLOT_SPEED", help="Robot seconds per real second.")] = None,
     lockstep: Annotated[
         bool | None,
-        typer.Option("--lockstep", help="Time passes only when a line with seconds comes on standard input."),
+        typer.Option("--lockstep", help="Advance time only by the seconds in each line of standard input."),
     ] = None,
     patient: Annotated[
         bool | None,
         typer.Option("--patient", envvar="ROBOGLOT_PATIENT", help="On a slow machine, time waits for the world."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(envvar="ROBOGLOT_SEED", help="Of all chance in the world.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(envvar="ROBOGLOT_SEED", help="Seed of all random numbers in the world.")
+    ] = None,
     data: Annotated[
         Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for programs, places, certificates.")
     ] = None,
@@ -66,7 +68,7 @@ def command(
         typer.Option(
             metavar="URL|FILE",
             envvar="ROBOGLOT_REGISTRY",
-            help="Where programs agree on who runs which robot; the database if not given.",
+            help="Registry of which program runs which robot; the database by default.",
         ),
     ] = None,
     database: Annotated[
@@ -74,22 +76,24 @@ def command(
         typer.Option(
             metavar="URL",
             envvar="ROBOGLOT_DATABASE",
-            help="Keep what robots remember in PostgreSQL (postgresql://...), not in a file of the folder.",
+            help="Store the robots' data in PostgreSQL (postgresql://...) instead of in the data folder.",
         ),
     ] = None,
     access: Annotated[
         bool,
-        typer.Option("--access", envvar="ROBOGLOT_ACCESS", help="Ask who comes: see `roboglot access`."),
+        typer.Option(
+            "--access", envvar="ROBOGLOT_ACCESS", help="Require clients to identify themselves: see `roboglot access`."
+        ),
     ] = False,
     insecure: Annotated[
         bool,
         typer.Option(
             "--insecure",
             envvar="ROBOGLOT_INSECURE",
-            help="Let anyone drive robots outside loopback, whatever \\[access] says.",
+            help="Let anyone drive robots, also from outside loopback; overrides \\[access].",
         ),
     ] = False,
-    console: Annotated[bool, typer.Option(help="Pages to see and drive the robots in a browser.")] = True,
+    console: Annotated[bool, typer.Option(help="Serve pages to see and drive the robots in a browser.")] = True,
     open_console: Annotated[bool, typer.Option("--open", help="Open the console in this machine's browser.")] = False,
     record: Annotated[
         str,
@@ -98,7 +102,7 @@ def command(
     record_ring: Annotated[
         bool, typer.Option("--record-ring", help="Keep the last five minutes, and write them at a fault.")
     ] = False,
-    config: Annotated[Path | None, typer.Option(help="A TOML file: see docs/settings.md.")] = None,
+    config: Annotated[Path | None, typer.Option(help="TOML file with settings: see docs/settings.md.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
     **doors: object,
 ) -> None:
@@ -244,7 +248,7 @@ async def _step(clock: LockstepClock) -> None:
         if 0 <= seconds <= STEP_MAX:
             await clock.advance(seconds)
         else:
-            print(f"seconds between 0 and {STEP_MAX:g} are wanted, not {line!r}", file=sys.stderr)
+            print(f"expected seconds from 0 to {STEP_MAX:g}, not {line!r}", file=sys.stderr)
         print(f"time {clock.time():.3f}", flush=True)
 
 

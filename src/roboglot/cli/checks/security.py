@@ -76,7 +76,7 @@ def _opened(config: Config) -> Iterator[Finding]:
             "[access] or --access instead of insecure",
         )
     elif not access.on:
-        yield Finding("access", not outside, "nobody is asked who they are; all robots are on loopback")
+        yield Finding("access", not outside, "clients need no name; all robots are on loopback")
     if access.on and outside:
         yield Finding(
             "encryption",
@@ -88,7 +88,7 @@ def _opened(config: Config) -> Iterator[Finding]:
         yield Finding(
             "gateway and local",
             False,
-            "programs on this machine need no name; tunnels have loopback addresses of their own, and do",
+            "programs on this machine need no name; clients through tunnels, on other loopback addresses, do",
             "[access] local = false, if others have accounts on this machine",
         )
 
@@ -129,11 +129,11 @@ def _identity_findings(config: Config, identities: list[Identity]) -> Iterator[F
     now = time.time()
     for identity in identities:
         grants = [grant for grant in identity.grants if grant.until is None or grant.until > now]
-        may = "; ".join(f"{write_rights(g.rights)} on {g.robot}{_until(g)}" for g in grants) or "nothing any more"
+        may = "; ".join(f"{write_rights(g.rights)} on {g.robot}{_until(g)}" for g in grants) or "no rights left"
         remedy = _weakness(identity, grants)
         yield Finding(f"{identity.kind} {identity.name}", not remedy, may, remedy)
     if config.access.on and not identities:
-        yield Finding("people and machines", config.access.local, "nobody has rights", "roboglot access add NAME")
+        yield Finding("people and machines", config.access.local, "no one has rights", "roboglot access add NAME")
 
 
 def _until(grant: Grant) -> str:
@@ -145,11 +145,11 @@ def _weakness(identity: Identity, grants: list[Grant]) -> str:
         return f"roboglot access revoke {identity.name}" if identity.grants else ""
     rights = whole(right for grant in grants for right in grant.rights)
     if identity.kind is IdentityKind.ADDRESS and any(grant.until is None for grant in grants) and rights > {Right.SEE}:
-        return "an address proves little where others share the network: give it an end (--for 2h)"
+        return "an address is weak proof on a shared network: limit its time (--for 2h)"
     if identity.kind is IdentityKind.ADDRESS and Right.ADMIN in rights:
-        return "an address proves little: administrators should have a password or a token"
+        return "an address is weak proof: administrators should have a password or a token"
     if Right.ADMIN in rights and any(grant.robot == ALL_ROBOTS and grant.until is None for grant in grants):
-        return "admin on all robots for good: is drive, program or edit enough?"
+        return "admin on all robots without an end: is drive, program or edit enough?"
     return ""
 
 
@@ -160,7 +160,7 @@ def _unused(config: Config, identities: list[Identity]) -> Iterator[Finding]:
         return
     used, oldest = _used(config, now - UNUSED_DAYS * DAY)
     if oldest is None or now - oldest < UNUSED_DAYS * DAY:
-        yield Finding("unused rights", True, f"the audit is younger than {UNUSED_DAYS} days: too early to tell")
+        yield Finding("unused rights", True, f"the audit is younger than {UNUSED_DAYS} days")
         return
     for identity in identities:
         had = {right for grant in identity.grants for right in grant.rights} - {Right.SEE}
@@ -200,18 +200,18 @@ def _settings(config: Config) -> Iterator[Finding]:
     """Yield settings that open more than their names suggest."""
     for name, section in (*((door.name, door.section(config)) for door in DOORS), ("console", config.console)):
         if "*" in getattr(section, "origins", ()):
-            yield Finding(f"[{name}] origins", False, "every web page may command the robots", "name the pages")
+            yield Finding(f"[{name}] origins", False, "every web page may drive the robots", "name the pages")
         if getattr(section, "plaintext", False):
-            yield Finding(f"[{name}] plaintext", False, "gRPC without TLS and certificates", "for tests alone")
+            yield Finding(f"[{name}] plaintext", False, "gRPC without TLS and certificates", "for tests only")
         if getattr(section, "without_filter", False):
             yield Finding(
-                f"[{name}] without_filter", False, "programs run without the kernel's filter", "only trusted ones"
+                f"[{name}] without_filter", False, "programs run without the kernel's filter", "trusted programs only"
             )
 
 
 def _folder(path: Path) -> Finding:
     if not path.exists():
-        return Finding("data folder", True, f"{path} is not there yet")
+        return Finding("data folder", True, f"{path} does not exist yet")
     mode = stat.S_IMODE(path.stat().st_mode)
     return Finding(
         "data folder", not mode & 0o077, f"{path} has mode {mode:o}", f"chmod 700 {path}: keys and programs are in it"

@@ -21,22 +21,27 @@ Verb = Literal["look", "take", "give", "release"]
 
 
 def command(
-    robot: Annotated[str, typer.Argument(help="Its name, for all but looking.")] = "",
-    take: Annotated[bool, typer.Option("--take", help="No client moves it until control is released.")] = False,
+    robot: Annotated[str, typer.Argument(help="The robot's name; without it, show all.")] = "",
+    take: Annotated[
+        bool, typer.Option("--take", help="Take control: no client moves the robot until it is released.")
+    ] = False,
     give: Annotated[
-        str, typer.Option(metavar="WHO", help="Only this door or client moves it: robomaster, 'slamware 10.0.0.7'.")
+        str,
+        typer.Option(metavar="WHO", help="Give control to this door or client alone: robomaster, 'slamware 10.0.0.7'."),
     ] = "",
-    release: Annotated[bool, typer.Option("--release", help="Let any client move it again.")] = False,
-    all_: Annotated[bool, typer.Option("--all", help="Take, give or release control of every robot.")] = False,
+    release: Annotated[
+        bool, typer.Option("--release", help="Release control: any client may move the robot again.")
+    ] = False,
+    all_: Annotated[bool, typer.Option("--all", help="Take, give or release control of all robots.")] = False,
     data: Data = None,
 ) -> None:
     """Show who moves each robot; take control of one, pass it on or release it."""
     if take + bool(give) + release > 1:
-        raise typer.BadParameter("one of --take, --give and --release")
+        raise typer.BadParameter("give one of --take, --give and --release")
     if (take or give or release) and not (robot or all_):
-        raise typer.BadParameter("which robot?")
+        raise typer.BadParameter("name a robot")
     if robot and all_:
-        raise typer.BadParameter("a robot or --all")
+        raise typer.BadParameter("name a robot, or give --all")
     verb: Verb = "take" if take else "give" if give else "release" if release else "look"
     answer = wish("lease", Request(verb, robot, give, all_), data)
     shown = [control for control in answer.robots if robot in ("", control.robot)]

@@ -10,7 +10,7 @@ from roboglot.cli.control.lease import Data, wish
 from roboglot.protocols.lease_desk import Request
 
 
-def command(robot: Annotated[str, typer.Argument(help="Its name.")], data: Data = None) -> None:
+def command(robot: Annotated[str, typer.Argument(help="The robot's name.")], data: Data = None) -> None:
     """Stop a robot, put it where it started, charge it, end its faults. What it knows and has stored stays."""
     wish("reset", Request("reset", robot), data)
     print(f"{robot} is back where it started")

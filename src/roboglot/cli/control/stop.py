@@ -11,12 +11,12 @@ from roboglot.protocols.lease_desk import Request
 
 
 def command(
-    robot: Annotated[str, typer.Argument(help="Its name.")] = "",
-    all_: Annotated[bool, typer.Option("--all", help="Every robot, at once.")] = False,
+    robot: Annotated[str, typer.Argument(help="The robot's name.")] = "",
+    all_: Annotated[bool, typer.Option("--all", help="Stop all robots at once.")] = False,
     data: Data = None,
 ) -> None:
     """Stop a robot, or all. Their clients may move them again: `roboglot lease --all --take` keeps them standing."""
     if bool(robot) == all_:
-        raise typer.BadParameter("a robot or --all")
+        raise typer.BadParameter("name a robot, or give --all")
     answer = wish("stop", Request("stop", robot, all=all_), data)
     print(f"{f'{len(answer.robots)} robots stand' if all_ else f'{robot} stands'}")

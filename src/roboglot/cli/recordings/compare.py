@@ -28,22 +28,23 @@ class By(StrEnum):
 
 def command(
     one: Annotated[str, typer.Argument(help="A recording, or a robot's URL.")],
-    other: Annotated[str, typer.Argument(help="Another one.")],
+    other: Annotated[str, typer.Argument(help="A recording or URL to compare it with.")],
     by: Annotated[
-        By | None, typer.Option(help="Each value of each answer, or fields, units, rates and times; URLs: behaviour.")
+        By | None,
+        typer.Option(help="values: every value; behaviour: fields, units, rates and times (always for URLs)."),
     ] = None,
-    robot: Annotated[str, typer.Option(help="Only this robot; needed where there are several.")] = "",
+    robot: Annotated[str, typer.Option(help="Only this robot; needed if there are several.")] = "",
     door: Annotated[str, typer.Option(help="Only this protocol.")] = "",
     commands: Annotated[
-        bool, typer.Option("--commands", help="Send a robot also what moves or changes it, as recorded.")
+        bool, typer.Option("--commands", help="Also send recorded requests that move or change the robot.")
     ] = False,
-    mask: Annotated[Path | None, typer.Option(help="TOML: how which fields are compared.")] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Every number and time exactly.")] = False,
-    html: Annotated[Path | None, typer.Option(help="Write a page.")] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML.")] = None,
-    at_least: Annotated[float, typer.Option(min=0, max=100, help="Fail below so many percent.")] = 100.0,
+    mask: Annotated[Path | None, typer.Option(help="TOML file with rules for the comparison of fields.")] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Compare every number and time exactly.")] = False,
+    html: Annotated[Path | None, typer.Option(help="Write an HTML report to this file.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write a JUnit report to this file.")] = None,
+    at_least: Annotated[float, typer.Option(min=0, max=100, help="Exit with 1 if fewer percent agree.")] = 100.0,
 ) -> None:
-    """Compare two recordings or robots. A robot is asked what the recording has, or all that changes nothing."""
+    """Compare two recordings or robots. A robot gets the recording's requests, or all that change nothing."""
     from roboglot.clients.errors import ClientError
     from roboglot.recording.comparing import reports
     from roboglot.recording.comparing.masks import STRICT, Mask, read_mask

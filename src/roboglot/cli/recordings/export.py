@@ -24,7 +24,7 @@ class Storage(StrEnum):
 def command(
     file: Annotated[Path, typer.Argument(help="A recording.")],
     rosbag2: Annotated[Path, typer.Option(metavar="FOLDER", help="Write a bag of ROS 2 into this new folder.")],
-    storage: Annotated[Storage, typer.Option(help="mcap as from ROS 2 Iron on, sqlite3 as before.")] = Storage.MCAP,
+    storage: Annotated[Storage, typer.Option(help="mcap for ROS 2 Iron and newer, sqlite3 for older.")] = Storage.MCAP,
     robot: Annotated[str, typer.Option(help="Only this robot's topics.")] = "",
 ) -> None:
     """Write a recording as a bag of ROS 2."""

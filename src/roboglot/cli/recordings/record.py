@@ -1,6 +1,6 @@
-"""``roboglot record``: starts and stops the recording of a running program, marks moments, reads and mends files.
+"""Record a running program, mark moments; show and repair recordings.
 
-`roboglot record URL --listen ADDRESS` records a real robot from between it and its client.
+`roboglot record URL --listen ADDRESS` records a real robot, as a proxy between it and its client.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The fol
 
 @app.command()
 def start(
-    path: Annotated[Path, typer.Argument(help="A file, or a folder.")] = Path("."),
+    path: Annotated[Path, typer.Argument(help="New file, or a folder for it.")] = Path("."),
     data: Data = None,
 ) -> None:
-    """Begin to record all robots of the running program."""
+    """Start to record all robots of the running program."""
     _show(_ask(data, Request("start", str(path.absolute()) + ("/" if path.is_dir() else ""))))
 
 
@@ -73,13 +73,13 @@ def stop(data: Data = None) -> None:
 
 
 @app.command()
-def mark(text: Annotated[str, typer.Argument(help="What to remember.")], data: Data = None) -> None:
+def mark(text: Annotated[str, typer.Argument(help="Text of the remark.")], data: Data = None) -> None:
     """Put a remark into the recording at this moment."""
     _ask(data, Request("mark", text))
 
 
 @app.command()
-def save(path: Annotated[Path, typer.Argument(help="A new file.")], data: Data = None) -> None:
+def save(path: Annotated[Path, typer.Argument(help="New file to write.")], data: Data = None) -> None:
     """Write the last minutes that --record-ring keeps."""
     _ask(data, Request("save", str(path.absolute())))
     print(f"the last minutes are in {path}")
@@ -87,7 +87,7 @@ def save(path: Annotated[Path, typer.Argument(help="A new file.")], data: Data =
 
 @app.command()
 def status(data: Data = None) -> None:
-    """Show how the recording goes."""
+    """Show the progress of the recording."""
     _show(_ask(data, Request()))
 
 
@@ -97,15 +97,13 @@ def proxy(
         str,
         typer.Argument(help="A robot: slamware://, robomaster://, visual://HOST[:PORT], cyberdog://HOST?certs=DIR."),
     ],
-    listen: Annotated[str, typer.Option(help="The address of this machine that the client is to use.")],
-    to: Annotated[Path, typer.Option(help="The recording, a new file.")] = Path("robot.mcap"),
-    redact: Annotated[
-        list[str] | None, typer.Option(help="One more field whose values are left out; may be given several times.")
-    ] = None,
+    listen: Annotated[str, typer.Option(help="Address of this machine for the client to connect to.")],
+    to: Annotated[Path, typer.Option(help="New file for the recording.")] = Path("robot.mcap"),
+    redact: Annotated[list[str] | None, typer.Option(help="Field whose values are left out; repeat for more.")] = None,
     photos: Annotated[bool, typer.Option("--photos", help="Keep photos and films that the client fetches.")] = False,
     data: Data = None,
 ) -> None:
-    """Stand between a client and a robot: pass every byte, and record what it means, until Ctrl-C."""
+    """Pass every byte between a client and a robot, and record the messages, until Ctrl-C."""
     from roboglot.recording.lines import Target
     from roboglot.recording.proxy.relay import Book, Relay
 
@@ -156,7 +154,7 @@ async def _pass(relay: Relay | DogRelay, words: str) -> None:
 
 @app.command()
 def info(file: Annotated[Path, typer.Argument(help="A recording.")]) -> None:
-    """Show what a recording holds."""
+    """Show the contents of a recording."""
     from roboglot.recording.reader import BadRecording, read_recording
 
     try:
@@ -165,7 +163,7 @@ def info(file: Annotated[Path, typer.Argument(help="A recording.")]) -> None:
         sys.exit(f"roboglot record: {in_words(error)}")
     for name, value in recording.facts.items():
         print(f"{name:10} {value}")
-    print(f"{'seconds':10} {recording.seconds:.1f}{'' if recording.whole else '  (it has no end: see repair)'}")
+    print(f"{'seconds':10} {recording.seconds:.1f}{'' if recording.whole else '  (incomplete: see repair)'}")
     for name, count in sorted(recording.topics.items()):
         print(f"{count:10} {name}")
     for name, data in recording.attachments.items():
@@ -174,10 +172,10 @@ def info(file: Annotated[Path, typer.Argument(help="A recording.")]) -> None:
 
 @app.command()
 def repair(
-    file: Annotated[Path, typer.Argument(help="A recording that has no end.")],
-    to: Annotated[Path, typer.Argument(help="A new file.")],
+    file: Annotated[Path, typer.Argument(help="A recording without its end.")],
+    to: Annotated[Path, typer.Argument(help="New file for the repaired recording.")],
 ) -> None:
-    """Copy what is readable of a recording whose program was killed into a whole file, with its index."""
+    """Copy the readable part of a recording whose program was killed into a complete file with an index."""
     from roboglot.recording.mending import mend
     from roboglot.recording.reader import BadRecording
 
@@ -212,7 +210,7 @@ def _show(answer: Answer) -> None:
     else:
         print("nothing is recorded")
     if answer.ring:
-        print("the last minutes are kept; `roboglot record save FILE` writes them")
+        print("the last minutes are in memory; `roboglot record save FILE` writes them")
     _complain(answer)
 
 
@@ -220,4 +218,4 @@ def _complain(answer: Answer) -> None:
     if answer.failure:
         sys.exit(f"roboglot record: the recording ended: {answer.failure}; {answer.dropped} values since then are lost")
     if answer.dropped:
-        print(f"{answer.dropped} values are lost: the disk was too slow", file=sys.stderr)
+        print(f"{answer.dropped} values were dropped: the disk was too slow", file=sys.stderr)

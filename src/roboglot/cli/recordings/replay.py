@@ -15,16 +15,20 @@ from roboglot.cli.recordings.reasons import in_words
 def command(
     file: Annotated[Path, typer.Argument(help="A recording.")],
     against: Annotated[
-        str, typer.Option(metavar="URL", help="slamware://, robomaster:// or visual://HOST, cyberdog://HOST?certs=DIR.")
+        str,
+        typer.Option(
+            metavar="URL",
+            help="Robot to send to: slamware://, robomaster:// or visual://HOST, cyberdog://HOST?certs=DIR.",
+        ),
     ],
-    robot: Annotated[str, typer.Option(help="Which robot of the recording; needed where there are several.")] = "",
-    fast: Annotated[bool, typer.Option("--fast", help="As fast as the answers come.")] = False,
-    mask: Annotated[Path | None, typer.Option(help="TOML: how which fields are compared.")] = None,
-    html: Annotated[Path | None, typer.Option(help="Write a page.")] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit's XML.")] = None,
-    at_least: Annotated[float, typer.Option(min=0, max=100, help="Fail below so many percent.")] = 100.0,
+    robot: Annotated[str, typer.Option(help="Robot of the recording; needed if there are several.")] = "",
+    fast: Annotated[bool, typer.Option("--fast", help="Send as fast as the answers come.")] = False,
+    mask: Annotated[Path | None, typer.Option(help="TOML file with rules for the comparison of fields.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write an HTML report to this file.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write a JUnit report to this file.")] = None,
+    at_least: Annotated[float, typer.Option(min=0, max=100, help="Exit with 1 if fewer percent agree.")] = 100.0,
 ) -> None:
-    """Send the requests of a recording to a robot, in their order and time. It obeys them: mind where it stands."""
+    """Send the requests of a recording to a robot, in order and on time. It obeys them: mind where it stands."""
     from roboglot.clients.errors import ClientError
     from roboglot.model.clock import RealClock
     from roboglot.recording.comparing import reports
@@ -42,7 +46,7 @@ def command(
     except* (OSError, ValueError, ClientError) as errors:
         sys.exit(f"roboglot replay: {in_words(_first(errors))}")
     if withheld:
-        print(f"{withheld} requests are not sent, for they hold [redacted]", file=sys.stderr)
+        print(f"{withheld} requests are not sent, because they contain [redacted]", file=sys.stderr)
     comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast)
     try:
         if html:

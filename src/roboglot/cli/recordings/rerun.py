@@ -38,7 +38,7 @@ def command(
     file: Annotated[Path, typer.Argument(help="A recording of roboglot up --lockstep --record.")],
     keep: Annotated[Path | None, typer.Option(help="Keep the recording of the rerun in this file.")] = None,
 ) -> None:
-    """Run a lockstep recording again: same configuration, seed and inputs; exits with 1 at the first difference."""
+    """Run a lockstep recording again, with its configuration, seed and inputs; exit with 1 at the first difference."""
     from roboglot.recording.reader import read_recording
     from roboglot.recording.traces import difference
 
@@ -64,7 +64,7 @@ def command(
         print(f"  {visible(line)}")
     print(f"- {visible(found.recorded)}\n+ {visible(found.now)}")
     for reason in reasons(recording):
-        print(f"A reason may be: {reason}")
+        print(f"Possible reason: {reason}")
     raise typer.Exit(1)
 
 

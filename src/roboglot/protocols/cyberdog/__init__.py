@@ -50,7 +50,7 @@ DOOR = DoorType(
     open=_open,
     asks="a certificate of the data folder",
     options=(
-        Option("--app", "app", "HOST:PORT of the CyberDog app to call; else the one that called last."),
+        Option("--app", "app", "HOST:PORT of the CyberDog app to call; by default the app that called last."),
         Option("--plaintext", "plaintext", "CyberDog without TLS, on loopback only.", True),
     ),
 )

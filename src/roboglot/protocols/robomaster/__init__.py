@@ -47,7 +47,7 @@ DOOR = DoorType(
         Option(
             "--robomaster-profile",
             "profile",
-            "How the RoboMaster door words things: spec, or a robot's build: fw60, fw70.",
+            "Form of the RoboMaster door's answers: spec, or those of a firmware build: fw60, fw70.",
         ),
         Option("--robomaster-lenient", "lenient", "Also run RoboMaster commands sent without `;`.", True),
         Option(

@@ -45,7 +45,7 @@ DOOR = DoorType(
     ports=(PortSetting("VDA 5050 broker", "port", PortKind.BROKER),),
     open=_open,
     options=(
-        Option("--vda5050", "broker", "HOST or HOST:PORT of the MQTT broker where a VDA 5050 fleet control is."),
-        Option("--vda5050-version", "version", "The version that fleet control speaks: 3.0 or 2.1."),
+        Option("--vda5050", "broker", "HOST or HOST:PORT of the MQTT broker of a VDA 5050 fleet control."),
+        Option("--vda5050-version", "version", "The fleet control's version of VDA 5050: 3.0 or 2.1."),
     ),
 )

@@ -58,7 +58,7 @@ DOOR = DoorType(
         Option(
             "--programs-without-filter",
             "without_filter",
-            "Run block programs also where the kernel can't lock them in: trusted ones.",
+            "Run block programs even if the kernel cannot confine them: trusted programs only.",
             True,
         ),
     ),
