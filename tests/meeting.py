@@ -39,6 +39,7 @@ SECONDS_MAX = 180.0  # s of robot time
 LOOK = 0.05  # s between two samples of all robots
 TOUCHES = 0.002  # m between two hulls that counts as a touch
 START_ROOM, GOAL_ROOM = 0.6, 1.1  # m around a place: a robot passes beside one that stands at its goal
+STAYS = 0.5  # m: a robot that stays within has not moved
 APART = 1.6  # m between two goals, and between two starts
 STANDING, WALKING = (Pose(4.6, 3.4),), ("person 0 0", "person 0 1")  # of the office's people
 SURVEYED = 1.5  # m between two places of the survey
@@ -74,6 +75,15 @@ class Drive:
     reached: int = 0
     seconds: float = math.inf  # until it reached its last goal
     failure: str = ""
+    stood: float = 0.0  # s: its longest stay at one place
+    _place: Pose = field(default_factory=lambda: Pose(math.inf))
+    _since: float = 0.0
+
+    def watch(self, pose: Pose, now: float) -> None:
+        """Note how long it has stayed where it is."""
+        if pose.distance_to(self._place) > STAYS:
+            self._place, self._since = pose, now
+        self.stood = max(self.stood, now - self._since)
 
 
 @dataclass
@@ -84,6 +94,7 @@ class Outcome:
     touches: list[Touch] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)  # robots that reached all their goals
     failures: list[str] = field(default_factory=list)
+    stood: dict[str, float] = field(default_factory=dict)  # the longest stay at one place before the last goal, s
 
 
 def scenario(seed: int, robots: int = ROBOTS, world: str = "") -> Scenario:
@@ -164,6 +175,7 @@ async def meet(scene: Scenario, grid: OccupancyGrid | None, alone: int | None = 
             outcome.touches += [Touch(clock.time() - begun, pair, _account(fleet, pair)) for pair in now - touching]
             touching = now
     for drive in drives:
+        outcome.stood[drive.name] = drive.stood
         if drive.reached == len(drive.goals):
             outcome.seconds[drive.name] = drive.seconds
         else:
@@ -189,6 +201,7 @@ def _goes(fleet: Fleet, drive: Drive, frames: dict[str, Pose], begun: float) -> 
     robot = fleet.robots[drive.name]
     if drive.action is not None:
         if not drive.action.status.ended:
+            drive.watch(fleet.world.truth.pose_of(drive.name), robot.clock.time())
             return True
         if drive.action.status is not ActionStatus.SUCCEEDED:
             drive.failure = drive.action.reason

@@ -12,6 +12,7 @@ from roboglot.model.maps import OccupancyGrid
 from tests.meeting import WORLDS, Scenario, meet, scenario, survey
 
 TIGHT = WORLDS[1]
+LONG = 12.0  # s
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -29,6 +30,32 @@ async def test_two_pass_a_corridor_for_one(building: OccupancyGrid, bodies: tupl
     outcome = await meet(Scenario(3, TIGHT, bodies, (west, east), ((east,), (west,))), building)
     assert outcome.touches == []
     assert outcome.failures == []
+
+
+@pytest.mark.parametrize(
+    ("bodies", "ends"),
+    [
+        pytest.param(("universal", "hermes"), (Pose(5.5, 9.5), Pose(8.6, 9.5, math.pi)), id="door"),
+        pytest.param(("hermes", "cyberdog2"), (Pose(10.0, 3.6, math.pi / 2), Pose(5.6, 6.0)), id="dead end"),
+    ],
+)
+@pytest.mark.asyncio(loop_scope="module")
+async def test_two_change_places(building: OccupancyGrid, bodies: tuple[str, ...], ends: tuple[Pose, Pose]) -> None:
+    """Through a door; and between a hall and a room with one door, where one of them announces nothing."""
+    outcome = await meet(Scenario(5, TIGHT, bodies, ends, ((ends[1],), (ends[0],))), building)
+    assert outcome.touches == []
+    assert outcome.failures == []
+    assert max(outcome.stood.values()) < LONG
+
+
+@pytest.mark.asyncio(loop_scope="module")
+async def test_three_cross_at_one_place(building: OccupancyGrid) -> None:
+    starts = (Pose(2.0, 5.5), Pose(4.5, 8.0, -math.pi / 2), Pose(6.0, 4.5, 2.5))
+    goals = ((Pose(6.2, 5.5),), (Pose(4.5, 3.6),), (Pose(2.6, 7.0),))
+    outcome = await meet(Scenario(6, TIGHT, ("universal", "cyberdog2", "hermes"), starts, goals), building)
+    assert outcome.touches == []
+    assert outcome.failures == []
+    assert max(outcome.seconds.values()) < LONG
 
 
 @pytest.mark.slow  # in short: test_two_pass_a_corridor_for_one

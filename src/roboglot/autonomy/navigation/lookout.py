@@ -109,10 +109,11 @@ class Lookout:
     def _mind_others(self, follower: Follower, pose: Pose, path: NDArray[np.float64]) -> None:
         """Stop for moving objects and robots with right of way, and announce this robot's route."""
         traffic = self._traffic
-        free = follower.along + traffic.free(path, pose, follower.speed, self._planner.radius)
-        follower.stop_at = min(follower.stop_at, free)
         carrot, beyond = follower.carrot()
-        traffic.follow(follower.route.ahead(pose, carrot, beyond, ANNOUNCED_MAX))
+        way = follower.route.ahead(pose, carrot, beyond, ANNOUNCED_MAX)
+        free = follower.along + traffic.free(path, way, pose, follower.speed, self._planner.radius)
+        follower.stop_at = min(follower.stop_at, free)
+        traffic.follow(way)
 
     @property
     def meets(self) -> bool:

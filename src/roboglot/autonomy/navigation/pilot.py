@@ -117,7 +117,7 @@ class Pilot:
             self._journey.waits(self._robot, self._action)
             self._report("waiting", Path(), 0.0)
             if self._courtesy.is_due_without_route():
-                await self._courtesy.go_aside(self._top)
+                left += await self._courtesy.go_aside(self._top)
             await self._clock.sleep(FIRST_ROUTE_PERIOD)
 
     async def _follow(self, follower: Follower) -> State:
@@ -143,9 +143,9 @@ class Pilot:
     async def _give_way(self, follower: Follower) -> State:
         """Move aside, wait there, and set out anew."""
         self._report("waiting", Path(), 0.0)
-        await self._courtesy.give_way(follower)
+        aside = await self._courtesy.give_way(follower)
         self._replanner.begin_again(follower)
-        follower.take(await self._first_route(follower.left))
+        follower.take(await self._first_route(follower.left + aside))
         self._lookout.follower = follower  # the robot may have given way again meanwhile, along another route
         self._patience.take(follower.left)
         self._patience.begin_anew()

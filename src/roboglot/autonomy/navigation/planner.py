@@ -77,7 +77,8 @@ class PlanningTask:
         """Return the route through all goals. Raises Unreachable."""
         rules = layers(self.drawn, GridFrame(self.corner, self.evidence.shape), self.tracks, self.start, self.goals)
         self._check_near()
-        cost = self.cost(rules)
+        bare = self.cost(rules)
+        cost = self._shunning(bare)
         legs: list[NDArray[np.float64]] = []
         start, driven = self.start, dict[tuple[Point, Point], NDArray[np.float64]]()  # a patrol repeats
         for number, goal in enumerate(self.goals, start=1):
@@ -92,7 +93,7 @@ class PlanningTask:
             start = goal
         route = Route(legs, self.goals, self.tolerance)
         cells = np.floor((route.points - (self.corner.x, self.corner.y)) / RESOLUTION).astype(np.int64)
-        near = np.sqrt(np.clip((cost[cells[:, 1], cells[:, 0]] - 1.0) / NEAR_COST, 0.0, 1.0)).astype(np.float64)
+        near = np.sqrt(np.clip((bare[cells[:, 1], cells[:, 0]] - 1.0) / NEAR_COST, 0.0, 1.0)).astype(np.float64)
         ceilings = self.top - max(0.0, self.top - SLOW) * near
         if rules and rules.speed is not None:
             ceilings = np.minimum(ceilings, rules.speed[cells[:, 1], cells[:, 0]])
@@ -166,13 +167,18 @@ class PlanningTask:
         self._reopen(cost)
         if rules and rules.extra is not None:
             cost += rules.extra
-        shun(cost, GridFrame(self.corner, self.evidence.shape), self.shunned)
         return cost
+
+    def _shunning(self, cost: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return ``cost`` raised on the shunned ways, which makes routes longer there but not slower."""
+        raised = cost.copy() if self.shunned else cost
+        shun(raised, GridFrame(self.corner, self.evidence.shape), self.shunned)
+        return raised
 
     def waiting_place(self) -> Point | None:
         """Return the nearest place off the shunned ways; None: there is none nearby."""
         frame = GridFrame(self.corner, self.evidence.shape)
-        cost = self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals))
+        cost = self._shunning(self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals)))
         return waiting_place(cost, self.evidence, frame, self.start, self.shunned)
 
     def _reopen(self, cost: NDArray[np.float32]) -> None:
@@ -280,20 +286,19 @@ class Planner:
 
     def forget_soon(self, places: Sequence[Point], now: float) -> None:
         """Shorten the memory of obstacles around ``places``, which are about to move."""
-        grid, until = self._belief.map, max(now - OBSTACLE_SECONDS + MOVING_SECONDS, 1e-3)
-        seen, frame = self._scans.seen(grid), GridFrame(grid.corner, grid.evidence.shape)
-        for place in places:
-            cells = seen[frame.around((place,), MOVING_REACH)]
-            cells[cells > until] = until
+        self._age(places, max(now - OBSTACLE_SECONDS + MOVING_SECONDS, 1e-3))
 
     def forget(self, places: Sequence[Point]) -> None:
         """Forget obstacles around ``places``, which will have moved before the robot gets there."""
-        if not places:
-            return
+        self._age(places, 0.0)
+
+    def _age(self, places: Sequence[Point], until: float) -> None:
+        """Make sightings around ``places`` at most as new as ``until``, s."""
         grid = self._belief.map
-        seen, frame = self._scans.seen(grid), GridFrame(grid.corner, grid.evidence.shape)
-        for place in places:
-            seen[frame.around((place,), MOVING_REACH)] = 0.0
+        frame, memories = GridFrame(grid.corner, grid.evidence.shape), (self._scans.seen(grid), self._low.seen(grid))
+        for window in (frame.around((place,), MOVING_REACH) for place in places):
+            for seen in memories:
+                np.minimum(seen[window], np.float32(until), out=seen[window])
 
     def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
         """Remember obstacles off the lidar's plane that ``echoes`` (map) do not show; return them in map (n, 2; m)."""

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 STANDS = 0.05  # m/s
 RULED_AFTER = 0.6  # s of standing in the way of a robot that goes first: a plan may lead around it meanwhile
 FACED_AFTER, FACED_MORE = 3.0, 4.0  # s of standing face to face; the second is scaled by the robot's name
+BACKS_OUT_AFTER = 1.0  # … in a narrow place, for the one with the shorter way back
 FACED_MAX = 10  # moves aside per drive for an object that may not want to pass
 ASIDE_MAX = 40  # per drive
 GO_SECONDS, STUCK_SECONDS = 10.0, 2.0
@@ -67,15 +68,17 @@ class Courtesy:
             return True
         if not faced or self._faced >= FACED_MAX:
             return False
-        return now - self._faced_since > FACED_AFTER + FACED_MORE * chance(self._robot.id, self._faced)
+        if now - self._faced_since > FACED_AFTER + FACED_MORE * chance(self._robot.id, self._faced):
+            return True
+        return now - self._faced_since > BACKS_OUT_AFTER and self._traffic.backs_out(self._course.belief.pose)
 
-    async def give_way(self, follower: Follower) -> None:
-        """Move aside, and wait until the way is free, or for a while."""
+    async def give_way(self, follower: Follower) -> float:
+        """Move aside, and wait until the way is free, or for a while; return the metres driven."""
         carrot, beyond = follower.carrot()
         path = follower.route.ahead(self._course.belief.pose, carrot, beyond, OLD_WAY)
         ruled = self._ruled_since < math.inf
         try:
-            await self.go_aside(follower.top)
+            aside = await self.go_aside(follower.top)
             follower.halt()
             if ruled:
                 await self._wait(path, WAIT_MIN, WAIT_MAX, ruled)
@@ -85,9 +88,10 @@ class Courtesy:
                 )
         finally:
             self._lookout.follower = follower
+        return aside
 
-    async def go_aside(self, top: float) -> None:
-        """Leave the others' ways at up to ``top`` m/s, if there is room, and stop."""
+    async def go_aside(self, top: float) -> float:
+        """Leave the others' ways at up to ``top`` m/s, if there is room, and stop; return the metres driven."""
         pose, traffic = self._course.belief.pose, self._traffic
         ruled = self._ruled_since < math.inf
         self._asides += 1
@@ -98,13 +102,16 @@ class Courtesy:
         self._lookout.follower = None
         traffic.rest()
         try:
-            route = await self._route_aside(ways)
+            route, aside = await self._route_aside(ways), 0.0
             if route is not None:
-                await self._go(Follower(self._robot[Base].limits, top, route))
+                follower = Follower(self._robot[Base].limits, top, route)
+                await self._go(follower, ruled=ruled)
+                aside = follower.along
             await stand_still(self._robot)
         finally:
             traffic.giving_way = False
             self._lookout.follower = None
+        return aside
 
     async def _route_aside(self, ways: list[tuple[Points, float]]) -> Route | None:
         here = self._course.belief.pose.point
@@ -116,17 +123,20 @@ class Courtesy:
         except Unreachable:
             return None
 
-    async def _go(self, follower: Follower) -> None:
-        """Drive along the route, as long as there is progress."""
+    async def _go(self, follower: Follower, *, ruled: bool) -> None:
+        """Drive along the route while there is progress; ``ruled``: at most until no robot that goes first is near."""
         belief, base = self._course.belief, self._robot[Base]
         self._lookout.follower = follower
-        begun = moved = self._clock.time()
+        begun = moved = due = self._clock.time()
         while (now := self._clock.time()) - begun < GO_SECONDS and now - moved < STUCK_SECONDS:
             if await self._action.hold(lambda: base.set_velocity(STILL)):
                 return
             pose = belief.pose
             follower.locate(pose)
             if follower.last and pose.distance_to(follower.end) < THERE:
+                return
+            due = due if ruled and self._traffic.is_beside(pose) else now
+            if now - due > RULED_AFTER:
                 return
             if not self._lookout.watches(follower) or belief.in_doubt:
                 follower.stop_at = follower.along

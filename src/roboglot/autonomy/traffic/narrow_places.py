@@ -16,14 +16,54 @@ HALF = 0.62  # m: half the width that two hulls of 0.27 m need side by side, wit
 REACH = 16.0  # m around the robot that are examined: no announced route is longer
 KEPT, MOVED = 5.0, 2.0  # s, m after which the map is examined again
 TILE = 64  # cells along a side of the pieces in which that is done, when asked
-AROUND = 2 * math.ceil(HALF / RESOLUTION) + 4  # cells around a piece that count there
+THROUGH = 0.7  # m that are free on both sides of a door, across its gap
+HULL = 0.35  # m from a door within which a robot's hull is in it
+AXES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, -1), (2, 1), (1, -2))  # directions, in cells, to measure gaps in
+THICK = 2  # cells by which walls are thickened for that: a thin slanting one does not lie along an axis
+AROUND = 2 * math.ceil(HALF / RESOLUTION) + math.ceil(HULL / RESOLUTION) + 4  # cells around a piece that count there
 
 
 def narrow(evidence: NDArray[np.int16]) -> NDArray[np.bool_]:
-    """Return the mask of free cells where no disc as wide as two robots fits."""
-    reach = HALF / RESOLUTION
-    wide = distances((evidence > 0).astype(np.uint8), reach + 1.0) >= reach
-    found: NDArray[np.bool_] = (distances(wide.astype(np.uint8), reach + 2.0) > reach + 1.0) & (evidence < 0)
+    """Return the mask of free cells where no disc as wide as two robots fits, or in or close to a door."""
+    reach, occupied = HALF / RESOLUTION, evidence > 0
+    wide = distances(occupied.astype(np.uint8), reach + 1.0) >= reach
+    found: NDArray[np.bool_] = distances(wide.astype(np.uint8), reach + 2.0) > reach + 1.0
+    thick = distances(occupied.astype(np.uint8), THICK + 1.0) <= THICK
+    doors = _gaps(thick) & ~thick & ~wide & (evidence < 0)
+    if doors.any():
+        found |= distances(doors.astype(np.uint8), HULL / RESOLUTION + 1.0) <= HULL / RESOLUTION
+    return found & (evidence < 0)
+
+
+def _gaps(thick: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the mask of cells between two obstacles too close for two robots, with floor before and behind.
+
+    Discs from both sides cover a door in a thin wall, so they do not find it. ``thick``: cells within THICK of one.
+    """
+    found, narrow_cells = np.zeros(thick.shape, bool), 2.0 * (HALF / RESOLUTION - THICK)
+    steps = {axis: math.hypot(*axis) for axis in AXES}
+    rays = {
+        way: _free_cells(thick, way, math.ceil(narrow_cells / steps[axis]))
+        for axis in AXES
+        for way in (axis, (-axis[0], -axis[1]))
+    }
+    for (down, along), step in steps.items():
+        across = (rays[down, along] + rays[-down, -along] + 1) * step < narrow_cells
+        ahead, behind = (rays[way] for way in ((along, -down), (-along, down)))
+        found |= across & (np.minimum(ahead, behind) * step >= THROUGH / RESOLUTION - THICK)
+    return found
+
+
+def _free_cells(occupied: NDArray[np.bool_], way: tuple[int, int], far: int) -> NDArray[np.int16]:
+    """Return the number of cells, ``far`` at most, between each cell and the next occupied one that way."""
+    height, width = occupied.shape
+    reach = far * max(map(abs, way))
+    around = np.pad(occupied, reach)
+    found, free = np.zeros(occupied.shape, np.int16), np.ones(occupied.shape, bool)
+    for k in range(1, far + 1):
+        top, left = reach + k * way[0], reach + k * way[1]
+        free &= ~around[top : top + height, left : left + width]
+        found += free
     return found
 
 
@@ -33,41 +73,52 @@ class NarrowPlaces:
     def __init__(self) -> None:
         self._looked_at, self._around, self._grid = -math.inf, Point(), EvidenceGrid()
         self._first, self._evidence = (0, 0), np.zeros((0, 0), np.int16)
-        self._narrow, self._known = np.zeros((0, 0), bool), np.zeros((0, 0), bool)  # by cell, and by piece
+        self._now: dict[tuple[int, int], NDArray[np.bool_]] = {}  # narrow cells of the pieces examined since
+        self._before: dict[tuple[int, int], tuple[NDArray[np.int8], NDArray[np.bool_]]] = {}  # … of what they showed
 
     def at(self, grid: EvidenceGrid, points: NDArray[np.float64], now: float) -> NDArray[np.bool_]:
         """Return which of ``points`` (n, 2; map; the first is the robot's) lie in a narrow place.
 
-        No disc as wide as two robots fits into the free floor there.
+        No disc as wide as two robots fits into the free floor there, or it is a door.
         """
         here = Point(float(points[0, 0]), float(points[0, 1]))
         if grid is not self._grid or now - self._looked_at > KEPT or here.distance_to(self._around) > MOVED:
             self._look(grid, here)
             self._looked_at, self._around, self._grid = now, here, grid
-        (first_x, first_y), (height, width) = self._first, self._narrow.shape
+        (first_row, first_column), (height, width) = self._first, self._evidence.shape
         found = np.zeros(len(points), bool)
-        for number, (x, y) in enumerate(np.floor(points / RESOLUTION).astype(np.intp).tolist()):
-            row, column = y - first_y, x - first_x
-            if 0 <= row < height and 0 <= column < width:
-                if not self._known[row // TILE, column // TILE]:
-                    self._examine(row // TILE, column // TILE)
-                found[number] = self._narrow[row, column]
+        for number, (column, row) in enumerate(np.floor(points / RESOLUTION).astype(np.intp).tolist()):
+            if 0 <= row - first_row < height and 0 <= column - first_column < width:
+                piece = row // TILE, column // TILE
+                if piece not in self._now:
+                    self._now[piece] = self._examined(piece)
+                found[number] = self._now[piece][row % TILE, column % TILE]
         return found
 
     def _look(self, grid: EvidenceGrid, here: Point) -> None:
         """Copy the map around ``here``."""
         rows, columns = GridFrame(grid.corner, grid.evidence.shape).around((here,), REACH)
         self._evidence = grid.evidence[rows, columns].copy()
-        height, width = self._evidence.shape
-        self._narrow = np.zeros((height, width), bool)
-        self._known = np.zeros((-(-height // TILE), -(-width // TILE)), bool)
-        self._first = (grid.first_column + columns.start, grid.first_row + rows.start)
+        self._first = (grid.first_row + rows.start, grid.first_column + columns.start)
+        self._now = {}
+        if grid is not self._grid:
+            self._before = {}
 
-    def _examine(self, down: int, along: int) -> None:
-        """Examine one piece, with the cells around it that matter."""
-        self._known[down, along] = True
-        row, column = down * TILE, along * TILE
-        top, left = max(0, row - AROUND), max(0, column - AROUND)
-        part = np.ascontiguousarray(self._evidence[top : row + TILE + AROUND, left : column + TILE + AROUND])
-        inner = slice(row - top, row - top + TILE), slice(column - left, column - left + TILE)
-        self._narrow[row : row + TILE, column : column + TILE] = narrow(part)[inner]
+    def _examined(self, piece: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return the narrow cells of one piece (TILE, TILE), with the cells around it that matter.
+
+        It is only examined anew if it shows something else than the last time.
+        """
+        top, left = (number * TILE - first for number, first in zip(piece, self._first, strict=True))
+        rows, columns = (slice(max(0, first - AROUND), first + TILE + AROUND) for first in (top, left))
+        shown = np.sign(self._evidence[rows, columns]).astype(np.int8)
+        before = self._before.get(piece)
+        if before is not None and np.array_equal(before[0], shown):
+            return before[1]
+        found, whole = np.zeros((TILE, TILE), bool), narrow(shown.astype(np.int16))
+        first_row, first_column = top - rows.start, left - columns.start  # of the piece in what is shown
+        inner = whole[max(0, first_row) : first_row + TILE, max(0, first_column) : first_column + TILE]
+        down, along = max(0, -first_row), max(0, -first_column)
+        found[down : down + inner.shape[0], along : along + inner.shape[1]] = inner
+        self._before[piece] = shown, found
+        return found

@@ -119,6 +119,15 @@ def through_narrow(mover: Mover, points: Points, narrow: NDArray[np.bool_]) -> W
     return Way(points[:end], mover.speed, mover.radius, outranks=True, lively=True)
 
 
+def joined(narrow: NDArray[np.bool_], longest: int) -> NDArray[np.bool_]:
+    """Return ``narrow``, by point of a way, with gaps of up to ``longest`` points between such places filled."""
+    filled, at = narrow.copy(), np.flatnonzero(narrow)
+    gaps = np.diff(at)
+    for gap in np.flatnonzero((gaps > 1) & (gaps <= longest)).tolist():
+        filled[at[gap] : at[gap + 1]] = True
+    return filled
+
+
 def shifted(way: Way) -> Points:
     """Return the way's points shifted to its right, so that plans pass on the other side."""
     if len(way.points) < 2:
@@ -141,7 +150,7 @@ def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> 
         close = way.distances(mine) < radius + way.radius + CLEAR
         if not close.any():
             continue
-        against = _directions(mine) @ _directions(way.points).T < ALIKE
+        against = directions(mine) @ directions(way.points).T < ALIKE
         later = way.seconds[None, :] - seconds[:, None]
         close &= against
         meets = np.asarray((close & (later > -BEFORE) & (later < AFTER)).any(axis=1))
@@ -155,7 +164,7 @@ def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> 
             yield Meeting(float(meets.argmax()) * STEP, way, stands)
 
 
-def _directions(points: Points) -> Points:
+def directions(points: Points) -> Points:
     """Return unit vectors along a way (n, 2)."""
     ahead = np.diff(points, axis=0, append=points[-1:])
     ahead[-1] = ahead[-2]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.navigation.route import SPACING
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.traffic.announcer import Announcer
+from roboglot.autonomy.traffic.one_way import OneWay
 from roboglot.autonomy.traffic.right_of_way import (
     CLEAR,
     STEP,
@@ -21,6 +22,7 @@ from roboglot.autonomy.traffic.right_of_way import (
     announced_way,
     expected_way,
     free_of_movers,
+    joined,
     meetings,
     shifted,
     straight_on,
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 
 ANNOUNCED = 5.0  # m of the route that are announced, plus any narrow place beyond
 SAME = 0.6  # m between the sighting and the announcement of the same robot
-BEFORE_NARROW = 0.35  # m in front of a narrow place where the robot waits
+BEFORE_NARROW = 0.6  # m in front of a narrow place where the robot waits: one that comes out has room to turn
 FACING = 0.27 + 0.5  # m between a hull and the centre of the object in front of it
 AROUND = 4.0  # m within which other robots may be the obstacle
 LIVELY = 8.0  # s after its last motion for which a robot counts as under way
@@ -45,6 +47,7 @@ STOPPED = 5.0  # s after which a robot standing in a narrow place may reverse, t
 IN_IT = 0.9  # m between the centre of such a robot and the place that it blocks
 TRAIL = 20  # places that were passed
 TRAIL_STEP = 0.2  # m between two of them
+BETWEEN = 2.0  # m between two narrow places of a way that count as one: a robot that waits there is in the way
 
 Points = NDArray[np.float64]
 
@@ -58,6 +61,7 @@ class Traffic:
         self._tracker: MoverTracker | None = None  # set once something drives: these two need the kernels
         self._narrow: NarrowPlaces | None = None
         self._ways: list[Way] = []
+        self._one_way = OneWay()
         self._went: dict[str, float] = {}  # time of the last announced route by robot, s
         self._trail: deque[Point] = deque(maxlen=TRAIL)
         self.meeting: Meeting | None = None  # with a robot that goes first
@@ -87,12 +91,16 @@ class Traffic:
             self._ways = [announced_way(other, mine, lively=self._goes(other)) for other in heard]
         self._went = {other.robot: self._went[other.robot] for other in heard if other.robot in self._went}
         self._ways += [self._expected(mover, pose, stamp, inside=inside) for mover in movers]
+        self._one_way.observe(self._ways, stamp)
 
     def _is_inside(self, pose: Pose, heard: list[Announcement], movers: list[Mover], stamp: float) -> bool:
         """True if the robot is in a narrow place, and there are others."""
         if not heard and not any(stamp - mover.moved_at <= LIVELY for mover in movers):
             return False
-        return bool(self._narrow_at(np.array([(pose.x, pose.y)]))[0])
+        behind = [(point.x, point.y) for point in self._trail]
+        ahead = self._announcer.way[: round(BETWEEN / STEP)]
+        line = np.concatenate([[(pose.x, pose.y)], np.reshape(behind, (-1, 2)), [(pose.x, pose.y)], ahead])
+        return bool(self._narrow_at(line, STEP, skipped=1)[len(behind)])
 
     def _goes(self, other: Announcement) -> bool:
         """True if another robot announces a way, or did so a moment ago."""
@@ -105,7 +113,7 @@ class Traffic:
         stood = stamp - mover.moved_at
         if not inside and stood <= STOPPED:
             points = straight_on(mover, THROUGH)
-            narrow = self._narrow_at(np.concatenate([[(pose.x, pose.y)], points]))[1:]
+            narrow = self._narrow_at(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
             if narrow[0]:
                 return through_narrow(mover, points, narrow)
         return expected_way(mover, lively=stood <= LIVELY)
@@ -132,38 +140,55 @@ class Traffic:
         return any(way.lively and way.is_within(IN_IT, here) for way in self._ways)
 
     def is_among_others(self, pose: Pose) -> bool:
-        """True if robots or other moving things are near."""
-        return any((way.name or way.speed > 0.0) and way.is_within(AROUND, pose) for way in self._ways)
+        """True if other robots or things that are under way are near."""
+        return any(way.lively and way.is_within(AROUND, pose) for way in self._ways)
 
-    def free(self, path: Points, pose: Pose, speed: float, radius: float) -> float:
-        """Return the distance along ``path`` (dense) free of movers and of others' right of way, m; inf: all."""
+    def free(self, path: Points, way: Points, pose: Pose, speed: float, radius: float) -> float:
+        """Return the distance along ``path`` (dense) free of movers and of others' right of way, m; inf: all.
+
+        ``way`` (dense): the path and its continuation.
+        """
         if not self._ways:
             self.meeting, self.meets = None, False
             return math.inf
         free = free_of_movers(path, pose, radius, self._ways)
         found = [] if self.giving_way else list(meetings(path, speed, radius, self._ways))
-        self.meets = bool(found)
+        self.meets = any(meeting.way.outranks or not meeting.way.name for meeting in found)
         ruled = [meeting for meeting in found if meeting.way.outranks]
         self.meeting = min(ruled, key=lambda meeting: meeting.along, default=None)
+        if self.meeting is None and not self.giving_way:
+            narrow, now = self._narrow_at(way), self._robot.clock.time()
+            self.meeting = self._one_way.meeting(way, narrow, speed, radius, self._ways, now)
         if self.meeting is not None:
-            free = min(free, self._before_narrow(path, self.meeting.along))
+            self.meets, free = True, min(free, self._before_narrow(way, self.meeting, radius))
         return free
 
-    def _before_narrow(self, path: Points, along: float) -> float:
-        """Return the distance to the waiting point for a meeting ``along`` m ahead, outside of narrow places, m."""
-        narrow = self._narrow_at(path)
-        last = min(int(along / SPACING), len(narrow) - 1)
-        if narrow[0] or not narrow[last]:
-            return along
-        wide = np.flatnonzero(~narrow[: last + 1])
-        return max(0.0, float(wide[-1]) * SPACING - BEFORE_NARROW)
+    def _before_narrow(self, path: Points, meeting: Meeting, radius: float) -> float:
+        """Return the distance to the waiting point for ``meeting``, outside of narrow places and of the other's way, m.
 
-    def _narrow_at(self, path: Points) -> NDArray[np.bool_]:
+        In the other's way only where the robot is in it already.
+        """
+        narrow = self._narrow_at(path)
+        last = min(int(meeting.along / SPACING), len(narrow) - 1)
+        if narrow[0] or not narrow[last]:
+            return meeting.along
+        entry = int(np.flatnonzero(~narrow[: last + 1])[-1])
+        entry = max(0, entry - round(BEFORE_NARROW / SPACING))
+        away = meeting.way.distances(path[: entry + 1]).min(axis=1)
+        clear = np.flatnonzero(away >= radius + meeting.way.radius + CLEAR)
+        return float(clear[-1] if len(clear) else entry) * SPACING
+
+    def _narrow_at(self, path: Points, spacing: float = SPACING, *, skipped: int = 0) -> NDArray[np.bool_]:
+        """Return which points of ``path``, ``spacing`` m apart, are too narrow for two, or between two such places.
+
+        The first point is the robot's; the first ``skipped`` ones do not belong to the path.
+        """
         if self._narrow is None:
             from roboglot.autonomy.traffic.narrow_places import NarrowPlaces
 
             self._narrow = NarrowPlaces()
-        return self._narrow.at(self._belief.map, path, self._robot.clock.time())
+        narrow = self._narrow.at(self._belief.map, path, self._robot.clock.time())[skipped:]
+        return joined(narrow, round(BETWEEN / spacing))
 
     def shunned(self) -> list[tuple[Points, float]]:
         """Return ways to avoid, with their distances (m): of robots with right of way or without announcements."""
@@ -187,10 +212,36 @@ class Traffic:
             for way in self._ways
         )
 
+    def is_beside(self, pose: Pose) -> bool:
+        """True if all that go first drive past ``pose``, or none does."""
+        here = np.array([(pose.x, pose.y)])
+        return not any(
+            len(points) >= 2 and bool((np.hypot(*(points - here).T) < reach).any()) for points, reach in self.to_leave()
+        )
+
     def is_faced(self, pose: Pose) -> bool:
         """True if another robot, or a person, may stand close."""
         reach = self._robot.description.radius + FACING
         return any(way.is_within(reach, pose) for way in self._ways)
+
+    def backs_out(self, pose: Pose) -> bool:
+        """True if the way back out of a narrow place is shorter for this robot than for one that announces nothing.
+
+        Both can see that, so they agree without words; straight on counts.
+        """
+        reach, here = self._robot.description.radius + FACING, np.array((pose.x, pose.y))
+        faced = [way.points[0] for way in self._ways if not way.name and way.is_within(reach, pose)]
+        if not faced:
+            return False
+        there = min(faced, key=lambda point: float(np.hypot(*(point - here))))
+        back = (here - there) / max(float(np.hypot(*(here - there))), 1e-6)
+        steps = np.arange(0.0, THROUGH, STEP)[:, None]
+        line = np.concatenate([[here], (here + steps * back)[::-1], there - steps * back])
+        narrow = self._narrow_at(line, STEP, skipped=1)
+        mine, others = narrow[: len(steps)][::-1], narrow[len(steps) :]
+        if not (mine[0] and others[0]):
+            return False
+        return int(np.argmin([*mine, False])) < int(np.argmin([*others, False]))
 
     def face_to_face(self, pose: Pose) -> list[tuple[Points, float]]:
         """Return the way that robots close by may need: where this one came from, with its distance (m)."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.autonomy.traffic.narrow_places import narrow
+from roboglot.kernels.distance import distances
 from roboglot.kernels.search import ways_from
 from roboglot.model.geometry import Point
 
@@ -18,6 +19,7 @@ REACH = 6.0  # m around the robot that are searched
 SHUN_COST = 4.0  # extra cost of a cell on another robot's route
 SHUN_POINTS = 40
 NARROW_COST = 60.0  # extra cost of waiting in a narrow place: equal to 3 m of open floor
+MOUTH, MOUTH_COST = 0.6, 20.0  # m around a narrow place where others come out, and the cost of waiting there
 
 Points = NDArray[np.float64]
 
@@ -50,7 +52,12 @@ def waiting_place(
         return None
     near[row, column] = min(near[row, column], 10.0)
     paid = ways_from(near, row, column)
-    paid += np.where(narrow(evidence[rows, columns]), np.float32(NARROW_COST), np.float32(0.0))
+    tight, mouth = narrow(evidence[rows, columns]), MOUTH / RESOLUTION
+    paid += np.where(tight, np.float32(NARROW_COST), np.float32(0.0))
+    if tight.any():
+        paid += np.where(
+            distances(tight.astype(np.uint8), mouth + 1.0) <= mouth, np.float32(MOUTH_COST), np.float32(0.0)
+        )
     corner = Point(frame.corner.x + columns.start * RESOLUTION, frame.corner.y + rows.start * RESOLUTION)
     part = GridFrame(corner, (near.shape[0], near.shape[1]))
     for points, reach in ways:
