@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Awaitable, Callable, Hashable, Iterator, Mapping
 from enum import StrEnum
+from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -39,22 +40,48 @@ class BadParameters(ValueError):
     """The parameters do not fit the handler's signature; the message names the parameter and the expected value."""
 
 
+class Schema:
+    """Schema that a handler's signature is; read when it is first asked for, as most operations never are."""
+
+    def __init__(self, handler: Callable[..., Awaitable[Any]]) -> None:
+        self._handler = handler
+
+    @cached_property
+    def signature(self) -> inspect.Signature:
+        """The signature, with types for annotations."""
+        return inspect.signature(self._handler, eval_str=True)
+
+    @cached_property
+    def parameters(self) -> type[msgspec.Struct]:
+        """Struct of the parameters after the first."""
+        return _parameters_of(self._handler.__qualname__, self.signature)
+
+
 @dataclass(frozen=True, slots=True)
 class Operation(Generic[K]):
     """One handler under its wire name.
 
-    ``answer``: the handler's return type. ``partial``: the missing part in plain words; empty if the operation is
+    ``partial``: the missing part in plain words; empty if the operation is
     complete. The coverage page counts only complete ones. ``right``: the right that a client needs; None, which a test
     refuses, means ADMIN. ``needs``: components of the robot without which the handler refuses.
     """
 
     key: K
     handler: Callable[..., Awaitable[Any]]
-    parameters: type[msgspec.Struct]
-    answer: object
+    schema: Schema
     partial: str
     right: Right | None
     needs: frozenset[type]
+
+    @property
+    def parameters(self) -> type[msgspec.Struct]:
+        """Struct of the handler's parameters after the first."""
+        return self.schema.parameters
+
+    @property
+    def answer(self) -> object:
+        """The handler's return type."""
+        return self.schema.signature.return_annotation
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -102,20 +129,12 @@ class OperationTable(Generic[K]):
         """Register a handler under ``keys``, for clients with ``right`` and robots with the components in ``needs``."""
 
         def register(handler: Handler) -> Handler:
-            signature = inspect.signature(handler, eval_str=True)
-            parameters = _parameters_of(handler.__qualname__, signature)
+            _refuse_untyped(handler)
+            schema = Schema(handler)
             for key in keys:
                 if key in self._operations:
                     raise ValueError(f"{self.name}: {key!r} is declared twice")
-                self._operations[key] = Operation(
-                    key,
-                    handler,
-                    parameters,
-                    signature.return_annotation,
-                    partial,
-                    right or self._right,
-                    frozenset(needs),
-                )
+                self._operations[key] = Operation(key, handler, schema, partial, right or self._right, frozenset(needs))
             return handler
 
         return register
@@ -145,13 +164,21 @@ class OperationTable(Generic[K]):
         return len(self._operations)
 
 
+def _refuse_untyped(handler: Callable[..., object]) -> None:
+    """Raise TypeError for a parameter after the first without a type; a look at the code takes no signature."""
+    code = getattr(inspect.unwrap(handler), "__code__", None)
+    if code is None:
+        return
+    for name in code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]:
+        if name not in handler.__annotations__:
+            raise TypeError(f"{handler.__qualname__}: parameter {name} has no type")
+
+
 def _parameters_of(name: str, signature: inspect.Signature) -> type[msgspec.Struct]:
     """Return a struct type with a handler's parameters after the first."""
     _, *parameters = signature.parameters.values()
     fields: list[tuple[str, object] | tuple[str, object, object]] = []
     for parameter in parameters:
-        if parameter.annotation is parameter.empty:
-            raise TypeError(f"{name}: parameter {parameter.name} has no type")
         field = (parameter.name, parameter.annotation)
         fields.append(field if parameter.default is parameter.empty else (*field, parameter.default))
     return msgspec.defstruct(name, fields, kw_only=True)
