@@ -25,7 +25,7 @@ class Point:
     y: float = 0.0
 
 
-def made(dataclass: Callable[..., Any], **options: bool) -> type:
+def made(dataclass: Callable[..., Any], **options: bool) -> Any:
     """Return a class with every kind of field."""
 
     @dataclass(slots=True, **options)
@@ -75,7 +75,7 @@ def test_frozen_values_are_refused_changes_and_hashable(dataclass: Callable[...,
         left: int
         right: int = 1
 
-    pair = Pair(4)
+    pair: Any = Pair(4)
     with pytest.raises(dataclasses.FrozenInstanceError, match="cannot assign to field 'left'"):
         pair.left = 5
     with pytest.raises(dataclasses.FrozenInstanceError, match="cannot delete field 'left'"):

@@ -43,7 +43,7 @@ class BadParameters(ValueError):
 class Schema:
     """Schema that a handler's signature is; read when it is first asked for, as most operations never are."""
 
-    def __init__(self, handler: Callable[..., Awaitable[Any]]) -> None:
+    def __init__(self, handler: Callable[..., object]) -> None:
         self._handler = handler
 
     @cached_property

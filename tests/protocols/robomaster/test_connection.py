@@ -3,13 +3,14 @@
 import asyncio
 import random
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.geometry import Twist
+from roboglot.model.inputs.turns import Share, Turns
 from roboglot.protocols.robomaster import limits
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
@@ -17,6 +18,17 @@ from tests.protocols.robomaster.text_client import ADDRESS
 
 FLOOD = 50_000
 PATIENCE = 100  # s, on a busy machine
+
+
+class Scripted(Turns):
+    """Lets clients wait as the test says."""
+
+    waits: Sequence[float] = ()
+
+    def wait(self, share: Share) -> float:
+        super().wait(share)
+        first, *self.waits = self.waits or (0.0,)
+        return first
 
 
 async def until(condition: Callable[[], object]) -> None:
@@ -212,6 +224,22 @@ async def test_flood_behind_a_waiting_command_is_answered_whole(client, connect,
     assert await client.reply() == "ok;"
     for _ in range(FLOOD):
         assert await client.reply() == "chassis_lead;"
+
+
+async def test_flood_waits_for_turns_and_is_answered(connect, robot) -> None:
+    robot.turns = turns = Scripted(lambda: 0.0)
+    greedy = await connect()
+    assert await greedy.ask("command;") == "ok;"
+    turns.waits = [0.01, 0.01, 0.0, 0.01]
+    greedy.send("robot mode ?;" * (3 * limits.BATCH_MAX))
+    for _ in range(3 * limits.BATCH_MAX):
+        assert await greedy.reply() == "chassis_lead;"
+    assert not turns.waits
+    turns.waits = [60.0]
+    greedy.send("robot mode ?;")
+    await until(lambda: not turns.waits)
+    assert await (await connect()).ask("version;") == "version 00.00.00.70;"
+    await greedy.close()
 
 
 async def test_client_that_is_not_read_from_can_leave(client, door, robot, forward) -> None:

@@ -1,1 +1,1 @@
-"""Inputs of a run that are no requests at doors: what they are, who notes them, how they are given again."""
+"""Inputs from outside: those that are no requests at doors, noted and given again; the turns of clients."""

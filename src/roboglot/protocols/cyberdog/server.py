@@ -243,7 +243,11 @@ class _Service:
             return
         code = request.nameCode
         await self._count(peer, len(request.params))
-        tap = self._context.robot.tap
+        tap, turns = self._context.robot.tap, self._context.robot.turns
+        share = turns.of(peer.partition(":")[2]) if turns else None
+        if turns and share:
+            await pay(turns.wait(share))
+            begun = turns.now()
 
         async def reply(value: object) -> None:
             if tap.watched:
@@ -259,6 +263,8 @@ class _Service:
         except asyncio.CancelledError:  # the app does not wait for the end
             self._note_end(peer, code, call.began)
             raise
+        if turns and share:
+            turns.took(share, turns.now() - begun)
         if last is not None:
             await self._say(rpc, _answer(code, last))
 

@@ -10,6 +10,7 @@ from functools import cache
 from typing import cast
 
 from roboglot.model.inputs.outside import CAME, GONE
+from roboglot.model.inputs.turns import Share
 from roboglot.model.lateness import late
 from roboglot.protocols.robomaster.context import Context, speak_as
 from roboglot.protocols.robomaster.dispatch import DOOR, Answer, answer
@@ -38,6 +39,7 @@ class ControlConnection(asyncio.Protocol):
     host: str
     driver: DrivingClient
     _name: str  # host and port of the client
+    _share: Share | None  # of the program's time
     _shown: str  # in the log: its identity if known, and its host
 
     def __init__(
@@ -59,6 +61,7 @@ class ControlConnection(asyncio.Protocol):
         self._commands: deque[str | None] = deque()
         self._resting: asyncio.TimerHandle | None = None  # while reading is paused
         self._worker: asyncio.Task[None] | None = None
+        self._turn: asyncio.TimerHandle | None = None  # while others come first
         self._writable = asyncio.Event()
         self._writable.set()
         self._explained = 0
@@ -75,6 +78,8 @@ class ControlConnection(asyncio.Protocol):
             transport.abort()
             return
         self.driver = DrivingClient(self._name, self.host, transport.get_extra_info("socket"))
+        turns = self._context.robot.turns
+        self._share = turns.of(self._name) if turns else None
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)
@@ -100,6 +105,8 @@ class ControlConnection(asyncio.Protocol):
             self._resting.cancel()
         if self._worker:
             self._worker.cancel()
+        if self._turn:
+            self._turn.cancel()
         self._context.stop_speaker(self._name)
         self._context.leave(self)
         log.info("robomaster: %s disconnected", self._shown)
@@ -135,8 +142,23 @@ class ControlConnection(asyncio.Protocol):
         """Execute queued commands; those that must wait continue in a task."""
         if finished is not None:
             self._worker = None
-        if not self._commands or self._worker is not None or self.transport.is_closing():
+        if not self._commands or self._worker is not None or self._turn or self.transport.is_closing():
             return
+        turns, share = self._context.robot.turns, self._share
+        if turns is None or share is None:
+            self._begin()
+        elif seconds := turns.wait(share):
+            self._turn = asyncio.get_running_loop().call_later(seconds, self._take_turn)
+        else:
+            begun = turns.now()
+            self._begin()
+            turns.took(share, turns.now() - begun)
+
+    def _take_turn(self) -> None:
+        self._turn = None
+        self._go_on()
+
+    def _begin(self) -> None:
         self._worker = begin(self._work(), f"robomaster {self.host}")
         if self._worker is not None:
             self._worker.add_done_callback(self._go_on)

@@ -63,6 +63,7 @@ from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.parameters import Parameters
 from roboglot.protocols.slamware.routes import BEYOND, Match, Routes
 from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text
+from roboglot.transport.limiter import pay
 from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
@@ -102,7 +103,10 @@ class Application:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         peer = scope.get("client") or ("", 0)
         client = f"slamware {peer[0]}".strip()
-        ask_for(client, f"{peer[0]}:{peer[1]}")
+        address = f"{peer[0]}:{peer[1]}"
+        ask_for(client, address)
+        if turns := self._context.robot.turns:
+            await pay(turns.wait(turns.of(address)))
         begun = perf_counter()
         shared: Headers = []
         why = ""
@@ -125,6 +129,8 @@ class Application:
             self._log(client, scope, status, body, perf_counter() - begun)
         if self._tap.watched:
             self._note_reply(scope, status, body, why)
+        if turns:
+            turns.took(turns.of(address), perf_counter() - begun)
         await late(self._context.robot)
         headers += shared
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []

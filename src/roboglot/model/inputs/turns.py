@@ -1,0 +1,108 @@
+"""Fair turns of the clients of a program that one thread serves. Knows no socket and no protocol.
+
+In each WINDOW of the machine's time, the requests of all clients together may take PART of it before anyone waits. Then
+those that had more than an equal part wait for the next window, and the others go on. So a client that asks as fast as
+it can takes what is free, and slows neither the others nor the robots; one that is alone never waits. Parts are equal
+between hosts, and between all connections: a host gains nothing by having many.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+log = logging.getLogger(__name__)
+WINDOW = 0.1  # s
+PART = 0.5  # of a window, for the requests of all clients
+ACTIVE_SECONDS = 1.0  # since its last request a client counts as one that wants its part
+LOG_SECONDS = 10.0  # between two log lines on one client
+COST_MAX = 0.02  # s that one request counts: longer ones wait for something
+CLIENTS_MAX = 4096  # connections counted at the same time; the oldest are dropped first
+
+
+class Share:
+    """Use that a connection, or all those of a host, made of a window."""
+
+    __slots__ = ("host", "last", "name", "named", "used", "window")
+
+    def __init__(self, name: str, host: Share | None) -> None:
+        self.name, self.host = name, host
+        self.last = 0.0  # time of the last request
+        self.named = -LOG_SECONDS  # time of the last log line
+        self.used = 0.0  # s in the window of that number
+        self.window = 0
+
+    def add(self, seconds: float, window: int) -> None:
+        """Count what a request took."""
+        if self.window != window:
+            self.window, self.used = window, 0.0
+        self.used += seconds
+
+
+class Turns:
+    """Turns of all clients of a program. ``now``: the machine's time in s, as its one thread has it."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self.now = now
+        self._shares: dict[str, Share] = {}  # by "host:port"
+        self._hosts: dict[str, Share] = {}
+        self._window, self._end, self._total = 0, 0.0, 0.0
+        self._connections = self._clients = 0  # active ones, counted in a window when someone has to wait
+
+    def of(self, peer: str) -> Share:
+        """Return the share of a connection from ``peer`` ("10.0.0.7:40312")."""
+        share = self._shares.get(peer)
+        if share is None:
+            if len(self._shares) >= CLIENTS_MAX:
+                self._forget()
+            name = peer.rpartition(":")[0]
+            host = self._hosts.setdefault(name, Share(name, None))
+            share = self._shares[peer] = Share(peer, host)
+        return share
+
+    def wait(self, share: Share) -> float:
+        """Return the seconds until a client may have its next answer; the log names one that waits."""
+        now = self.now()
+        assert share.host is not None
+        share.last = share.host.last = now
+        if now >= self._end:
+            self._window += 1
+            self._end, self._total, self._connections = now + WINDOW, 0.0, 0
+        if self._total < PART * WINDOW or not self._is_over(share, now):
+            return 0.0
+        if now - share.host.named >= LOG_SECONDS:
+            share.host.named = now
+            log.warning(
+                "client %s waits for others: it asks for more than its share of %d connections",
+                share.name,
+                self._connections,
+            )
+        return self._end - now
+
+    def took(self, share: Share, seconds: float) -> None:
+        """Count a request that took ``seconds``."""
+        seconds = min(seconds, COST_MAX)
+        assert share.host is not None
+        share.add(seconds, self._window)
+        share.host.add(seconds, self._window)
+        self._total += seconds
+
+    def _is_over(self, share: Share, now: float) -> bool:
+        """Return whether a client, or its host, had more than an equal part of this window."""
+        if not self._connections:
+            recent = now - ACTIVE_SECONDS
+            self._connections = sum(each.last >= recent for each in self._shares.values())
+            self._clients = sum(each.last >= recent for each in self._hosts.values())
+        assert share.host is not None
+        return any(
+            count > 1 and each.window == self._window and each.used > PART * WINDOW / count
+            for each, count in ((share, self._connections), (share.host, self._clients))
+        )
+
+    def _forget(self) -> None:
+        """Drop the connections whose last request is oldest: a quarter."""
+        oldest = sorted(self._shares.items(), key=lambda item: item[1].last)
+        for peer, _ in oldest[: CLIENTS_MAX // 4]:
+            del self._shares[peer]
+        left = {share.host for share in self._shares.values()}
+        self._hosts = {name: host for name, host in self._hosts.items() if host in left}

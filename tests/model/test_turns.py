@@ -1,0 +1,98 @@
+"""Clients of a busy program get equal parts of it; one that asks for more waits, and the log names it."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from roboglot.model.inputs.turns import CLIENTS_MAX, COST_MAX, LOG_SECONDS, PART, WINDOW, Turns
+
+GREEDY, MODEST = "10.0.0.7:4001", "10.0.0.8:4002"
+
+
+class Machine:
+    """Time that passes when the test says so, and a loop that answers requests one after another."""
+
+    def __init__(self) -> None:
+        self.time = 100.0
+        self.turns = Turns(lambda: self.time)
+
+    def ask(self, peer: str, seconds: float) -> float:
+        """Answer a request that takes ``seconds``; return how long it waited before."""
+        share = self.turns.of(peer)
+        waited = 0.0
+        while wait := self.turns.wait(share):
+            waited += wait
+            self.time += wait
+        self.time += seconds
+        self.turns.took(share, seconds)
+        return waited
+
+
+@pytest.fixture
+def machine() -> Machine:
+    return Machine()
+
+
+def test_one_alone_never_waits(machine: Machine) -> None:
+    assert not any(machine.ask(GREEDY, 0.01) for _ in range(100))
+
+
+def test_greedy_client_waits_and_modest_does_not(machine: Machine, caplog: pytest.LogCaptureFixture) -> None:
+    began, used = machine.time, 0.0
+    with caplog.at_level(logging.WARNING):
+        while machine.time < began + 2.0:
+            assert machine.ask(MODEST, 0.001) == 0.0
+            for _ in range(20):
+                machine.ask(GREEDY, 0.004)
+                used += 0.004
+    assert used / (machine.time - began) <= PART + 0.05
+    (line,) = caplog.messages
+    assert line == f"client {GREEDY} waits for others: it asks for more than its share of 2 connections"
+
+
+def test_log_names_it_again_after_a_while(machine: Machine, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        for _ in range(2):
+            machine.ask(MODEST, 0.001)
+            for _ in range(10):
+                machine.ask(GREEDY, 0.02)
+            machine.time += LOG_SECONDS
+    assert len(caplog.messages) == 2
+
+
+def test_many_connections_gain_a_host_nothing(machine: Machine) -> None:
+    machine.ask("10.0.0.8:1", 0.001)
+    waited = [machine.ask(f"10.0.0.7:{port}", 0.01) for port in range(5000, 5030)]
+    assert sum(wait > 0 for wait in waited) >= 3
+    assert machine.ask("10.0.0.8:1", 0.001) == 0.0
+
+
+def test_connections_of_one_host_share_with_each_other(machine: Machine) -> None:
+    waits = {"one": 0.0, "other": 0.0}
+    for _ in range(20):
+        waits["other"] += machine.ask("127.0.0.1:2", 0.001)
+        waits["one"] += sum(machine.ask("127.0.0.1:1", 0.01) for _ in range(6))
+    assert waits["one"] > 10 * WINDOW * (1 - PART) / 2
+    assert waits["other"] == 0.0
+
+
+def test_no_client_waits_where_there_is_time(machine: Machine) -> None:
+    for _ in range(100):
+        assert machine.ask(GREEDY, PART * WINDOW / 5) == 0.0
+        assert machine.ask(MODEST, 0.001) == 0.0
+        machine.time += WINDOW / 3
+
+
+def test_long_request_counts_little(machine: Machine) -> None:
+    machine.ask(MODEST, 0.001)
+    machine.ask(GREEDY, 100 * COST_MAX)
+    assert machine.turns.of(GREEDY).used == COST_MAX
+
+
+def test_memory_is_bounded(machine: Machine) -> None:
+    for number in range(3 * CLIENTS_MAX):
+        machine.ask(f"10.{number >> 8}.0.{number & 255}:1", 0.0)
+    assert len(machine.turns._shares) <= CLIENTS_MAX
+    assert len(machine.turns._hosts) <= CLIENTS_MAX
