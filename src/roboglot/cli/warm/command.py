@@ -115,6 +115,7 @@ def _wish(kind: str, words: list[str]) -> dict[str, object]:
         "words": words,
         "folder": os.getcwd(),
         "environment": dict(os.environ),
+        "path": sys.path,
         "umask": umask,
         "ignored": [number for number in SIGNALS if signal.getsignal(number) == signal.SIG_IGN],
         "limits": [(kind, *resource.getrlimit(kind)) for kind in LIMITS],

@@ -48,6 +48,7 @@ class Wanted(TypedDict):
     words: list[str]
     folder: str
     environment: dict[str, str]
+    path: list[str]
     umask: int
     ignored: list[int]
     limits: list[tuple[int, int, int]]
@@ -219,6 +220,8 @@ def become(wanted: Wanted, descriptors: list[int]) -> NoReturn:
         os.chdir(wanted["folder"])
         os.environ.clear()
         os.environ.update(wanted["environment"])
+        time.tzset()
+        sys.path[:] = wanted["path"]
         sys.stdin, sys.stdout = os.fdopen(0, encoding="utf-8"), os.fdopen(1, "w", buffering=1, encoding="utf-8")
         sys.stderr = os.fdopen(2, "w", buffering=1, encoding="utf-8", errors="backslashreplace")
         run_to_end(lambda: (_run_code if wanted["kind"] == CODE else _run_command)(wanted["words"]))
