@@ -98,7 +98,8 @@ def test_status_words_and_output_are_the_commands(place: Place) -> None:
 
 
 def test_a_command_has_its_callers_folder_and_environment(place: Place, tmp_path: Path) -> None:
-    code = "import os, time; print(time.tzname[0], os.getcwd(), os.environ['WORD'], oct(os.umask(0)), os.environ.get('GRPC_VERBOSITY'))"
+    code = "import os, time; print(time.tzname[0], os.getcwd(), os.environ['WORD'], oct(os.umask(0)), "
+    code += "os.environ.get('GRPC_VERBOSITY'))"
     process = place.start(f"import os; os.chdir({str(tmp_path)!r}); " + code, WORD="here", TZ="XYZ-3")
     assert process.communicate(timeout=PATIENCE)[0].split() == ["XYZ", str(tmp_path), "here", oct(umask()), "None"]
 
