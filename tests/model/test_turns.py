@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from roboglot.model.inputs.turns import CLIENTS_MAX, COST_MAX, LOG_SECONDS, PART, WINDOW, Turns
+from roboglot.model.inputs.turns import CLIENTS_MAX, COST_MAX, HANDSHAKE_GAP, LOG_SECONDS, PART, WINDOW, Turns
 
 GREEDY, MODEST = "10.0.0.7:4001", "10.0.0.8:4002"
 
@@ -89,6 +89,14 @@ def test_long_request_counts_little(machine: Machine) -> None:
     machine.ask(MODEST, 0.001)
     machine.ask(GREEDY, 100 * COST_MAX)
     assert machine.turns.of(GREEDY).used == COST_MAX
+
+
+def test_handshakes_of_many_robots_follow_each_other(machine: Machine) -> None:
+    assert machine.turns.wait_to_dial() == 0.0
+    waits = [machine.turns.wait_to_dial() for _ in range(99)]
+    assert waits == pytest.approx([HANDSHAKE_GAP * number for number in range(1, 100)])
+    machine.time += 100 * HANDSHAKE_GAP
+    assert machine.turns.wait_to_dial() == 0.0
 
 
 def test_memory_is_bounded(machine: Machine) -> None:

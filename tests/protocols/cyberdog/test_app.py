@@ -21,7 +21,8 @@ from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.cyberdog.table import push, pushes
-from roboglot.simulation.world.world import World
+from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world_files import load_world
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2 import Ticks
 from roboglot.wire.visual.relay import FrontEnd
 from tests.drivers.pace import settle
@@ -259,6 +260,21 @@ async def test_program_frames_pass_through(robot, data, app, pems, messages, pas
         assert app.of(2001) == [{"feedback": {"state": 0}}]
     await door.close()
     assert programs.front_end is None
+
+
+async def test_body_without_legs_dials_when_called(clock, data, app, passing: Passing) -> None:
+    world = World(load_world("office"), [RobotPlacement("a", "robomaster_ep")], clock=clock, seed=1)
+    robot = Robot("a", world.description_of("a"), clock)
+    world.equip(robot)
+    door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0, app=f"127.0.0.1:{app.port}"), data)
+    await door.start()
+    await clock.advance(5.0)
+    await settle()
+    assert not app.ticks
+    context_of(door).app.seen(f"ipv4:{ADDRESS}:4001")
+    await passing(lambda: app.ticks)
+    await door.close()
+    world.close()
 
 
 async def test_wildcard_address_becomes_the_route_to_the_app(robot, data, app, passing: Passing) -> None:

@@ -16,6 +16,7 @@ WINDOW = 0.1  # s
 PART = 0.5  # of a window, for the requests of all clients
 ACTIVE_SECONDS = 1.0  # since its last request a client counts as one that wants its part
 LOG_SECONDS = 10.0  # between two log lines on one client
+HANDSHAKE_GAP = 0.02  # s between the beginnings of two handshakes with TLS, which hold the thread for a third of it
 COST_MAX = 0.02  # s that one request counts: longer ones wait for something
 CLIENTS_MAX = 4096  # connections counted at the same time; the oldest are dropped first
 
@@ -47,6 +48,7 @@ class Turns:
         self._shares: dict[str, Share] = {}  # by "host:port"
         self._hosts: dict[str, Share] = {}
         self._window, self._end, self._total = 0, 0.0, 0.0
+        self._handshake = 0.0  # time at which the next one may begin
         self._connections = self._clients = 0  # active ones, counted in a window when someone has to wait
 
     def of(self, peer: str) -> Share:
@@ -86,6 +88,13 @@ class Turns:
         share.add(seconds, self._window)
         share.host.add(seconds, self._window)
         self._total += seconds
+
+    def wait_to_dial(self) -> float:
+        """Return the seconds until one more handshake may begin: those of many robots do not come at once."""
+        now = self.now()
+        begins = max(now, self._handshake)
+        self._handshake = begins + HANDSHAKE_GAP
+        return begins - now
 
     def _is_over(self, share: Share, now: float) -> bool:
         """Return whether a client, or its host, had more than an equal part of this window."""

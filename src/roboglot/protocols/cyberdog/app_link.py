@@ -20,6 +20,7 @@ from roboglot.protocols.cyberdog.app_line import DONE, AppLine, Credentials, del
 from roboglot.protocols.cyberdog.frame_queue import Delivery
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.table import Push
+from roboglot.transport.limiter import pay
 from roboglot.values import dataclass
 from roboglot.wire.cyberdog.channel import HEARTBEAT_DEADLINE, HEARTBEAT_PERIOD, LOST_AFTER, PUSH_DEADLINE, PUSH_MAX
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
@@ -34,12 +35,17 @@ REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: first, then doub
 
 @dataclass(frozen=True, slots=True)
 class AppRoute:
-    """Route from the robot's ``own`` address to the app: ``configured`` host[:port], or the ``last`` one."""
+    """Route from the robot's ``own`` address to the app: ``configured`` host[:port], or the ``last`` one.
+
+    ``unasked``: the configured app is dialled before a client has called. ``pace``: real s to wait before dialling.
+    """
 
     own: str
     configured: str
     app_port: int
     last: str = ""
+    unasked: bool = True
+    pace: Callable[[], float] = lambda: 0.0
 
 
 def early_share(address: str) -> float:
@@ -74,7 +80,9 @@ class AppLink:
         self._ticks = ticks
         self._tap = tap
         self._outside = outside or Outside("", clock)
-        self._target = self._configured or (f"{last}:{app_port}" if last else "")
+        known = self._configured or (f"{last}:{app_port}" if last else "")
+        self._target = known if route.unasked or not self._configured else ""
+        self._pace = route.pace
         self._host, self._on_host = last, on_host
         self._news = asyncio.Event()  # set when the address changes or a client calls: dial at once
         self._line: AppLine | None = None
@@ -156,6 +164,7 @@ class AppLink:
 
     async def _keep(self, target: str) -> bool:
         """Dial ``target`` and send heartbeats until it is lost or moves; return whether one got through."""
+        await pay(self._pace())
         self._line = line = AppLine(target, self._credentials)
         try:
             return await self._beat(target, line)

@@ -15,6 +15,7 @@ import grpc
 from roboglot.config import is_loopback
 from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import ask_for, identity
+from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import RobotError
@@ -137,7 +138,14 @@ class CyberDogDoor:
         app = AppLink(
             robot.clock,
             partial(_as_client, certificates) if certificates else None,
-            AppRoute(self._address, self._config.app, self._config.app_port, str(kept(robot, APP, ""))),
+            AppRoute(
+                self._address,
+                self._config.app,
+                self._config.app_port,
+                last=str(kept(robot, APP, "")),
+                pace=lambda: robot.turns.wait_to_dial() if robot.turns and certificates else 0.0,
+                unasked=Legs in robot or Base not in robot,  # a program's other bodies have no app until one calls
+            ),
             ticks=lambda own: ticks(context, own),
             tap=robot.tap,
             outside=robot.outside,
