@@ -9,14 +9,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.network import Network
 from roboglot.model.tap import Direction, Exchange
+from roboglot.recording.entries import Entry, encoded
 from roboglot.recording.playback import Playback
 from roboglot.recording.reader import read_messages, read_recording
-from roboglot.recording.redaction import Redaction
+from roboglot.recording.redaction import FIELDS, Redaction
 from roboglot.recording.replaying import sendable
+from roboglot.recording.secrets import ORDINARY
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.visual.replies import feedback, responses
 from tests.recording.everything import Session, begun
@@ -134,3 +138,79 @@ def test_descriptions_of_programs_stay() -> None:
 @pytest.mark.parametrize("field", ["GRÖSSE", "größe"])
 def test_fields_beyond_ascii_are_left_out(field: str) -> None:
     assert Redaction((field,))(json.dumps({field: "1 m"}, ensure_ascii=False).encode()).count(b"[redacted]") == 1
+
+
+WORD = st.text(st.characters(categories=["L", "N"], max_codepoint=0x9FFF), min_size=3, max_size=12).filter(
+    lambda word: word.lower() not in {*ORDINARY, *FIELDS} and not word.isnumeric()
+)
+WIFI = "PUT /api/core/system/v1/network/status"
+
+
+def said(operation: str, payload: str, status: str = "", refusal: str = "") -> Exchange:
+    direction = Direction.REPLY if status else Direction.REQUEST
+    return Exchange(
+        1.0, "a", "slamware", "127.0.0.1:5", "x", direction, operation, payload.encode(), status, refusal, 0.0
+    )
+
+
+@given(WORD, st.sampled_from(["ssid", "password", "username", "member"]), st.booleans())
+def test_later_quotes_of_a_secret_are_redacted(word: str, field: str, ascii_only: bool) -> None:
+    redact = Redaction()
+    secret = f"{word} 7"
+    asked = redact.exchange(said(WIFI, json.dumps({"options": {field: secret}}, ensure_ascii=ascii_only)))
+    body = json.dumps({"message": f"no network {secret}, (-3)", "code": 3}, ensure_ascii=not ascii_only)
+    refused = redact.exchange(said("GET /x", body, "404", f"no network {secret}, (-3)"))
+    nested = redact.exchange(said("GET /y", json.dumps({"params": json.dumps({"text": secret})}), "200"))
+    logged = encoded(Entry("/log", "log", 0, 0, (20, "roboglot", f"{secret} is away")), redact)
+    event = encoded(Entry("/a/events", "event", 0, 0, {"event": "X", "text": f"hello {secret}!"}), redact)
+    everything = (asked.payload, refused.payload, refused.refusal.encode(), nested.payload, logged, event)
+    for form in (secret.encode(), json.dumps(secret)[1:-1].encode()):
+        assert not [text for text in everything if form in text]
+    assert refused.refusal == "no network [redacted], (-3)"
+    assert json.loads(refused.payload) == {"message": "no network [redacted], (-3)", "code": 3}
+    assert json.loads(json.loads(nested.payload)["params"]) == {"text": "[redacted]"}
+
+
+def test_what_only_looks_like_a_secret_stays() -> None:
+    redact = Redaction()
+    for secret in ("mode", "1234", "Tom", "ok"):
+        redact(json.dumps({"password": secret}).encode())
+    text = b'{"mode": 1, "stamp": 1234, "text": "Tomorrow, atom 12345", "status": "ok", "model": "modest"}'
+    assert redact(text) == text
+    assert redact(b'{"text": "Tom, \'1234\' is wrong\\nTom"}') == (
+        b'{"text": "[redacted], \'[redacted]\' is wrong\\n[redacted]"}'
+    )
+    assert redact(b"\xff\xfe Tom ") == b"\xff\xfe Tom "  # no text: a map, a picture
+
+
+@pytest.mark.parametrize("door", ["slamware", "driver/slamware"])
+def test_refusals_of_real_robots_do_not_quote_networks(door: str) -> None:
+    """A proxy knows their status alone; the network may be one that no field has named."""
+    body = json.dumps({"error": "there is no network 'Home Net' here"})
+    refused = said(WIFI, body, "400")._replace(door=door)
+    assert Redaction().exchange(refused).payload == b'{"error": "there is no network [redacted] here"}'
+    fine = refused._replace(status="200")
+    assert Redaction().exchange(fine).payload == fine.payload
+
+
+@given(st.permutations(["mode", "describe", "nested", "text", "list"]), WORD, st.integers(0, 2), st.booleans())
+def test_people_have_no_names_whatever_stands_between(
+    order: list[str], name: str, wrapped: int, is_person: bool
+) -> None:
+    name = f"{name}."
+    values: dict[str, object] = {
+        "mode": "face" if is_person else "tag",
+        "describe": name,
+        "nested": {"mode": "tag", "a": {"describe": "a place"}},
+        "text": "} {",
+        "list": [{"b": 1}, {"mode": "voiceprint", "describe": "#1"}],
+    }
+    person: object = {key: values[key] for key in order}
+    for _ in range(wrapped):
+        person = {"data": json.dumps(person)}
+    found = json.loads(Redaction()(json.dumps(person).encode()))
+    for _ in range(wrapped):
+        found = json.loads(found["data"])
+    listed = [{"b": 1}, {"mode": "voiceprint", "describe": "[redacted]"}]
+    assert found == values | {"list": listed, "describe": "[redacted]" if is_person else name}
+    assert list(found) == order

@@ -82,6 +82,8 @@ def encoding_of(kind: str, redaction: Redaction) -> Encode:
         return lambda at, value: encode(at, redaction.exchange(value))
     if kind == "action":
         return lambda at, value: redaction(encode(at, redaction.action(value)))
+    if kind == "log":
+        return lambda at, value: encode(at, (*value[:2], redaction.text(value[2])))
     if KINDS[kind].is_protobuf:
         return encode
     return lambda at, value: redaction(encode(at, value))

@@ -12,7 +12,7 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.lines import Line, Target
 from roboglot.recording.reader import Asked, pair
-from roboglot.recording.redaction import REDACTED
+from roboglot.recording.secrets import REDACTED
 
 IDS_MAX = 10_000
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import socket
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -33,8 +34,8 @@ assert whole_closing  # a fixture for these tests, too
 BETWEEN, ROBOT, OTHER = free_addresses(1), free_addresses(1), free_addresses(1)
 
 
-async def between(url: str, path: Path, script: Any) -> Any:
-    """Run a client against the relay, and return its result."""
+async def between(url: str, path: Path, script: Any, sums: list[str] | None = None) -> Any:
+    """Run a client against the relay, and return its result; ``sums`` gets the summary of delays."""
     book = Book(path, Target(url), "0")
     relay = Relay(Target(url), BETWEEN, book)
     await relay.open()
@@ -43,6 +44,8 @@ async def between(url: str, path: Path, script: Any) -> Any:
     finally:
         await relay.close()
         book.close()
+        if sums is not None:
+            sums.append(relay.watch.summary())
 
 
 async def reading(address: str) -> list[tuple[float, ...]]:
@@ -79,12 +82,13 @@ async def by_text(address: str) -> list[bytes]:
     ids=["slamware", "slamware drive", "robomaster", "visual"],
 )
 async def test_what_passes_is_what_robots_own_tap_says(url: str, script: Any, tmp_path: Path) -> None:
-    own, passed = tmp_path / "own.mcap", tmp_path / "passed.mcap"
+    own, passed, sums = tmp_path / "own.mcap", tmp_path / "passed.mcap", list[str]()
 
     async def through(_: str) -> Any:
-        return await between(url, passed, script)
+        return await between(url, passed, script, sums)
 
     assert await run(tmp_path, "universal", str(own), through)
+    assert re.fullmatch(r"passing bytes on took ([\d.]+ ms \(\w.*\).*){2}, [\d.]+ and [\d.]+ ms .*processor", sums[0])
     door = Target(url).door
     sessions = [pair(read_recording(path).of(door=door))[0] for path in (own, passed)]
     reported, seen = (
@@ -102,10 +106,10 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
     target = Target(f"cyberdog://{ADDRESS}?certs={certificates}&app={called}")
     phone = Phone(BETWEEN, certificates)
     await phone.open()
+    book = Book(passed, target, "0")
+    relay = DogRelay(target, BETWEEN, book, Proof(proof.certificate, proof.key, proof.callers), phone.port)
 
     async def through(_: str) -> Any:
-        book = Book(passed, target, "0")
-        relay = DogRelay(target, BETWEEN, book, Proof(proof.certificate, proof.key, proof.callers), phone.port)
         await relay.open()
         try:
             return await phone.run(PROGRAM)  # the frames come as pushes
@@ -118,6 +122,8 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
     finally:
         await phone.close()
     assert said == ["one", "two"]
+    assert relay.watch.delays
+    assert min(relay.watch.delays) > 0
     asked, seen = (pair(read_recording(path).of(door="cyberdog"))[0] for path in (own, passed))
     assert [(a.request.operation, a.request.payload, [r.payload for r in a.replies]) for a in seen] == [
         (a.request.operation, a.request.payload, [r.payload for r in a.replies]) for a in asked

@@ -124,6 +124,8 @@ def proxy(
     if book.thread.failure:
         sys.exit(f"roboglot record: the recording ended early: {book.thread.failure}")
     print(f"{book.files.written} messages are in {to}")
+    if delays := relay.watch.summary():
+        print(delays)
 
 
 def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> DogRelay:

@@ -122,7 +122,7 @@ def _alone(doors: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
 def reasons(recording: Recording) -> list[str]:
     """Return, as text, the inputs of a recording that a rerun cannot repeat."""
     from roboglot.model.tap import Direction
-    from roboglot.recording.redaction import REDACTED
+    from roboglot.recording.secrets import REDACTED
 
     found = []
     if recording.facts.get("data", "") == KEPT:

@@ -60,6 +60,7 @@ class DogRelay:
         self._as_app = _context(own, server=True)
         self._to_robot = _context(own, server=False)
         self._crossing = Crossing(book.clock)
+        self.watch = self._crossing.watch
         self._app_host = ""
         self._beats = Beats()
 
@@ -102,7 +103,7 @@ class DogRelay:
         self._cross(robot, to, RobotSniffer(partial(self._book.note, f"{to.host}:{to.port}"), self._beats))
 
     def _cross(self, came: End, to: Place, sniffer: Sniffer) -> None:
-        made = End()
+        made = End(self.watch)
         came.look, made.look = sniffer.from_client, sniffer.from_robot
         self._crossing.cross(came, to, made)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import ssl
+import time
+from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import cast
 
@@ -17,6 +19,7 @@ log = logging.getLogger(__name__)
 seldom = Seldom(log)
 CONNECT_SECONDS = 10.0
 CONNECTIONS_MAX = 256
+DELAYS_MAX = 100_000
 BUFFER_MAX = 1 << 20  # bytes kept until the other end is connected
 Joining = Callable[["End", "End"], Awaitable[None]]
 
@@ -34,12 +37,13 @@ class Place:
     async def dial(self, end: End) -> None:
         """Connect ``end``. Raises OSError."""
         loop, context = asyncio.get_running_loop(), self.context
+        end.is_encrypted = context is not None
         if context is None:
             own = (self.own, 0) if self.own else None
             await loop.create_connection(lambda: end, self.host, self.port, local_addr=own)
             return
         transport, call = await loop.create_connection(
-            lambda: TlsCall(lambda: end, context, self.name), self.host, self.port
+            lambda: _TimedCall(end, context, self.name), self.host, self.port
         )
         try:
             await call.over
@@ -48,14 +52,76 @@ class Place:
             raise
 
 
+class Stopwatch:
+    """Delays from bytes received to bytes passed on, the last ``DELAYS_MAX``, decryption and encryption included.
+
+    ``delays``: ns by the clock; ``computed``: ns that this thread had a processor in them. The difference is others'.
+    Waiting in the system before this process ran is in neither.
+    """
+
+    def __init__(self) -> None:
+        self.delays: deque[int] = deque(maxlen=DELAYS_MAX)
+        self.computed: deque[int] = deque(maxlen=DELAYS_MAX)
+        self._began = self._used = 0
+
+    def begin(self) -> None:
+        """Bytes were received."""
+        self._began, self._used = time.perf_counter_ns(), time.thread_time_ns()
+
+    def end(self) -> None:
+        """They were passed on."""
+        self.delays.append(time.perf_counter_ns() - self._began)
+        self.computed.append(time.thread_time_ns() - self._used)
+
+    def summary(self) -> str:
+        """Return median and 99th percentile of both (ms) in a line; empty if nothing has passed."""
+        if not self.delays:
+            return ""
+        half, most, own_half, own_most = (
+            sorted(times)[int(part * len(times))] / 1e6
+            for times in (self.delays, self.computed)
+            for part in (0.5, 0.99)
+        )
+        return (
+            f"passing bytes on took {half:.3f} ms (median) and {most:.3f} ms (99 %), "
+            f"{own_half:.3f} and {own_most:.3f} ms of it on the processor"
+        )
+
+
+class _TimedCall(TlsCall):
+    """An outgoing connection whose stopwatch begins with encrypted bytes."""
+
+    def __init__(self, end: End, context: ssl.SSLContext, name: str) -> None:
+        super().__init__(lambda: end, context, name)
+        self._begin = end.watch.begin
+
+    def data_received(self, data: bytes) -> None:
+        self._begin()
+        super().data_received(data)
+
+
+class _TimedPort(TlsPort):
+    """The same for an incoming connection."""
+
+    def __init__(self, came: Callable[[End], None], context: ssl.SSLContext, watch: Stopwatch) -> None:
+        super().__init__(lambda: End(watch, came, is_encrypted=True), Tls(context, plain=False))
+        self._begun = watch.begin
+
+    def data_received(self, data: bytes) -> None:
+        self._begun()
+        super().data_received(data)
+
+
 class End(asyncio.Protocol):
     """One end of a connection; ``other`` gets its bytes first, then the sniffer a copy."""
 
     transport: asyncio.Transport
 
-    def __init__(self, came: Callable[[End], None] = lambda _: None) -> None:
-        """``came`` is called when the end is connected."""
-        self._came = came
+    def __init__(
+        self, watch: Stopwatch, came: Callable[[End], None] = lambda _: None, *, is_encrypted: bool = False
+    ) -> None:
+        """``came`` is called when the end is connected. Of an encrypted end, the connection begins the watch."""
+        self._came, self.watch, self.is_encrypted = came, watch, is_encrypted
         self.other: End | None = None
         self.look: Callable[[bytes], None] | None = None
         self.waiting = bytearray()
@@ -76,12 +142,15 @@ class End(asyncio.Protocol):
         self._came(self)
 
     def data_received(self, data: bytes) -> None:
+        if not self.is_encrypted:
+            self.watch.begin()
         if self.other is None:
             self.waiting += data
             if len(self.waiting) > BUFFER_MAX:
                 self.transport.pause_reading()
         else:
             self.other.transport.write(data)
+            self.watch.end()
         if self.look is not None:
             try:
                 self.look(data)
@@ -126,12 +195,13 @@ class Crossing:
         self._servers: list[asyncio.Server] = []
         self._ends: set[End] = set()
         self._dialling: set[asyncio.Task[None]] = set()
+        self.watch = Stopwatch()
 
     async def listen(self, host: str, port: int, came: Callable[[End], None], context: ssl.SSLContext | None) -> None:
         """Listen; ``came`` is called for each connection, with TLS after the handshake. Raises OSError."""
 
         def end() -> asyncio.Protocol:
-            return End(came) if context is None else TlsPort(lambda: End(came), Tls(context, plain=False))
+            return End(self.watch, came) if context is None else _TimedPort(came, context, self.watch)
 
         self._servers.append(await asyncio.get_running_loop().create_server(end, host, port))
 

@@ -95,6 +95,7 @@ class Relay:
             raise ValueError(f"no recording between a client and a robot of {target.door} yet")
         self._target, self._address, self._book = target, address, book
         self._crossing = Crossing(book.clock)
+        self.watch = self._crossing.watch
         self._hosts: set[str] = set()
         self._datagrams: asyncio.DatagramTransport | None = None
         self._out: asyncio.DatagramTransport | None = None
@@ -115,7 +116,7 @@ class Relay:
 
     def _accept(self, port: int, client: End) -> None:
         """Dial the robot for a new client, whose first bytes wait meanwhile and are parsed."""
-        robot, sniffer = End(), self._sniffer("{}:{}".format(*client.peer), port)
+        robot, sniffer = End(self.watch), self._sniffer("{}:{}".format(*client.peer), port)
         if sniffer is not None:
             client.look, robot.look = sniffer.from_client, sniffer.from_robot
         joining = self._listen_for_pushes if self._target.door == "robomaster" else None
