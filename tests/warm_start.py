@@ -1,12 +1,15 @@
-"""``python -m roboglot …`` forked from a process that has imported everything: a tenth of the processor time.
+"""``python -m roboglot …``, and xdist's workers, forked from a process that has imported everything.
 
-``install`` has ``subprocess.Popen``, and with it asyncio, start such commands like this. The process is a child of ours
-as if we had started it ourselves: output, signals, exit status and waiting are the same. Commands with an environment
-for another interpreter, and all other programs, start cold; so do those with ``ROBOGLOT_TESTS_COLD=1`` in theirs.
+``install`` has ``subprocess.Popen``, and with it asyncio and execnet, start such commands like this, in a tenth of the
+processor time. The process is a child of ours as if we had started it ourselves: output, signals, exit status and
+waiting are the same. Commands with an environment for another interpreter, and all other programs, start cold; so do
+those with ``ROBOGLOT_TESTS_COLD=1`` in theirs. A worker is born with a process that forks of its own.
 """
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import ctypes
 import importlib
 import inspect
@@ -21,10 +24,14 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from types import ModuleType
+from typing import Any
+
+from execnet.gateway_io import popen_bootstrapline
 
 COLD = "ROBOGLOT_TESTS_COLD"
 ROBOGLOT = [sys.executable, "-m", "roboglot"]
+WORKER = [sys.executable, "-u", "-c", popen_bootstrapline]
 PLAIN = {
     "shell": False,
     "preexec_fn": None,
@@ -46,11 +53,11 @@ _signature = inspect.signature(_execute_cold)
 
 
 class WarmParent:
-    """The process that forks, started when it is needed first."""
+    """The process that forks, started when it is needed first; ``line``: to one that runs."""
 
-    def __init__(self) -> None:
+    def __init__(self, line: socket.socket | None = None) -> None:
         self._lock = threading.Lock()
-        self._line: socket.socket | None = None
+        self._line = line
         self._libc = ctypes.CDLL(None, use_errno=True)
 
     def start(self, wish: dict[str, Any], descriptors: list[int]) -> int:
@@ -80,7 +87,6 @@ class WarmParent:
                 cwd=Path(__file__).parents[1],
                 # Forks have a hash seed other than ours: a rerun of what we recorded must not depend on it.
                 env={**os.environ, **ENVIRONMENT, "PYTHONHASHSEED": "random"},
-                start_new_session=True,
             ).returncode = 0  # it ends with our socket; no need to wait for it
         return ours
 
@@ -107,6 +113,7 @@ def _execute(process: Any, *arguments: Any, **named: Any) -> None:
         "folder": str(wanted["cwd"] or Path.cwd()),
         "environment": dict(os.environ if wanted["env"] is None else wanted["env"]),
         "session": bool(wanted["start_new_session"]),
+        "worker": list(wanted["args"]) == WORKER,
         "parent": os.getpid(),
     }
     try:
@@ -119,7 +126,7 @@ def _execute(process: Any, *arguments: Any, **named: Any) -> None:
 def _is_warm(wanted: Mapping[str, Any]) -> bool:
     words = wanted["args"]
     words = [words] if isinstance(words, str | bytes | os.PathLike) else list(words)
-    if words[:3] != ROBOGLOT:
+    if words[:3] != ROBOGLOT and words != WORKER:
         return False
     if wanted["pass_fds"] or any(wanted.get(name, usual) != usual for name, usual in PLAIN.items()):
         return False
@@ -163,7 +170,7 @@ def end_with(parent: int) -> None:
         os._exit(1)
 
 
-def _become(wish: Any, descriptors: list[int]) -> NoReturn:
+def _become(wish: Any, descriptors: list[int]) -> None:
     """Become the wanted process, in the fork."""
     status = 70
     try:
@@ -177,8 +184,14 @@ def _become(wish: Any, descriptors: list[int]) -> NoReturn:
         os.chdir(wish["folder"])
         os.environ.clear()
         os.environ.update(wish["environment"])
-        sys.stdin, sys.stdout = os.fdopen(0, encoding="utf-8"), os.fdopen(1, "w", encoding="utf-8")
-        sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1)
+        # A fork of a fork drops these, but not their pipes.
+        sys.stdin = os.fdopen(0, encoding="utf-8", closefd=False)
+        sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
+        sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
+        if wish["worker"]:
+            _work()
+            status = 0
+            return
         package = importlib.import_module("roboglot")
         sys.argv = [str(Path(str(package.__file__)).with_name("__main__.py")), *wish["arguments"]]
         sys.path[0] = wish["folder"]
@@ -195,6 +208,44 @@ def _become(wish: Any, descriptors: list[int]) -> NoReturn:
         os._exit(status)
 
 
+OF_TESTS = (
+    "aiortc",
+    "av",
+    "cv2",
+    "httpx",
+    "playwright.async_api",
+    "psycopg",
+    "rosbags.highlevel",
+    "ruamel.yaml",
+)
+REWRITTEN = ("roboglot.cli.", "roboglot.demo.", "roboglot.testing.")  # by pytest, and what imports that
+
+
+def _work() -> None:
+    """Be a worker of xdist, as if Python had just been started for it."""
+    global _parent
+    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    if os.fork() == 0:
+        ours.close()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for pipe in (0, 1):  # the worker's alone: they end with it
+            os.dup2(nothing, pipe)
+        serve(its)
+        os._exit(0)
+    its.close()
+    _parent = WarmParent(ours)
+    for name in [name for name in sys.modules if f"{name}.".startswith(REWRITTEN)]:
+        del sys.modules[name]
+    package = importlib.import_module("roboglot")
+    package.__doc__ = f"{package.__doc__}\nPYTEST_DONT_REWRITE"  # else pytest warns that it is imported already
+    sys.argv, sys.path[0] = ["-c"], ""
+    names = sys.modules["__main__"] = ModuleType("__main__")
+    exec(eval(sys.stdin.readline()), names.__dict__)
+    threading._shutdown()  # type: ignore[attr-defined]  # as at the end of a process
+    atexit._run_exitfuncs()
+
+
 def main(descriptor: int) -> None:
     """Load everything, then serve."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -203,6 +254,9 @@ def main(descriptor: int) -> None:
 
     for module in pkgutil.walk_packages(cli.__path__, f"{cli.__name__}."):
         importlib.import_module(module.name)
+    for name in OF_TESTS:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
     warm()
     refuse_threads()
     for name in ENVIRONMENT:
@@ -211,4 +265,4 @@ def main(descriptor: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    importlib.import_module("tests.warm_start").main(int(sys.argv[1]))  # the module that a worker imports
