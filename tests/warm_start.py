@@ -2,8 +2,9 @@
 
 ``install`` has ``subprocess.Popen``, and with it asyncio and execnet, start such commands like this, in a tenth of the
 processor time. The process is a child of ours as if we had started it ourselves: output, signals, exit status and
-waiting are the same. Commands with an environment for another interpreter, and all other programs, start cold; so do
-those with ``ROBOGLOT_TESTS_COLD=1`` in theirs. A worker is born with a process that forks of its own.
+waiting are the same. So do ``python -m tests.…``, and ``python -c`` with a program whose first line is ``# warm``.
+Commands with an environment for another interpreter, and all other programs, start cold; so do those with
+``ROBOGLOT_TESTS_COLD=1`` in theirs. A worker is born with a process that forks of its own.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import inspect
 import json
 import os
 import pkgutil
+import runpy
 import signal
 import socket
 import subprocess
@@ -30,7 +32,6 @@ from typing import Any
 from execnet.gateway_io import popen_bootstrapline
 
 COLD = "ROBOGLOT_TESTS_COLD"
-ROBOGLOT = [sys.executable, "-m", "roboglot"]
 WORKER = [sys.executable, "-u", "-c", popen_bootstrapline]
 PLAIN = {
     "shell": False,
@@ -109,11 +110,10 @@ def _execute(process: Any, *arguments: Any, **named: Any) -> None:
     ends = [wanted[name] for name in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")]
     given = [end if end != -1 else own for own, end in enumerate((ends[0], ends[3], ends[5]))]
     wish = {
-        "arguments": [str(os.fspath(word)) for word in wanted["args"][3:]],
+        "words": [str(os.fspath(word)) for word in wanted["args"][1:]],
         "folder": str(wanted["cwd"] or Path.cwd()),
         "environment": dict(os.environ if wanted["env"] is None else wanted["env"]),
         "session": bool(wanted["start_new_session"]),
-        "worker": list(wanted["args"]) == WORKER,
         "parent": os.getpid(),
     }
     try:
@@ -126,12 +126,22 @@ def _execute(process: Any, *arguments: Any, **named: Any) -> None:
 def _is_warm(wanted: Mapping[str, Any]) -> bool:
     words = wanted["args"]
     words = [words] if isinstance(words, str | bytes | os.PathLike) else list(words)
-    if words[:3] != ROBOGLOT and words != WORKER:
+    if not _is_ours(words):
         return False
     if wanted["pass_fds"] or any(wanted.get(name, usual) != usual for name, usual in PLAIN.items()):
         return False
     environment = os.environ if wanted["env"] is None else wanted["env"]
     return COLD not in environment and _of_the_interpreter(environment) == _of_the_interpreter(os.environ)
+
+
+def _is_ours(words: list[Any]) -> bool:
+    """Return whether this command needs what the process that forks has loaded."""
+    match words:
+        case [sys.executable, "-m", str(module), *_]:
+            return module == "roboglot" or module.startswith("tests.")
+        case [sys.executable, "-c", str(code), *_]:
+            return code.lstrip().startswith("# warm\n")
+    return words == WORKER
 
 
 def _of_the_interpreter(environment: Mapping[Any, Any]) -> dict[Any, Any]:
@@ -188,24 +198,50 @@ def _become(wish: Any, descriptors: list[int]) -> None:
         sys.stdin = os.fdopen(0, encoding="utf-8", closefd=False)
         sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
         sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
-        if wish["worker"]:
-            _work()
-            status = 0
-            return
-        package = importlib.import_module("roboglot")
-        sys.argv = [str(Path(str(package.__file__)).with_name("__main__.py")), *wish["arguments"]]
-        sys.path[0] = wish["folder"]
-        from roboglot.cli import run_process
-
-        run_process()
+        _run(wish["words"], wish["folder"])
+        status = 0
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else 1 if end.code else 0
+        if isinstance(end.code, str):
+            print(end.code, file=sys.stderr)
     except KeyboardInterrupt:
         status = 130
     except BaseException:  # noqa: BLE001 - a forked child has no caller to raise to
         sys.excepthook(*sys.exc_info())
         status = 1
     finally:
-        sys.stderr.flush()
+        threading._shutdown()  # type: ignore[attr-defined]  # as at the end of a process
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
         os._exit(status)
+
+
+def _run(words: list[str], folder: str) -> None:
+    """Do what Python does with these words after its own name."""
+    match words:
+        case ["-m", "roboglot", *arguments]:
+            package = importlib.import_module("roboglot")
+            sys.argv = [str(Path(str(package.__file__)).with_name("__main__.py")), *arguments]
+            sys.path[0] = folder
+            from roboglot.cli import run_process
+
+            run_process()
+        case ["-m", module, *arguments]:
+            sys.argv, sys.path[0] = [module, *arguments], folder
+            runpy.run_module(module, run_name="__main__", alter_sys=True)
+        case ["-c", code, *arguments]:
+            sys.argv, sys.path[0] = ["-c", *arguments], ""
+            exec(compile(code, "<string>", "exec"), _new_main())
+        case _:
+            _work()
+
+
+def _new_main() -> dict[str, Any]:
+    """Return the names of a new main module."""
+    sys.modules["__main__"] = made = ModuleType("__main__")
+    return made.__dict__
 
 
 OF_TESTS = (
@@ -240,10 +276,7 @@ def _work() -> None:
     package = importlib.import_module("roboglot")
     package.__doc__ = f"{package.__doc__}\nPYTEST_DONT_REWRITE"  # else pytest warns that it is imported already
     sys.argv, sys.path[0] = ["-c"], ""
-    names = sys.modules["__main__"] = ModuleType("__main__")
-    exec(eval(sys.stdin.readline()), names.__dict__)
-    threading._shutdown()  # type: ignore[attr-defined]  # as at the end of a process
-    atexit._run_exitfuncs()
+    exec(eval(sys.stdin.readline()), _new_main())
 
 
 def main(descriptor: int) -> None:

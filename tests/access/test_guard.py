@@ -269,7 +269,7 @@ async def until(condition) -> None:
 
 def test_the_audit_survives_a_kill_and_shows_changes(tmp_path: Path) -> None:
     code = (
-        "import sys, os, time; from pathlib import Path; from roboglot.access.audit import Audit\n"
+        "# warm\nimport sys, os, time; from pathlib import Path; from roboglot.access.audit import Audit\n"
         "from roboglot.access.trail import Entry, open_trail\n"
         "trail = open_trail(Path(sys.argv[1])); audit = Audit(trail)\n"
         "for n in range(50): audit.note(Entry(float(10 * n), 'anna', '', 'a', 'slamware', f'op {n}', 'done'))\n"

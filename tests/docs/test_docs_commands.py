@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import shlex
 from collections.abc import Iterator
@@ -34,12 +35,18 @@ def shown(page: Path) -> Iterator[tuple[str, bool]]:
                 yield arguments, full
 
 
+@functools.cache
+def made(name: str) -> Any:
+    """Return the command of this name, which Typer makes of its function's parameters."""
+    return typer.main.get_command(loaded(name))
+
+
 def refusal(arguments: str, full: bool = True) -> str:
     """Return why the command line does not take this; "" if it does."""
     name, *rest = shlex.split(re.sub(r"[…\[\]]", "", arguments))
     if name not in COMMANDS:
         return "" if name in ("--help", "--version") else f"there is no command {name!r}"
-    command: Any = typer.main.get_command(loaded(name))
+    command: Any = made(name)
     if not rest:
         return ""
     try:

@@ -12,6 +12,8 @@ import time
 ROUNDS = 3  # idle samples in a row: a thread that waits for Python's lock seems to sleep
 GLANCE = 0.0005  # real s between two samples of a working thread
 SETTLE_MAX = 2.0  # real s: some threads never rest
+STAT = 64  # bytes, up to the state of a thread
+_files = dict[str, int]()
 
 
 async def settle(patience: float = SETTLE_MAX) -> None:
@@ -36,19 +38,22 @@ async def settle(patience: float = SETTLE_MAX) -> None:
 
 def _working() -> bool:
     """Return whether another thread of this process runs, or would if a processor were free."""
-    own = threading.get_native_id()
-    return any(_is_running(name) for name in os.listdir("/proc/self/task") if int(name) != own)
+    own = str(threading.get_native_id())
+    return any(_is_running(name) for name in os.listdir("/proc/self/task") if name != own)
 
 
 def _is_running(thread: str) -> bool:
-    try:
-        file = os.open(f"/proc/self/task/{thread}/stat", os.O_RDONLY)
-    except FileNotFoundError:  # it has ended
-        return False
-    try:
-        state = os.read(file, 256).rpartition(b") ")[2][:1]
-    except ProcessLookupError:
-        state = b"X"
-    finally:
-        os.close(file)
-    return state in (b"R", b"D")
+    """Return its state; its file is kept open, as opening it takes longer than reading."""
+    while True:
+        try:
+            file = _files.get(thread)
+            if file is None:
+                file = _files[thread] = os.open(f"/proc/self/task/{thread}/stat", os.O_RDONLY)
+            said = os.pread(file, STAT, 0)
+        except FileNotFoundError:  # it has ended
+            return False
+        except ProcessLookupError:  # it has ended; another may have its number by now
+            os.close(_files.pop(thread))
+        else:
+            state = said[said.rfind(b") ") + 2 :][:1]
+            return state in (b"R", b"D")

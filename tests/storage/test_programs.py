@@ -75,6 +75,7 @@ async def test_what_was_left_running_is_settled_at_start(database: Database) -> 
 
 
 CHILD = """
+# warm
 import asyncio, sys
 from roboglot.storage.database import Database
 from roboglot.programs.stores import StoredProgram

@@ -146,6 +146,7 @@ async def test_a_database_of_a_newer_program_is_refused(tmp_path: Path) -> None:
 
 
 WRITER = """
+# warm
 import asyncio, sys
 from roboglot.storage.database import Database
 from roboglot.storage.settings import StoredSettings

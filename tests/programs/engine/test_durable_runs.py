@@ -48,6 +48,7 @@ print('end', time.monotonic() >= began)
 CUT_OFF = "the server ended while {} was under way; it was not repeated"
 # First life: runs the task until it is killed, and prints its log.
 SERVER = """
+# warm
 import asyncio, sys
 from pathlib import Path
 from roboglot.model.clock import RealClock

@@ -164,6 +164,7 @@ def test_runs_on_uvloop() -> None:
 
 async def test_workers_die_with_the_server() -> None:
     server = textwrap.dedent("""
+        # warm
         import asyncio
         from roboglot.programs.engine.engine import Engine
         async def main():

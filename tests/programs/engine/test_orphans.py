@@ -12,6 +12,7 @@ from tests.programs.playing import process_state
 
 WORKERS = 12
 SERVER = f"""
+# warm
 import asyncio, signal
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.launcher import Launcher

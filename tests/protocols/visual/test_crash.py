@@ -19,6 +19,7 @@ from roboglot.testing.process import child
 from tests.protocols.visual.front_end import FrontEnd
 
 SERVER = """
+# warm
 import asyncio, json, sys
 from pathlib import Path
 from roboglot.model.clock import RealClock
