@@ -72,7 +72,9 @@ def parse_moment(text: str) -> Moment:
     """Parse a ``single`` task's condition: "now", "HH:MM", "HH:MM YYYY-MM-DD", each with an optional "+ N<unit>"."""
     match = _SINGLE.fullmatch(_bounded(text).strip())
     if match is None:
-        raise BadCondition('a single task runs at "now", "HH:MM" or "HH:MM YYYY-MM-DD", then "+ 5minutes" or the like')
+        raise BadCondition(
+            'a single task runs at "now", "HH:MM" or "HH:MM YYYY-MM-DD", optionally "+ 5minutes" or similar'
+        )
     amount = int(match["amount"] or 0)
     if amount > AMOUNT_MAX:
         raise BadCondition(f"{amount} {match['unit']} are too many")

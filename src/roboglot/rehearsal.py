@@ -363,7 +363,7 @@ def act(stage: Stage, given: Act) -> None:
         case "box", _:
             stage.add_obstacle(Pose(*given.to), (0.4, 0.4, 1.0))
         case kind, _:
-            raise ValueError(f"nobody can do {kind!r}")
+            raise ValueError(f"{kind!r} is not a kind of step")
 
 
 def scene_of(stage: Stage, robot: str, world: str, body: str, others: Sequence[str] = ()) -> Scene:

@@ -303,7 +303,7 @@ class Runtime:
         """Return the current scene for a rehearsal of a robot's program. Raises ValueError for a real robot."""
         robots = {robot.name: robot for robot in self.config.robots}
         if robots[name].is_real:
-            raise ValueError(f"robot {name} is no simulated one: there is no copy of its world to try things in")
+            raise ValueError(f"robot {name} is not simulated: there is no copy of its world to try things in")
         others = [robot.name for robot in robots.values() if robot.name != name and not robot.is_real]
         return scene_of(self.fleet.world.hands, name, self.config.world, robots[name].body, others)
 

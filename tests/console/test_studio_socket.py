@@ -194,10 +194,10 @@ async def test_a_page_tries_one_program_at_once(shown: Shown) -> None:
         assert "being tried already" in (await studio.kind("refused"))["why"]
         await studio.until(lambda m: m.get("what") == "spot")
         await studio.say(type="end_try")
-        assert "it was ended" in (await studio.kind("refused"))["why"]
+        assert "it was cancelled" in (await studio.kind("refused"))["why"]
         await studio.say(**wish | {"body": "import time\ntime.sleep(2000)\n"})
         await studio.say(type="end_try")  # while it is checked, as nothing was that is known already
-        assert "it was ended" in (await studio.kind("refused"))["why"]
+        assert "it was cancelled" in (await studio.kind("refused"))["why"]
 
 
 async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:

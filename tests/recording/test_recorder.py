@@ -91,8 +91,8 @@ async def test_recording_is_started_marked_and_ended_from_outside(tmp_path: Path
     await started.start()
     desk = tmp_path / "data" / NAME
     assert not (await _exchange(desk, Request())).on
-    assert "nothing is recorded" in (await _exchange(desk, Request("mark", "x"))).error
-    assert "nothing is recorded" in (await _exchange(desk, Request("stop"))).error
+    assert "no recording is under way" in (await _exchange(desk, Request("mark", "x"))).error
+    assert "no recording is under way" in (await _exchange(desk, Request("stop"))).error
     refused = await _exchange(desk, Request("start", "/proc/nowhere/x.mcap"))
     assert "cannot be written" in refused.error
     assert (await _exchange(desk, Request("start", f"{tmp_path}/"))).on

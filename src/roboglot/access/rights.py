@@ -29,7 +29,7 @@ def parse_rights(text: str) -> frozenset[Right]:
     try:
         return frozenset(Right(word.strip().lower()) for word in text.split(","))
     except ValueError:
-        raise ValueError(f"rights are {', '.join(Right)}, with commas between, not {text!r}") from None
+        raise ValueError(f"rights are {', '.join(Right)}, separated by commas, not {text!r}") from None
 
 
 def write_rights(rights: Iterable[Right]) -> str:

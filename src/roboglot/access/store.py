@@ -139,7 +139,7 @@ class AccessStore:
             self._set("password", password_hash(password), name)
             return ""
         if kind is not IdentityKind.MACHINE:
-            raise ValueError(f"{name} is let in by its {kind}: there is nothing to rotate")
+            raise ValueError(f"{name} is identified by its {kind}: there is nothing to rotate")
         token = new_token()
         self._set("token", token_hash(token), name)
         return token
@@ -197,5 +197,5 @@ def _put(connection: Connection, identity: Identity) -> None:
 def _kind(connection: Connection, name: str) -> IdentityKind:
     row = connection.execute("SELECT kind FROM identity WHERE name=?", (name,)).fetchone()
     if row is None:
-        raise LookupError(f"there is no {name!r}; `roboglot access list` shows who there is")
+        raise LookupError(f"there is no {name!r}; `roboglot access list` shows all names")
     return IdentityKind(row[0])

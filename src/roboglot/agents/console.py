@@ -61,7 +61,7 @@ def _decoded(data: bytes, kind: type[T]) -> T:
     try:
         return msgspec.json.decode(data, type=kind)
     except msgspec.MsgspecError as error:
-        raise Refused(f"the console's answer is not what was asked for: {error}") from None
+        raise Refused(f"the console's answer has the wrong form: {error}") from None
 
 
 def _reason(error: HTTPError) -> str:

@@ -81,6 +81,6 @@ class HeardWords(TrainingWords):
 
 def _check(word: TrainedWord) -> None:
     if not (1 <= len(word.trigger.strip()) <= TRIGGER_MAX and len(word.value) <= VALUE_MAX):
-        raise InvalidGoal(f"a word has 1 to {TRIGGER_MAX} characters, what it stands for at most {VALUE_MAX}")
+        raise InvalidGoal(f"a word has 1 to {TRIGGER_MAX} characters, its meaning at most {VALUE_MAX}")
     if len(word.kind) > KIND_MAX:
         raise InvalidGoal(f"a kind has at most {KIND_MAX} characters")

@@ -142,7 +142,7 @@ def _end(until: str, lasts: str) -> float | None:
     """Return the end of a right (Unix s); None: unlimited. Raises ValueError."""
     now = datetime.now().astimezone()
     if until and lasts:
-        raise ValueError("either --until or --for")
+        raise ValueError("give either --until or --for")
     if lasts:
         match = re.fullmatch(r"(\d{1,6})\s*(s|min|h|d)", lasts)
         if match is None:
@@ -166,7 +166,7 @@ def _password() -> str:
         return sys.stdin.readline().rstrip("\n")
     first, again = getpass.getpass("password: "), getpass.getpass("the same again: ")
     if first != again:
-        raise ValueError("these are two passwords")
+        raise ValueError("the two passwords differ")
     return first
 
 

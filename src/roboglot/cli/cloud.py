@@ -69,7 +69,7 @@ def _warn_if_open(address: str, insecure: bool) -> None:
     if not insecure:
         sys.exit(
             f"roboglot cloud: on {address} tokens would pass without encryption. Let it listen on 127.0.0.1 behind a"
-            " proxy with TLS, or say --insecure if that is what you want"
+            " proxy with TLS, or give --insecure if that is what you want"
         )
     Console(stderr=True, highlight=False, soft_wrap=True).print(
         f"[bold red]INSECURE[/][red]: anyone on the network of {address} can read the accounts' tokens and"

@@ -78,7 +78,7 @@ def addresses(count: int, first: str, network: str) -> list[str]:
     if not 1 <= count <= ROBOTS_MAX:
         raise ValueError(f"at most {ROBOTS_MAX} robots")
     if first and network:
-        raise ValueError("either --address or --address-range")
+        raise ValueError("give either --address or --address-range")
     if not network:
         start = IPv4Address(first or "127.0.0.1")
         return [str(start + number) for number in range(count)]

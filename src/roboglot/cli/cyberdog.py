@@ -74,7 +74,7 @@ def _numbers(words: list[str], least: int, most: int) -> list[float]:
         raise ValueError(f"it takes {least}{f' to {most}' if most > least else ''} numbers, not {len(words)}")
     numbers = [float(word) for word in words]
     if not all(map(math.isfinite, numbers)):
-        raise ValueError(f"{' '.join(words)}: not all of these are numbers that a robot can use")
+        raise ValueError(f"{' '.join(words)}: not all of these are finite numbers")
     return numbers
 
 

@@ -52,7 +52,7 @@ def _text(path: Path) -> str:
     except OSError as error:
         raise ValueError(f"cannot read {path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise ValueError(f"{path} is no UTF-8 text") from None
+        raise ValueError(f"{path} is not UTF-8 text") from None
 
 
 async def _play_all(lessons: list[tuple[str, Lesson]], own: str | None, chinese: bool) -> bool:

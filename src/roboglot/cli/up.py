@@ -147,7 +147,7 @@ def command(
 def access_section(*, on: bool, insecure: bool) -> dict[str, object] | None:
     """Return the options' section [access]; --insecure overrides the file's. Raises ValueError for both options."""
     if on and insecure:
-        raise ValueError("--access asks who comes and --insecure lets everyone in: give one of them")
+        raise ValueError("--access requires names and --insecure lets everyone in: give one of them")
     return {"on": on} if on or insecure else None
 
 

@@ -69,9 +69,9 @@ class BackEnd:
             raise Answer(CloudCode.REFUSED, why)
         handler = {"/programs": self._program, "/favourites": self._favourite}.get(scope["path"])
         if handler is None:
-            raise Answer(CloudCode.NOT_FOUND, "there are /programs and /favourites")
+            raise Answer(CloudCode.NOT_FOUND, "only /programs and /favourites exist")
         if scope["method"] != "POST":
-            raise Answer(CloudCode.NO_SUCH_METHOD, "only POST")
+            raise Answer(CloudCode.NO_SUCH_METHOD, "only POST is allowed")
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         account = await self._account(headers.get("authorization", ""))
         try:
@@ -85,7 +85,7 @@ class BackEnd:
     async def _account(self, authorization: str) -> str:
         scheme, _, token = authorization.partition(" ")
         if scheme.lower() != "bearer" or not token:
-            raise Answer(CloudCode.UNAUTHORISED, "an account's token is wanted: Authorization: Bearer …")
+            raise Answer(CloudCode.UNAUTHORISED, "an account's token is required: Authorization: Bearer …")
         if (account := await self._store.account_of(token.strip())) is None:
             raise Answer(CloudCode.REFUSED, "no account has this token")
         return account
@@ -99,7 +99,7 @@ class BackEnd:
         if operate == "inquiry":
             raise Answer(CloudCode.OK, "these", await self._inquire(account, kind, ids))
         if kind not in KINDS:
-            raise Answer(CloudCode.NOT_FOUND, f"there is nothing of type {kind}")
+            raise Answer(CloudCode.NOT_FOUND, f"there is no type {kind}")
         if not ids:
             raise Answer(CloudCode.MISSING, "target_id is empty")
         document = json.dumps(frame)
@@ -121,7 +121,7 @@ class BackEnd:
             found = [json.loads(document) for document in await self._store.favourites(account, kind, known)]
             return [frame | {"id": frame["target_id"][0], "operate": "save", "state": "null"} for frame in found]
         if kind != RECORD:
-            raise Answer(CloudCode.NOT_FOUND, f"there is nothing of type {kind}")
+            raise Answer(CloudCode.NOT_FOUND, f"there is no type {kind}")
         rows = await self._store.records(account, RECORDS_SHOWN)
         return [_record(robot, json.loads(document)) for robot, document in rows]
 
@@ -152,7 +152,7 @@ async def _json_of(receive: Receive) -> dict[str, object]:
     except (ValueError, RecursionError):
         frame = None
     if not isinstance(frame, dict):
-        raise Answer(CloudCode.MISSING, "a JSON object is wanted")
+        raise Answer(CloudCode.MISSING, "a JSON object is required")
     return frame
 
 

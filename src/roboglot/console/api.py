@@ -129,7 +129,7 @@ class Api:
 
     async def _serve_recording(self, method: str, receive: Receive) -> dict[str, object]:
         if (recordings := self._desk.recordings) is None:
-            raise NotFound("nothing is recorded here")
+            raise NotFound("this program cannot record")
         for name in self._desk.views:
             self._desk.view(name, "look at the recording")
         if method == "GET":

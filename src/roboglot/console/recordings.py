@@ -55,7 +55,7 @@ class Recordings:
                 recorder.start(f"{self._folder}/")
             case "mark":
                 if not wish.text.strip():
-                    raise Refused("a mark needs words")
+                    raise Refused("a mark needs text")
                 recorder.mark(wish.text.strip())
             case "stop":
                 ended = await recorder.stop()

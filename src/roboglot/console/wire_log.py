@@ -78,7 +78,7 @@ class WireLog:
         """Return an exchange by number. Raises NotFound."""
         if self._entries and (index := number - self._entries[0].number) >= 0 and index < len(self._entries):
             return self._entries[index].exchange
-        raise NotFound(f"exchange {number} is not kept any more")
+        raise NotFound(f"exchange {number} is no longer stored")
 
     def _note(self, exchange: Exchange) -> None:
         if len(exchange.payload) > PAYLOAD_MAX:

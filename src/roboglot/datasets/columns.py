@@ -33,7 +33,7 @@ def read_columns(path: Path) -> DriveLog:
     heads = 7 if rows.shape[1] - 7 in HALF_CIRCLES or rows.shape[1] - 4 not in HALF_CIRCLES else 4
     count = rows.shape[1] - heads
     if count < 2:
-        raise BadDriveLog(f"{path.name}: {rows.shape[1]} columns; stamp, pose and ranges need more")
+        raise BadDriveLog(f"{path.name}: {rows.shape[1]} columns are too few for stamp, pose and ranges")
     angle_min = -math.pi / 2 if count in HALF_CIRCLES else -math.pi
     increment = HALF_CIRCLES.get(count, math.tau / count)
     nothing_from = no_echo(rows[:, heads:], least=LEAST_NO_ECHO)
@@ -69,5 +69,5 @@ def table(path: Path) -> NDArray[np.float64]:
         raise BadDriveLog(f"{path.name}: no line of numbers")
     result = np.stack(rows)
     if not np.isfinite(result[:, :4]).all():
-        raise BadDriveLog(f"{path.name}: a stamp or a pose is no number")
+        raise BadDriveLog(f"{path.name}: a stamp or a pose is not a number")
     return result

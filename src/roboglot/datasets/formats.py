@@ -22,7 +22,7 @@ def read_drive_log(path: Path) -> DriveLog:
     if path.is_dir():
         if is_bag(path, b""):
             return read_bag(path)
-        raise BadDriveLog(f"{path.name}: a folder without metadata.yaml, so no bag of ROS")
+        raise BadDriveLog(f"{path.name}: a folder without metadata.yaml is not a ROS bag")
     if path.stat().st_size > FILE_BYTES_MAX:
         raise BadDriveLog(f"{path.name}: larger than {FILE_BYTES_MAX} bytes")
     with path.open("rb") as file:

@@ -151,7 +151,7 @@ def _movement(data: bytes, at: int) -> Pose:
 def _plane(reader: _Reader, version: int) -> Pose:
     x, y, yaw = reader.take("fff" if version == 0 else "ddd")
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
-        raise ValueError("a pose is no number")
+        raise ValueError("a pose is not a number")
     return Pose(x, y, wrap_angle(yaw))
 
 
@@ -207,7 +207,7 @@ def _scan(data: bytes, at: int, odometry: Pose | None) -> _Scan:
     reader = _Reader(data, at)
     version = reader.begin()
     if version > 7:
-        raise ValueError(f"version {version} is not known")
+        raise ValueError(f"version {version} is unknown")
     aperture, leftwards, range_max = reader.take("fBf")
     mount, flipped = _mount(reader)
     if version < 6:

@@ -28,7 +28,7 @@ class LinkedBase(Base):
     def check(self, twist: Twist) -> None:
         """Check a velocity. Raises InvalidGoal if it is not finite, Unconnected if it cannot reach the robot."""
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
-            raise InvalidGoal("a velocity is finite")
+            raise InvalidGoal("a velocity must be finite")
         if twist != STILL:
             self._link.require()
 

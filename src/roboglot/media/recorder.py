@@ -138,7 +138,7 @@ class _File:
     def finish(self) -> Recording:
         """Complete the file and rename it. Raises OSError."""
         if self._container is None:
-            raise OSError("no picture came")
+            raise OSError("the camera sent no picture")
         self._container.close()
         self._container = None
         self._part.replace(self._path)

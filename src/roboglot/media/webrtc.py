@@ -177,7 +177,7 @@ class VideoCall:
         try:
             await peer.setRemoteDescription(RTCSessionDescription(offer, "offer"))
             if transceiver.mid is None or transceiver._offerDirection not in ("sendonly", "sendrecv"):
-                raise BadOffer("it asks for no video")
+                raise BadOffer("it does not ask for video")
             await peer.setLocalDescription(await peer.createAnswer())
         except BadOffer:
             raise

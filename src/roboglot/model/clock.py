@@ -99,7 +99,7 @@ class RealClock(Clock):
     def set_speed(self, speed: float) -> None:
         """Run ``speed`` times as fast as real time from now on. Raises ValueError unless it is above 0."""
         if not 0 < speed < math.inf:
-            raise ValueError(f"the speed of a clock is above 0, not {speed}")
+            raise ValueError(f"the speed of a clock must be above 0, not {speed}")
         self._change(speed, self._until)
 
     def pause(self) -> None:

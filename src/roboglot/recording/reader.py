@@ -158,7 +158,7 @@ def stream(path: Path, file: IO[bytes], *, chunks: bool = False) -> Iterator[Mca
         yield from StreamReader(file, emit_chunks=chunks, record_size_limit=RECORD_MAX).records
     except DAMAGE as error:
         if isinstance(error, McapError) and file.tell() <= 16:
-            raise BadRecording(f"{path} is no MCAP file") from None
+            raise BadRecording(f"{path} is not an MCAP file") from None
         log.info("%s: cut off or damaged: %s", path, error)
 
 

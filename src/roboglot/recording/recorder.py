@@ -126,7 +126,7 @@ class Recorder:
     async def stop(self) -> Status:
         """End the recording; return its final status. Raises NotRecording."""
         if self._files is None or self._thread is None:
-            raise NotRecording("nothing is recorded")
+            raise NotRecording("no recording is under way")
         thread, files = self._thread, self._files
         self._thread = None
         self._look_away_if_idle()
@@ -149,7 +149,7 @@ class Recorder:
     def mark(self, text: str) -> None:
         """Record a person's remark at the current time. Raises NotRecording."""
         if self._thread is None and self._ring_thread is None:
-            raise NotRecording("nothing is recorded")
+            raise NotRecording("no recording is under way")
         at, wall = self._stamp()
         self._put(Entry("/marks", "mark", at, wall, {"text": text[:MARK_MAX]}))
 
@@ -199,7 +199,7 @@ class Recorder:
     def save_ring(self, path: Path) -> int:
         """Write the last minutes to ``path``; return the number of values. Raises NotRecording, OSError."""
         if self._ring is None or self._ring_thread is None:
-            raise NotRecording("the last minutes are not kept: start with --record-ring")
+            raise NotRecording("the last minutes are not in memory: start with --record-ring")
         self._ring_thread.settle()
         path.parent.mkdir(parents=True, exist_ok=True)
         return self._ring.save(path)

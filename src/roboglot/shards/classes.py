@@ -104,7 +104,7 @@ class _Link:
         try:
             hello = _decode(await reader.readline())
             if not isinstance(hello, Hello):
-                raise ValueError("it said no name")
+                raise ValueError("it sent no name")
             self._world = hello.world
             mine = self._room.worlds[hello.world] = World(hello.world, hello.page, self._stop, self._end)
             while text := await reader.readline():
@@ -132,7 +132,7 @@ class _Link:
                 if (waiting := self._stops.get(id)) is not None and not waiting.done():
                     waiting.set_result(why)
             case Hello():
-                raise ValueError("it said its name twice")
+                raise ValueError("it sent its name twice")
             case _:
                 self._hear_page(message)
 

@@ -66,9 +66,9 @@ def plan_fleet(
         raise ValueError(f"between 1 and {ROBOTS_MAX} robots in each world, not {robots_each}")
     robots = template.get("robots") or _robots(robots_each or 1)
     if robots_each and template.get("robots") and len(robots) != robots_each:
-        raise ValueError(f"the template has {len(robots)} robots in a world, and --robots-each says {robots_each}")
+        raise ValueError(f"the template has {len(robots)} robots in a world, but --robots-each is {robots_each}")
     if any(robot.get("address") for robot in robots):
-        raise ValueError("robots of a template have no addresses: every world needs others; see --first-address")
+        raise ValueError("robots of a template must not have addresses: each world needs its own; see --first-address")
     addresses = _addresses(first, worlds * len(robots))
     shards: list[ShardPlan] = []
     for number in range(1, worlds + 1):
@@ -136,7 +136,7 @@ def _addresses(first: str, count: int) -> Iterator[str]:
     except ValueError as error:
         raise ValueError(f"the first address: {error}") from None
     if not isinstance(start, IPv4Address):
-        raise ValueError(f"the first address is an IPv4 one, not {first}")
+        raise ValueError(f"the first address must be an IPv4 address, not {first}")
     if int(start) + count > int(IPv4Address("255.255.255.255")):
         raise ValueError(f"there are no {count} addresses from {first} on")
     return (str(start + number) for number in range(count))

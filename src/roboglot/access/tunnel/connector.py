@@ -65,12 +65,12 @@ class KnownGateways:
         try:
             known = json.loads(self._path.read_text()) if self._path.exists() else {}
         except ValueError as error:
-            raise NotTrusted(f"{self._path} cannot be read ({error}): remove it to begin anew") from None
+            raise NotTrusted(f"{self._path} cannot be read ({error}): remove it to start afresh") from None
         if (kept := known.get(gateway)) == shown:
             return shown, False
         if kept is not None:
             raise NotTrusted(
-                f"{gateway} shows another certificate than before ({shown}, not {kept}): if that is meant to be,"
+                f"{gateway} shows another certificate than before ({shown}, not {kept}): if that is intended,"
                 f" remove its line from {self._path}"
             )
         self._path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -90,7 +90,7 @@ class AnnouncedGateway:
         """Return the fingerprint, never as new. Raises NotTrusted."""
         shown = hashlib.sha256(certificate).hexdigest()
         if shown != self._fingerprint:
-            raise NotTrusted(f"{gateway} shows another certificate ({shown}) than the registry has of it")
+            raise NotTrusted(f"{gateway} shows another certificate ({shown}) than the registry has for it")
         return shown, False
 
 
@@ -168,7 +168,7 @@ class Connector:
 
             async def call_back(port: int, protocol: Callable[[], asyncio.Protocol]) -> object:
                 if port not in callbacks:
-                    raise OSError(f"{port} is no port of an app")
+                    raise OSError(f"{port} is not a port of an app")
                 return await loop.create_connection(protocol, "127.0.0.1", port)
 
             tunnel = Tunnel(link, first=1, opened=call_back, datagram=pass_on)

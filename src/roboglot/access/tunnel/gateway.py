@@ -162,7 +162,7 @@ class Gateway:
         who = await self._guard.admit(f"{peer[0]}:{peer[1]}", Proof(ProofKind.HTTP, f"Bearer {token}"))
         found = self._robots.get(name)
         if found is None or not self._guard.may(who, name, Right.SEE):
-            raise Unknown(f"{who} has no right to see a robot {name!r}")
+            raise Unknown(f"{who} has no right to see robot {name!r}")
         robot, ports = found
         with self._address(who, str(peer[0]), ports.callbacks) as own:
             log.info("%s drives robot %s through a tunnel from %s", who, name, peer[0])
@@ -201,10 +201,12 @@ class Gateway:
         """
         mine = sum(each == who for each in self._addresses.values())
         if len(self._addresses) >= TUNNELS_MAX or mine >= TUNNELS_OF_ONE_MAX:
-            raise Unknown(f"{mine} tunnels of {who} are open, and {len(self._addresses)} together: no more")
+            raise Unknown(f"{mine} tunnels of {who} are open, {len(self._addresses)} in all: no more are allowed")
         free = (a for n in range(ADDRESSES) if (a := str(FIRST_ADDRESS + n)) not in self._addresses)
         if (own := next((a for a in free if _is_free(a, callbacks)), None)) is None:
-            raise Unknown(f"other programs listen at all of {FIRST_ADDRESS} to {FIRST_ADDRESS + ADDRESSES - 1}")
+            raise Unknown(
+                f"other programs listen on all addresses from {FIRST_ADDRESS} to {FIRST_ADDRESS + ADDRESSES - 1}"
+            )
         self._addresses[own] = who
         self._guard.tunnels[own] = Tunnelled(who, host, WeakValueDictionary())
         try:
@@ -255,7 +257,7 @@ def _hello(payload: bytes) -> Hello:
     try:
         return msgspec.json.decode(payload, type=Hello)
     except msgspec.MsgspecError:
-        raise BadFrame("this is no client of ours") from None
+        raise BadFrame("this is not a client of roboglot") from None
 
 
 class _Calls:
@@ -268,13 +270,13 @@ class _Calls:
     async def connect(self, port: int, protocol: Callable[[], asyncio.Protocol]) -> object:
         """Connect within the process if the door offers that, else (gRPC) over loopback. Raises OSError."""
         if port not in self._ports.tcp:
-            raise OSError(f"{port} is none of the robot's ports")
+            raise OSError(f"{port} is not a port of the robot")
         address = self._ports.address
         if (offered := self._robot.admission.offered(port)) is None:
             return await self._call(protocol(), address, port)
         server, door = offered
         if not server.is_serving():
-            raise ConnectionRefusedError(f"nothing listens at {port} now")
+            raise ConnectionRefusedError(f"nothing listens on port {port} now")
         number = next(free for free in self._numbers if free not in self._open)
         stream = self._open[number] = protocol()
         join(stream, door(), (self._own, number), (address, port))

@@ -126,7 +126,7 @@ class Tunnel:
 
     def _take_beat(self, kind: FrameKind, _number: int, _payload: bytes) -> None:
         if kind is not FrameKind.PING:
-            raise BadFrame("only beats come by this connection")
+            raise BadFrame("this connection carries only heartbeats")
         self._heart.hear_beside(self._loop.time())
 
     def _take(self, kind: FrameKind, number: int, payload: bytes) -> None:
@@ -140,7 +140,7 @@ class Tunnel:
             self._feed(stream, kind, payload)
         elif kind is FrameKind.OPEN:
             if len(payload) != PORT.size or number % 2 == self._next % 2:
-                raise BadFrame("this is no stream of the other end's")
+                raise BadFrame("this stream is not the other end's")
             if len(self._streams) >= STREAMS_MAX:
                 raise BadFrame("too many streams")
             self._open(number, PORT.unpack(payload)[0])
@@ -158,7 +158,7 @@ class Tunnel:
             case FrameKind.CLOSE:
                 stream.close()
             case FrameKind.OPEN:
-                raise BadFrame("this stream is open")
+                raise BadFrame("this stream is open already")
 
     def _open(self, number: int, port: int) -> None:
         task = self._loop.create_task(self._answer(number, self._new(number), port))

@@ -60,7 +60,7 @@ class LiftFloors(Floors):
     def set_lift(self, waiting: Pose, inside: Pose) -> None:
         numbers = (waiting.x, waiting.y, waiting.yaw, inside.x, inside.y, inside.yaw)
         if not all(map(math.isfinite, numbers)) or not 0.1 < waiting.distance_to(inside) < TRIP_MAX:
-            raise InvalidGoal(f"no places before and in a lift: {waiting}, {inside}")
+            raise InvalidGoal(f"not places in front of and in a lift: {waiting}, {inside}")
         yaw = waiting.point.bearing_to(inside)
         self._places = Pose(waiting.x, waiting.y, yaw), Pose(inside.x, inside.y, yaw)
 

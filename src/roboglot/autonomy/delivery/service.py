@@ -76,7 +76,7 @@ class QueueDelivery(Delivery):
                 raise Refused("the battery is too low for remote orders")
             known = {order.number for order in self._book.orders}
             if any(request.number in known for request in requests if request.number):
-                raise Refused("there is an order of that number already")
+                raise Refused("there is already an order with that number")
             orders = await self._book.add(requests)
         if any(request.remote for request in requests):
             self._driver.report(DeliveryNews.ORDER_RECEIVED)

@@ -101,7 +101,7 @@ class RearDocking(Docking):
                 break
             await self._try(action, self.home, shift)
         if not contact.docked:
-            raise DockNotFound(f"nothing touched in {len(SIDE_SHIFTS)} tries")
+            raise DockNotFound(f"no contact closed in {len(SIDE_SHIFTS)} tries")
         await self._charge()
         action.report("docked")
 
@@ -130,7 +130,7 @@ class RearDocking(Docking):
                 return
         tried = len(fronts[:CANDIDATES_MAX])
         why = f": {'; '.join(reasons)}" if reasons else ""
-        raise DockNotFound(f"no dock is known, and nothing touched at {tried} things that look like one{why}")
+        raise DockNotFound(f"no dock is known, and no contact closed at {tried} things that look like one{why}")
 
     async def _try(self, action: Action, home: Pose, shift: float) -> None:
         """Try to dock once at ``home``; ``shift``: m to the left, used if the lidar sees no dock."""

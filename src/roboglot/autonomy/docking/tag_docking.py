@@ -74,7 +74,7 @@ class MarkDocking(TagDocking):
         self._need(mark)
         way = self._robot.description.radius + ROOM_TO_TURN if distance is None else distance
         if not 0.0 < way <= DISTANCE_MAX:
-            raise InvalidGoal(f"robots back off by up to {DISTANCE_MAX:g} m, not {distance}")
+            raise InvalidGoal(f"a robot backs off by at most {DISTANCE_MAX:g} m, not {distance}")
 
         async def run(action: Action) -> None:
             if mark is Mark.SHELF and Jack in self._robot and self._robot[Jack].stage is not JackStage.DOWN:
@@ -92,12 +92,12 @@ class MarkDocking(TagDocking):
         radius = self._robot.description.radius
         numbers = (goal.start.x, goal.start.y, goal.start.yaw, goal.turn, goal.outside or 0.0)
         if not all(math.isfinite(number) for number in numbers):
-            raise InvalidGoal("a place to dock from, a turn and what is left out are numbers")
+            raise InvalidGoal("the place to dock from, the turn and the part left outside must be numbers")
         place = Point(radius + CLOSE) if goal.place is None or goal.mark is Mark.SHELF else goal.place
         if not (radius + TOUCH <= place.x <= PLACE_MAX and abs(place.y) <= PLACE_MAX):
-            raise InvalidGoal(f"{place} before the mark: the hull reaches {radius:g} m")
+            raise InvalidGoal(f"{place} in front of the mark is too close: the hull reaches {radius:g} m")
         if goal.outside is not None and not 0.0 <= goal.outside <= 2.0 * radius:
-            raise InvalidGoal(f"a hull {2.0 * radius:g} m long cannot be left out by {goal.outside:g} m")
+            raise InvalidGoal(f"a hull {2.0 * radius:g} m long cannot stay outside by {goal.outside:g} m")
         if not 0 <= goal.retries <= RETRIES_MAX or not 1 <= goal.strips <= 10:
             raise InvalidGoal(f"0 to {RETRIES_MAX} retries, 1 to 10 strips")
         if goal.lift:

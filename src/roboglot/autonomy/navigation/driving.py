@@ -284,7 +284,7 @@ def _top_speed(wanted: float | None, limit: float, what: str) -> float:
     if wanted is None:
         return limit
     if not wanted > 0:
-        raise InvalidGoal(f"the {what} is above 0, not {wanted}")
+        raise InvalidGoal(f"the {what} must be above 0, not {wanted}")
     return min(wanted, limit)
 
 
@@ -293,4 +293,4 @@ def _check_command(command: Twist | WheelSpeeds, lifetime: float | None) -> None
     if not all(map(math.isfinite, astuple(command))):
         raise InvalidGoal(f"not a velocity: {command}")
     if lifetime is not None and not 0 < lifetime <= LIFETIME_MAX:
-        raise InvalidGoal(f"a lifetime is above 0 and at most {LIFETIME_MAX:g} s, not {lifetime}")
+        raise InvalidGoal(f"a lifetime must be above 0 and at most {LIFETIME_MAX:g} s, not {lifetime}")

@@ -130,9 +130,9 @@ def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:
     if options.yaw is not None and not math.isfinite(options.yaw):
         raise InvalidGoal("the final yaw is not a number")
     if not 0.0 < options.speed_ratio <= 1.0:
-        raise InvalidGoal(f"a share of the top speed is above 0 and at most 1, not {options.speed_ratio}")
+        raise InvalidGoal(f"a share of the top speed must be above 0 and at most 1, not {options.speed_ratio}")
     if not 0.0 < options.tolerance <= POSITION_MAX:
-        raise InvalidGoal(f"a tolerance is above 0, not {options.tolerance}")
+        raise InvalidGoal(f"a tolerance must be above 0, not {options.tolerance}")
     if not 0 <= options.retries <= RETRIES_MAX:
         raise InvalidGoal(f"0 to {RETRIES_MAX} retries, not {options.retries}")
     return Goal(tuple(Point(goal.x, goal.y) for goal in goals), options)

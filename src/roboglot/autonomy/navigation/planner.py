@@ -198,7 +198,7 @@ class PlanningTask:
         first = self._open_cell(cost, start, ESCAPE_MAX)
         last = self._open_cell(cost, goal, self.tolerance + HALF_DIAGONAL)
         if first is None:
-            raise Unreachable("the robot is hemmed in where it stands")
+            raise Unreachable("the robot has no free floor around it")
         if last is None:
             raise Unreachable(f"{name} is too close to an obstacle, or in one")
         path = self._path(cost, first, last)

@@ -74,7 +74,7 @@ class LidarLocalization(Localization):
             -POSITION_MAX <= region.min_x < region.max_x <= POSITION_MAX
             and -POSITION_MAX <= region.min_y < region.max_y <= POSITION_MAX
         ):
-            raise InvalidGoal(f"no region of this map: {region}")
+            raise InvalidGoal(f"not a region of this map: {region}")
 
         async def search(_action: Action) -> None:
             await (self._search_driving(region, source) if may_move else self._search_standing(region))
@@ -90,7 +90,7 @@ class LidarLocalization(Localization):
             if len(found) == 1 and await self._settle(found[0], odometry):
                 return
             if len(found) > 1:  # another scan from the same place adds nothing
-                raise NotLocalized(f"{len(found)} places look like what the lidar sees: drive to where they differ")
+                raise NotLocalized(f"{len(found)} places look alike to the lidar: drive to a place where they differ")
             if self._robot.clock.time() > deadline:
                 if not self.started:
                     raise NotReady("localization is warming up: no scan has been compared with the map yet")

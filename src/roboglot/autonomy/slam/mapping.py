@@ -61,7 +61,7 @@ class LidarMapping(Mapping):
 
     def move_origin(self, point: Point) -> Point:
         if not math.hypot(point.x, point.y) <= ORIGIN_MAX:
-            raise InvalidGoal(f"no origin of a map: {point}")
+            raise InvalidGoal(f"not an origin of a map: {point}")
         column, row = round(point.x / RESOLUTION), round(point.y / RESOLUTION)
         origin = Pose(column * RESOLUTION, row * RESOLUTION)
         belief = self._belief

@@ -44,7 +44,7 @@ def merged(floors: Sequence[str], building: str, fetch: Callable[[str], bytes]) 
         layers += composite_of(replace(floor, name=label, layers=kept)).layers
     data = encode_stcm(CompositeMap(tuple(layers)))
     if len(floors_of(decode_stcm(data))) != len(floors):
-        raise BadMap("the floors do not stay apart")
+        raise BadMap("two floors have the same name")
     return data
 
 

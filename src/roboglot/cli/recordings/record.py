@@ -135,7 +135,7 @@ def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> Do
     from roboglot.recording.proxy.dog import DogRelay, Proof
 
     if "certs" not in target.options:
-        raise ValueError("a CyberDog wants to see a certificate: cyberdog://HOST?certs=FOLDER, none for plain gRPC")
+        raise ValueError("a CyberDog requires a certificate: cyberdog://HOST?certs=FOLDER, or none for plain gRPC")
     if target.options["certs"] == "none":
         return DogRelay(target, listen, book, None)
     own = ensure_certificates((data or default_data_folder(os.environ)) / FOLDER)
@@ -210,7 +210,7 @@ def _show(answer: Answer) -> None:
     elif answer.on:
         print(f"recording to {answer.path}: {answer.seconds:.1f} s, {answer.entries} values, {answer.bytes} bytes")
     else:
-        print("nothing is recorded")
+        print("no recording is under way")
     if answer.ring:
         print("the last minutes are in memory; `roboglot record save FILE` writes them")
     _complain(answer)

@@ -75,11 +75,11 @@ def configuration(recording: Recording, folder: Path) -> Config:
 
     clock = recording.facts.get("clock", "")
     if clock != "lockstep":
-        raise NoRerun(f"{recording.path} was recorded on a running clock ({clock}), of which no second run is the same")
+        raise NoRerun(f"{recording.path} was recorded on a running clock ({clock}), so a second run would differ")
     try:
         values: dict[str, Any] = json.loads(recording.attachments["config.json"])
     except (KeyError, ValueError):
-        raise NoRerun(f"{recording.path} says nothing of its configuration") from None
+        raise NoRerun(f"{recording.path} lacks its configuration") from None
     for name, data in recording.attachments.items():  # world and bodies as they were then
         (folder / Path(name).name).write_bytes(data)
     values |= values.pop("doors", {}) | {"data": str(folder / "data")}

@@ -146,7 +146,7 @@ class DogLink:
                 self.app_port = self._server.add_insecure_port(where)
         except RuntimeError as error:
             await channel.close()
-            raise LinkLost(f"the robot cannot call back: {where} is taken, perhaps by another app") from error
+            raise LinkLost(f"the robot cannot call back: {where} is in use, perhaps by another app") from error
         await self._server.start()
 
     async def close(self) -> None:
@@ -162,7 +162,7 @@ class DogLink:
 
     def _robot(self) -> GrpcAppStub:
         if self._stub is None:
-            raise LinkLost("hung up")
+            raise LinkLost("disconnected")
         return self._stub
 
     async def send(self, code: int, text: str) -> AsyncGenerator[tuple[int, str], None]:

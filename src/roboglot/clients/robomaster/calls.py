@@ -75,7 +75,7 @@ def _word(value: Parameter) -> str:
         return "true" if value else "false"
     if isinstance(value, float):
         if not math.isfinite(value):
-            raise ValueError(f"{value} is no number for a robot")
+            raise ValueError(f"{value} is not a finite number")
         return f"{value:.6f}".rstrip("0").rstrip(".")
     text = str(value)
     if not text or ";" in text or text.split() != [text]:

@@ -46,7 +46,7 @@ class CloudLink:
             raise LinkLost(f"the cloud at {self._url} cannot be reached: {error}") from None
         head, end, body = answer.partition(b"\r\n\r\n")
         if not end or not head.startswith(b"HTTP/1."):
-            raise BadAnswer(f"what answers at {self._url} speaks no HTTP")
+            raise BadAnswer(f"the server at {self._url} does not speak HTTP")
         try:
             return parse_answer(body)
         except BadCloudAnswer as error:

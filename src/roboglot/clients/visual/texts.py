@@ -52,7 +52,7 @@ class TextLink:
         except InvalidHandshake as error:
             if isinstance(error.__cause__, (EOFError, OSError)):
                 raise LinkLost(f"{host} hung up: {error.__cause__}") from None
-            raise BadAnswer(f"{host} is no WebSocket: {error}") from None
+            raise BadAnswer(f"{host} does not speak WebSocket: {error}") from None
         except OSError as error:
             raise LinkLost(f"no answer at {address}: {error.strerror or error}") from None
         return cls(connection)

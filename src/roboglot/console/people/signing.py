@@ -70,7 +70,7 @@ class Signing:
         if admission is None:
             raise Problem(409, "no sign-in is needed here: access is not switched on")
         if not (shown.token or (shown.name and shown.password)):
-            raise Problem(400, "a name and a password, or a token, or a name and a code are needed")
+            raise Problem(400, "give a name and a password, or a token, or a name and a code")
         proof = Proof(ProofKind.HTTP, _header(shown))
         try:
             who = await admission.admit(address, proof)

@@ -305,7 +305,7 @@ class Seat:
     async def _join(self, wish: Member) -> None:
         name, joined = wish.name.strip(), self._room.find(wish.code)
         if not name or not name.isprintable():
-            raise Refused("a name is needed")
+            raise Refused("give a name")
         self.leave()
         pupil = joined.enrol(name)
         if pupil.seat is not None:

@@ -78,7 +78,7 @@ class Trial:
             raise NotFound("there is no simulation here to try it in")
         modules = await _modules(programs, wish.body)
         if self._ended:
-            raise Busy("it was ended")
+            raise Busy("it was cancelled")
         play = studio.rehearse.play(wish.body, scene, modules=modules, speed=SPEED, notice=self._notice)
         self._playing = asyncio.ensure_future(play)
         try:
@@ -86,7 +86,7 @@ class Trial:
         except RuntimeError as error:
             raise Busy(str(error)) from None
         except asyncio.CancelledError:
-            raise Busy("it was ended") from None
+            raise Busy("it was cancelled") from None
         finally:
             self._playing = None
 

@@ -19,7 +19,7 @@ CLOCK_VERBS: OperationTable[str] = OperationTable("console clock", Right.ADMIN)
 def steerable(clock: Clock) -> RealClock:
     """Return ``clock`` if a person may steer it. Raises Refused for a lockstep clock."""
     if not isinstance(clock, RealClock):
-        raise Refused("this world runs in lockstep: the program that started it moves its clock")
+        raise Refused("this world runs in lockstep: the program that started it advances its clock")
     return clock
 
 

@@ -48,6 +48,6 @@ class Motions:
             if now < best - good / 2:
                 best, best_at = now, clock.time()
             elif clock.time() - best_at > PATIENCE:
-                raise Blocked(f"{what} stays {now:.3g} off")
+                raise Blocked(f"{what} remains {now:.3g} off")
             self._supervisor.link.require()
             await clock.sleep(PERIOD)

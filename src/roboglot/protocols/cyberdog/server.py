@@ -77,7 +77,7 @@ class CyberDogDoor:
         self, robot: Robot, address: str, config: CyberDogConfig, data: Path, frames: FrameRelay | None = None
     ) -> None:
         if config.plaintext and not is_loopback(address):
-            raise ValueError(f"plaintext gRPC is for loopback addresses alone, not for {address}")
+            raise ValueError(f"plaintext gRPC is allowed on loopback addresses only, not on {address}")
         self.port = config.port
         self._address = address
         self._config = config
@@ -225,7 +225,7 @@ class CyberDogDoor:
         except RuntimeError:
             port = 0
         if not port:
-            raise OSError(f"cannot listen on {where}: it is taken, or not an address of this machine")
+            raise OSError(f"cannot listen on {where}: it is in use, or not an address of this machine")
         return int(port)
 
 

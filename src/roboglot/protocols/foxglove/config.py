@@ -21,4 +21,4 @@ class FoxgloveConfig:
 
     def __post_init__(self) -> None:
         if not 0.05 <= self.dead_man <= 60:
-            raise ValueError("foxglove.dead_man is 0.05 to 60 s")
+            raise ValueError("foxglove.dead_man must be 0.05 to 60 s")

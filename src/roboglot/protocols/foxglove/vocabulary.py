@@ -41,7 +41,7 @@ class Quaternion(msgspec.Struct):
     def yaw(self) -> float:
         """The heading, rad. Raises InvalidGoal for what turns nothing."""
         if not all(map(math.isfinite, (self.x, self.y, self.z, self.w))) or not any((self.x, self.y, self.z, self.w)):
-            raise InvalidGoal("the orientation is no quaternion")
+            raise InvalidGoal("the orientation is not a quaternion")
         return math.atan2(2 * (self.w * self.z + self.x * self.y), 1 - 2 * (self.y**2 + self.z**2))
 
 

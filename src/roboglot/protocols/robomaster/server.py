@@ -69,7 +69,7 @@ class RoboMasterDoor:
         try:
             everywhere = IPv4Address(self._address).is_unspecified
         except ValueError:
-            raise OSError(f"{self._address} is no IPv4 address, and the text protocol knows no others") from None
+            raise OSError(f"{self._address} is not an IPv4 address, and the text protocol needs one") from None
         ports: dict[str, tuple[Callable[[], asyncio.Protocol], int | None]] = {
             "text SDK": (self._control_connection, self._config.control_port),
             "events": (self._events.connect, self._config.event_port),

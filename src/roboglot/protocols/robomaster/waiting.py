@@ -13,6 +13,6 @@ async def ended(context: Context, action: Action) -> None:
     try:
         status = await context.robot.clock.wait_for(action.done(), WAIT_MAX)
     except TimeoutError:
-        raise Expired(f"it is not over after {WAIT_MAX:g} s and goes on") from None
+        raise Expired(f"it has not ended after {WAIT_MAX:g} s and goes on") from None
     if status is not ActionStatus.SUCCEEDED:
         raise RobotError(action.reason or "it was cancelled")

@@ -28,9 +28,9 @@ class Ros2Config:
 
     def __post_init__(self) -> None:
         if not 0 <= self.domain <= DOMAIN_MAX:
-            raise ValueError(f"ros2.domain is 0 to {DOMAIN_MAX}")
+            raise ValueError(f"ros2.domain must be 0 to {DOMAIN_MAX}")
         if not 0.05 <= self.dead_man <= 60:
-            raise ValueError("ros2.dead_man is 0.05 to 60 s")
+            raise ValueError("ros2.dead_man must be 0.05 to 60 s")
         for name in self.namespaces.values():
             if name and not all(part.isidentifier() for part in name.split("/")):
                 raise ValueError(f"ros2.namespaces: {name!r} cannot be a namespace")

@@ -83,6 +83,6 @@ def pose(message: PoseMessage) -> Pose:
     turn = message.orientation
     parts = turn.x, turn.y, turn.z, turn.w
     if not all(map(math.isfinite, parts)) or not any(parts):
-        raise InvalidGoal("the orientation is no quaternion")
+        raise InvalidGoal("the orientation is not a quaternion")
     yaw = math.atan2(2 * (turn.w * turn.z + turn.x * turn.y), 1 - 2 * (turn.y**2 + turn.z**2))
     return Pose(message.position.x, message.position.y, yaw)

@@ -34,12 +34,12 @@ class Vda5050Config:
 
     def __post_init__(self) -> None:
         if self.version not in ("2.1", "3.0"):
-            raise ValueError(f"vda5050.version is 2.1 or 3.0, not {self.version!r}")
+            raise ValueError(f"vda5050.version must be 2.1 or 3.0, not {self.version!r}")
         for level in (self.interface, self.manufacturer, self.map, *self.serials.values()):
             if not 0 < len(level) <= LEVEL_MAX or any(sign in level for sign in "/+#\0"):
                 raise ValueError(f"vda5050: {level!r} cannot be a level of a topic")
         if not 0.1 <= self.visualization_period <= 60:
-            raise ValueError("vda5050.visualization_period is 0.1 to 60 s")
+            raise ValueError("vda5050.visualization_period must be 0.1 to 60 s")
         self.address  # noqa: B018 - raises for a port that is none
 
     @property
@@ -49,5 +49,5 @@ class Vda5050Config:
         if not colon or (host.count(":") and not host.startswith("[")):
             return self.broker.strip("[]"), self.port
         if not port.isdigit() or not 0 < int(port) < 65536:
-            raise ValueError(f"vda5050.broker: {port!r} is no port")
+            raise ValueError(f"vda5050.broker: {port!r} is not a port")
         return host.strip("[]"), int(port)

@@ -203,7 +203,7 @@ class Context:
             if state.action.action_type == "waitForTrigger" and state.status is ActionStatus.RUNNING
         ]
         if not waiting:
-            raise Rejected(ErrorKind.INSTANT_ACTION, "nothing waits for a trigger")
+            raise Rejected(ErrorKind.INSTANT_ACTION, "no action waits for a trigger")
         self._trigger.set()
 
     async def wait_for_trigger(self) -> None:

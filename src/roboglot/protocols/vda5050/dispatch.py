@@ -35,7 +35,7 @@ async def _refusal(context: Context, name: str, data: bytes) -> Rejected | None:
     operation = TABLE.get(name)
     try:
         if operation is None:
-            raise Rejected(ErrorKind.UNSUPPORTED, f"this robot uses no zones and asks for none: {name} is not read")
+            raise Rejected(ErrorKind.UNSUPPORTED, f"this robot does not use zones: {name} is ignored")
         context.check(name, operation.right or Right.ADMIN)
         await operation.call(context, {"payload": data})
     except Rejected as rejected:

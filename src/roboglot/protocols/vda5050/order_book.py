@@ -88,7 +88,7 @@ class OrderBook:
             if order.order_update_id == self.update_id and self.last is not None:
                 if (order.nodes, order.edges) == (self.last.nodes, self.last.edges):
                     return False
-                raise Rejected(ErrorKind.SAME_UPDATE, "another order came with the same orderUpdateId", known)
+                raise Rejected(ErrorKind.SAME_UPDATE, "another order has the same orderUpdateId", known)
             self._check_update(order, known)
             self._drop_horizon()
             self._extend(order, order.nodes[1:])
@@ -101,12 +101,12 @@ class OrderBook:
         if not near(order.nodes[0]):
             first = order.nodes[0].node_id
             raise Rejected(
-                ErrorKind.START_TOO_FAR, f"node {first} is not where the robot is", {**known, "nodeId": first}
+                ErrorKind.START_TOO_FAR, f"node {first} is too far from the robot", {**known, "nodeId": first}
             )
 
     def _check_update(self, order: OrderMessage, known: dict[str, object]) -> None:
         if order.order_update_id < self.update_id:
-            raise Rejected(ErrorKind.OUTDATED, f"update {self.update_id} was taken already", known)
+            raise Rejected(ErrorKind.OUTDATED, f"update {self.update_id} was accepted already", known)
         if self.cancelled or self.canceling:
             raise Rejected(ErrorKind.AFTER_CANCEL, f"order {self.order_id} was cancelled", known)
         first, decision = order.nodes[0], self.decision
@@ -117,7 +117,9 @@ class OrderBook:
             )
         new = {action.action_id for part in order.parts if part is not first for action in part.actions}
         if reused := sorted(new & {key for key, state in self.actions.items() if self._released(state.action)}):
-            raise Rejected(ErrorKind.NOT_A_CONTINUATION, "an actionId came before", {**known, "actionId": reused[0]})
+            raise Rejected(
+                ErrorKind.NOT_A_CONTINUATION, "an actionId was used before", {**known, "actionId": reused[0]}
+            )
 
     def _extend(self, order: OrderMessage, nodes: tuple[Node, ...]) -> None:
         self.nodes += nodes

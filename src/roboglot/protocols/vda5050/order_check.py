@@ -52,17 +52,19 @@ def _check_edge(edge: Edge, robot: Robot) -> None:
         "rotationAllowed": True if edge.rotation_allowed is False else None,
     }
     if named := [name for name, value in unusable.items() if value is not None]:
-        raise _unsupported(f"this robot plans its own way: {named[0]} cannot be used", {"edgeId": edge.edge_id})
+        raise _unsupported(f"this robot plans its own route: {named[0]} cannot be used", {"edgeId": edge.edge_id})
     if edge.actions:
         first = edge.actions[0]
         raise Rejected(
-            ErrorKind.ORDER_ACTION, f"this robot does {first.action_type} on no edge", {"actionId": first.action_id}
+            ErrorKind.ORDER_ACTION,
+            f"this robot cannot do {first.action_type} on an edge",
+            {"actionId": first.action_id},
         )
     if edge.height is not None and edge.height < robot.description.height:
         high = robot.description.height
         raise _unsupported(f"the robot is {high} m high, the edge allows {edge.height}", {"edgeId": edge.edge_id})
     if edge.speed is not None and edge.speed <= 0:
-        raise _unsupported("nothing moves at no speed", {"edgeId": edge.edge_id})
+        raise _unsupported("the speed must be above 0", {"edgeId": edge.edge_id})
 
 
 def _unsupported(why: str, references: dict[str, object]) -> Rejected:

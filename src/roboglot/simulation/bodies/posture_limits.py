@@ -50,7 +50,7 @@ def check_pose(body: BodyPose, limits: LegLimits) -> None:
     a = body.attitude
     numbers = (a.roll, a.pitch, a.yaw, body.shift.x, body.shift.y, body.height or 0.0)
     if not all(map(math.isfinite, numbers)):
-        raise InvalidGoal("a body pose is finite")
+        raise InvalidGoal("a body pose must be finite")
     if body.height is not None and not limits.lowest <= body.height <= limits.highest:
         raise InvalidGoal(f"the belly is held {limits.lowest} to {limits.highest} m above the floor")
     if max(abs(a.roll), abs(a.pitch), abs(a.yaw)) > limits.angle:
@@ -77,7 +77,7 @@ def check_steps(steps: Sequence[Step], footfalls: Sequence[Footfall], limits: Le
         if not 0.0 <= step.seconds <= STEP_SECONDS_MAX or step.twist.clamped(fastest) != step.twist:
             raise InvalidGoal("a step is too long or too fast")
         if not 0.0 < step.friction < math.inf or not 0.0 <= step.landing < math.inf:
-            raise InvalidGoal("a step's friction or landing makes no sense")
+            raise InvalidGoal("a step's friction or landing is out of range")
         if step.footholds:
             _check_footholds(step.footholds, limits)
     if footfalls:
@@ -105,7 +105,7 @@ def _check_balance(footfalls: Sequence[Footfall]) -> None:
         runs[0] = (runs[0][0], math.inf if endless else runs[0][1] + runs[-1][1])
     for down, seconds in runs:
         if len(down) < 3 and seconds > (ON_TWO_FEET_MAX if len(down) == 2 else ON_FEWER_MAX) + 1e-9:
-            raise InvalidGoal(f"it would fall over on {len(down)} feet for {seconds:g} s")
+            raise InvalidGoal(f"the robot would fall with {len(down)} feet down for {seconds:g} s")
 
 
 def led(pull: tuple[float, float], turned: float) -> Twist:

@@ -48,7 +48,7 @@ class Passengers:
     def board(self, lift: Car, count: int) -> None:
         """Set the number of people in the car, facing its door. Raises ValueError."""
         if not 0 <= count <= PASSENGERS_MAX:
-            raise ValueError(f"0 to {PASSENGERS_MAX} people can be put into the lift, not {count}")
+            raise ValueError(f"the lift holds 0 to {PASSENGERS_MAX} added people, not {count}")
         for index in range(self._count):
             self._props.remove(f"passenger {index}")
         self._count = count

@@ -60,14 +60,14 @@ class Props:
         """Hang up a printed code; return its number. Raises ValueError for too many."""
         number = next((n for n in range(TAGS_MAX) if n not in self.tags), None)
         if number is None:
-            raise ValueError(f"no more than {TAGS_MAX} tags can be hung up in a world")
+            raise ValueError(f"at most {TAGS_MAX} tags can be added to a world")
         self.tags[number] = floor, tag
         return number
 
     def take_down(self, number: int) -> None:
         """Remove a printed code. Raises NotFound."""
         if self.tags.pop(number, None) is None:
-            raise NotFound(f"no tag {number} was hung up")
+            raise NotFound(f"there is no added tag {number}")
 
     def elevation(self, floor: int) -> float:
         """Return the elevation of a floor's surface, m."""

@@ -90,7 +90,7 @@ class Actor(StagePerson):
 
     def place(self, x: float, y: float, facing: float = 0.0) -> None:
         if not all(map(math.isfinite, (x, y, facing))):
-            raise ValueError("a place has finite coordinates")
+            raise ValueError("a place must have finite coordinates")
         self._walker.drop()
         self._walker.place(Pose(x, y, math.radians(facing)))
 

@@ -202,7 +202,7 @@ class Hands(Stage):
         self._check_inside(pose, floor)
         props = self._physics.props
         if number not in props.tags:
-            raise NotFound(f"no tag {number} was hung up")
+            raise NotFound(f"there is no added tag {number}")
         tag = props.tags[number][1]
         props.tags[number] = floor, replace(tag, card=replace(tag.card, pose=pose))
 

@@ -115,12 +115,12 @@ class Table:
         self._file.seek(0)
         data, head = self._file.read(), ",".join(HEAD).encode() + b"\n"
         if not (data.startswith(head) or head.startswith(data)):
-            raise OtherCampaign(f"{self.path} is no table of a campaign")
+            raise OtherCampaign(f"{self.path} is not a table of a campaign")
         whole = data.rfind(b"\n") + 1
         try:
             rows = [_row(line) for line in csv.reader(io.StringIO(data[len(head) : whole].decode("utf-8", "replace")))]
         except (ValueError, TypeError, csv.Error) as error:
-            raise OtherCampaign(f"{self.path} is no table of a campaign: {error}") from None
+            raise OtherCampaign(f"{self.path} is not a table of a campaign: {error}") from None
         self._file.truncate(whole)
         self._file.seek(whole)
         return rows

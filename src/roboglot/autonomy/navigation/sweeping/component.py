@@ -66,10 +66,10 @@ class LaneSweeping(Sweeping):
             raise InvalidGoal("no area to sweep is drawn on the map" if not wanted else f"more than {AREAS_MAX} areas")
         numbers = [v for a in wanted for v in (a.start.x, a.start.y, a.end.x, a.end.y, a.half_width)]
         if not all(map(math.isfinite, numbers)):
-            raise InvalidGoal("an area lies nowhere")
+            raise InvalidGoal("an area has no finite coordinates")
         apart = 2 * OVERLAP * self._robot.description.radius if width is None else width
         if not WIDTH_MIN <= apart <= WIDTH_MAX:
-            raise InvalidGoal(f"lanes lie {WIDTH_MIN} to {WIDTH_MAX} m apart, not {apart}")
+            raise InvalidGoal(f"lanes must be {WIDTH_MIN} to {WIDTH_MAX} m apart, not {apart}")
         return wanted, apart
 
     async def _ways(self, areas: Sequence[Area], width: float) -> list[list[Point]]:

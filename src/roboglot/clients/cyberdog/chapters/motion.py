@@ -109,7 +109,7 @@ class Servo:
     def set(self, x: float, y: float, yaw: float) -> None:
         """Set the velocity in m/s and rad/s. Raises LinkLost if frames no longer get through."""
         if self._sending and self._sending.done():
-            raise LinkLost("the servo's frames do not get through any more")
+            raise LinkLost("the servo's frames no longer reach the robot")
         self._velocity = (x, y, yaw)
 
     async def _send(self) -> None:

@@ -93,7 +93,7 @@ class RoboMasterGimbal(Gimbal):
 
     def set_speed(self, pitch: float, yaw: float, *, source: str = "") -> Action:
         if not (math.isfinite(pitch) and math.isfinite(yaw)):
-            raise InvalidGoal("a speed is finite")
+            raise InvalidGoal("a speed must be finite")
         top = self.limits.speed
         pitch, yaw = max(-top, min(top, pitch)), max(-top, min(top, yaw))
 

@@ -62,7 +62,7 @@ class RoboMasterGripper(Gripper):
                 self._supervisor.link.require()
                 await clock.sleep(motion.PERIOD)
             if goal is GripperStatus.OPEN or self._status is GripperStatus.OPEN:
-                raise Blocked(f"the gripper stays {self._status}")  # otherwise it grips an object
+                raise Blocked(f"the gripper remains {self._status}")  # otherwise it grips an object
 
         name = f"{'open' if goal is GripperStatus.OPEN else 'close'} gripper"
         return self._motions.start(name, run, gripper.stop, resource=GRIPPER, goal=goal, source=source)

@@ -72,7 +72,7 @@ class RoboMasterAdapters(SensorAdapters):
         try:
             return self._inputs[adapter, port]
         except KeyError:
-            raise NotFound(f"there is no port {port} at a sensor adapter {adapter}") from None
+            raise NotFound(f"there is no port {port} on sensor adapter {adapter}") from None
 
     async def _ask(self, adapter: int, port: int) -> None:
         robot = self._client.sensor_adapter

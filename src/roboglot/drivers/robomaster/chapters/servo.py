@@ -64,7 +64,7 @@ class RoboMasterServos(Servos):
     def set_speed(self, number: int, speed: float, *, source: str = "") -> Action:
         self._index(number)
         if not math.isfinite(speed):
-            raise InvalidGoal("a speed is finite")
+            raise InvalidGoal("a speed must be finite")
         cut = max(-self.speed, min(self.speed, speed))
 
         async def run() -> None:

@@ -85,7 +85,7 @@ class SlamwareLocalization(Localization):
         if region is not None:
             width, height = region.max_x - region.min_x, region.max_y - region.min_y
             if not (width > 0 and height > 0):
-                raise InvalidGoal(f"no region of this map: {region}")
+                raise InvalidGoal(f"not a region of this map: {region}")
             area = geometry.Rectangle(region.min_x, region.min_y, width, height)
         movement = RecoverMovement.ROTATE_ONLY if may_move else RecoverMovement.NO_MOVE
         options = RelocalizationOptions(recover_movement_type=movement)

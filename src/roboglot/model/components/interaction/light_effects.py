@@ -64,7 +64,7 @@ class ShownLight(Light):
         if not FREQUENCY_MIN <= frequency <= FREQUENCY_MAX:
             raise InvalidGoal(f"a light's frequency is {FREQUENCY_MIN} to {FREQUENCY_MAX} Hz, not {frequency}")
         if effect in RUNNING and len(lamps) < 2:
-            raise InvalidGoal(f"{zone} has a single lamp: nothing runs there")
+            raise InvalidGoal(f"{zone} has a single lamp: running effects need several")
         command = ZoneState(colour, effect, frequency, self._clock.time())
         if lamp is None:
             lamps[:] = [command] * len(lamps)

@@ -180,7 +180,7 @@ async def _find_itself(session: Session, stored: StoredMap, assisted: bool, inte
             await session.complete(localization.relocalize(sky.region if sky else None, source=session.source))
             if sky is None or sky.allows(localization.pose.point):
                 return
-            raise NotLocalized("by satellite the robot is elsewhere")
+            raise NotLocalized("the satellite fix places the robot elsewhere")
         except NotLocalized:
             if not assisted or clock.time() >= deadline:
                 raise
@@ -255,7 +255,7 @@ def _preset(stored: StoredMap, name: str) -> Point:
     for label in stored.labels:
         if label.name == name:
             return label.point
-    raise NotFound(f"the map {stored.name} has no point {name!r}")
+    raise NotFound(f"the map {stored.name} has no label {name!r}")
 
 
 async def _newest(robot: Robot, *, outdoor: bool | None = None) -> StoredMap:

@@ -76,19 +76,19 @@ def _footfalls(sequence: Record) -> Sequence[Footfall]:
     """Return the gait list. Raises InvalidGoal for a sequence without a name or paces, or with invalid gaits."""
     name = sequence.fields.get("name")
     if not isinstance(name, str) or not name.isidentifier() or len(name) > NAME_MAX:
-        raise InvalidGoal("a sequence's name follows the rules of variables' names")
+        raise InvalidGoal("a sequence's name must be a valid name of a variable")
     if not _list(sequence, "pace_list", "MotionSequencePace"):
-        raise InvalidGoal("a sequence has paces")
+        raise InvalidGoal("a sequence needs paces")
     return [_footfall(gait) for gait in _list(sequence, "gait_list", "MotionSequenceGait")] or TROT
 
 
 def _footfall(gait: Record) -> Footfall:
     seconds = _number(gait, "duration") * GAIT_UNIT
     if seconds <= 0:
-        raise InvalidGoal("a gait takes time")
+        raise InvalidGoal("a gait needs a duration above 0")
     down = {foot: _number(gait, name) for foot, name in FEET.items()}
     if any(number not in (0, 1) for number in down.values()):
-        raise InvalidGoal("a foot is on the ground (1) or not (0)")
+        raise InvalidGoal("a foot must be 1 (on the ground) or 0")
     return Footfall(seconds, frozenset(foot for foot, number in down.items() if number))
 
 
@@ -103,7 +103,7 @@ class _Pace:
 def _pace(pace: Record) -> _Pace:
     weights = [_number(pace, "weight", part, axis) for part in ("linear", "angular") for axis in "xyz"]
     if any(weight < 0.0 for weight in weights):
-        raise InvalidGoal("a weight is not negative")
+        raise InvalidGoal("a weight must not be negative")
     landing, friction = _number(pace, "landing_gain"), _number(pace, "friction_coefficient")
     if not 0.0 <= landing <= LANDING_GAIN_MAX:
         raise InvalidGoal(f"landing_gain is 0 to {LANDING_GAIN_MAX}")

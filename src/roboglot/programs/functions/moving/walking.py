@@ -138,7 +138,7 @@ async def _walk(
     """Walk for a distance (m, by odometry), else for a time (s), else for one command."""
     driving = session.robot[Driving]
     if distance > 0 and not twist.speed:
-        raise InvalidGoal("a distance needs a velocity")
+        raise InvalidGoal("a distance needs a velocity other than 0")
     if Legs in session.robot:
         session.robot[Legs].walk(gait, lift)
     if distance > 0 and not twist.yaw:

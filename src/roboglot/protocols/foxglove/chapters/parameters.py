@@ -71,7 +71,7 @@ def _set(robot: Robot, value: Value) -> None:
     if parameter is None:
         raise NotFound(f"there is no parameter {value.name[:80]!r}")
     if parameter.write is None:
-        raise InvalidGoal(f"{value.name} can only be read")
+        raise InvalidGoal(f"{value.name} is read-only")
     robot.admission.check(DOOR, f"set {value.name}", parameter.right)
     try:
         wanted: object = msgspec.convert(value.value, parameter.kind)

@@ -21,7 +21,7 @@ async def control(context: Context, *, command: int, speed: float, seek: int | N
     if context.topics is None:
         raise NotReady("there are no topics to play")
     if command not in (PLAY, PAUSE):
-        raise InvalidGoal(f"a recording is played (0) or paused (1), not {command}")
+        raise InvalidGoal(f"a playback command must be 0 (play) or 1 (pause), not {command}")
     if not math.isfinite(speed) or not SPEED_MIN <= speed <= SPEED_MAX:
         raise InvalidGoal(f"a recording is played {SPEED_MIN:g} to {SPEED_MAX:g} times as fast, not {speed:g}")
     context.topics.control(context, Wish(command == PLAY, speed, seek, request))

@@ -29,7 +29,7 @@ async def subscribe(context: Context, *, subscriptions: list[Subscription]) -> N
         if wish.channel_id not in known or topics is None:
             raise NotFound(f"there is no channel {wish.channel_id}")
         if not 0 <= wish.id <= NUMBER_MAX or wish.id in context.subscriptions.values():
-            raise InvalidGoal(f"a subscription cannot be {wish.id}, or is already")
+            raise InvalidGoal(f"a subscription cannot have the number {wish.id}, or has it already")
         if wish.channel_id in context.subscriptions:
             raise InvalidGoal(f"channel {wish.channel_id} is subscribed to already")
         if len(context.subscriptions) >= SUBSCRIPTIONS_MAX:

@@ -173,5 +173,5 @@ async def push(
     """
     words = {"person": person or people, "gesture": gesture or pose, "marker": marker, "robot": robot, "line": line}
     if {person, people} == {"on", "off"} or {gesture, pose} == {"on", "off"}:
-        raise InvalidGoal("the same thing on and off")
+        raise InvalidGoal("the same attribute is on and off")
     context.part(Ai).switch({name: word == "on" for name, word in words.items() if word})

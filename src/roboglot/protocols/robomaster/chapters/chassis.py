@@ -60,7 +60,7 @@ async def set_wheels(
     speeds = wheels_of(round(w1), round(w2), round(w3), round(w4), as_robots)
     if context.mode is FollowMode.GIMBAL_LEAD:
         if as_robots:
-            raise Refused("robots drive no single wheels in gimbal_lead")
+            raise Refused("single wheels cannot be driven in gimbal_lead")
         speeds = without_yaw(speeds)
     _drive(context, speeds)
 

@@ -144,7 +144,7 @@ def _near(goal: float | None, now: float) -> bool:
 def _top(name: str, speed: float) -> float:
     """Return a top speed in rad/s. Raises InvalidGoal for 0."""
     if not speed:
-        raise InvalidGoal(f"with {name} 0 it never gets there; did you mean `{name} 30`?")
+        raise InvalidGoal(f"with {name} 0 it would never arrive; did you mean `{name} 30`?")
     return math.radians(speed)
 
 

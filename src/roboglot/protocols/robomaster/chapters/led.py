@@ -33,7 +33,7 @@ async def control(
     if kind is LightEffect.SCROLLING or single_led_index is not None:
         zones = [zone for zone in zones if light.zones[zone] > 1]
     if not zones:
-        raise NotFound(f"{comp} has no lamps that could do this")
+        raise NotFound(f"the lamps of {comp} cannot do this")
     if single_led_index is not None and kind not in (LightEffect.SOLID, LightEffect.OFF):
         raise InvalidGoal(f"a single lamp is solid or off, not {effect}")
     for zone in zones:

@@ -130,7 +130,7 @@ def request_of(task: CloudTask, name: str) -> OrderRequest:
     number = task.order_id or name[:64]
     if task.type == "INDUSTRY":
         if not task.task_targets:
-            raise InvalidGoal("a round has task_targets")
+            raise InvalidGoal("a round needs task_targets")
         *stops, target = [point.target_name for point in task.task_targets]
         return OrderRequest(
             OrderKind.ROUND,
@@ -142,7 +142,7 @@ def request_of(task: CloudTask, name: str) -> OrderRequest:
             number=number,
         )
     if task.location is None:
-        raise InvalidGoal("a task has a location")
+        raise InvalidGoal("a task needs a location")
     points = tuple(task.location.task_points)
     boxes = boxes_of(task.cargos or ())
     return OrderRequest(CLOUD_KINDS[task.type], task.location.poi_name, points, boxes, remote=True, number=number)

@@ -76,7 +76,7 @@ async def drop(
 def _check(lhd: str, station: str, height: float | None, depth: float | None, side: str) -> None:
     """Raise Refused for a load that a jack cannot handle."""
     if lhd not in ("", JACK_POSITION):
-        raise Refused(f"there is no load handling device {lhd!r}; it is called {JACK_POSITION!r}")
+        raise Refused(f"there is no load handling device {lhd!r}; the robot's is {JACK_POSITION!r}")
     if station not in ("", SHELF):
         raise Refused(f"there is no station type {station!r}; it is {SHELF!r} or left out")
     for name, value in (("height", height), ("depth", depth), ("side", side or None)):

@@ -65,7 +65,7 @@ def _seconds_until(text: str, now: float) -> float:
     try:
         then = datetime.fromisoformat(text)
     except ValueError:
-        raise InvalidGoal(f"{text[:40]!r} is no time of ISO 8601") from None
+        raise InvalidGoal(f"{text[:40]!r} is not an ISO 8601 time") from None
     seconds = (then if then.tzinfo else then.replace(tzinfo=UTC)).timestamp() - now
     if not 0 < seconds <= SLEEP_MAX:
         raise InvalidGoal(f"{text[:40]} is not within the next 31 days")

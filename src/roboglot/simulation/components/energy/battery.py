@@ -145,7 +145,7 @@ class SimulatedBattery(Battery):
     def set_charge(self, charge: float) -> None:
         """Set the charge (0..1) at once: for tests and faults. Raises ValueError."""
         if not 0.0 <= charge <= 1.0:
-            raise ValueError("a charge lies between 0 and 1")
+            raise ValueError("a charge must be between 0 and 1")
         self._charge = charge
 
     def warm(self, temperature: float) -> None:

@@ -109,7 +109,7 @@ class SimulatedPower(Power):
 
     def shut_down(self, *, source: str = "", after: float = 0.0, restart_after: float | None = None) -> Action:
         if not (0.0 <= after <= AFTER_MAX and 0.0 <= (restart_after or 0.0) <= AFTER_MAX):
-            raise InvalidGoal("that is too far away")
+            raise InvalidGoal("the time is too far ahead")
 
         async def run(action: Action) -> None:
             await self._clock.sleep(after)

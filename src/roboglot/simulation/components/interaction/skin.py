@@ -32,7 +32,7 @@ class SimulatedSkin(ShownSkin):
 
     def show(self, pattern: SkinPattern, *, cycle: float = 1.0, standing: Shade = Shade.LIGHT) -> None:
         if pattern is SkinPattern.FOOTFALLS and not self.feet:
-            raise Refused("this body has no feet to show")
+            raise Refused("this body has no feet")
         super().show(pattern, cycle=cycle, standing=standing)
 
 

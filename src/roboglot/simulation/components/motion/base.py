@@ -50,7 +50,7 @@ class SimulatedBase(Base):
 
     def set_velocity(self, twist: Twist) -> None:
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
-            raise InvalidGoal("a velocity is finite")
+            raise InvalidGoal("a velocity must be finite")
         if twist != STILL:
             self.locks.check()
         if not self.wheels.mecanum:
@@ -65,7 +65,7 @@ class SimulatedBase(Base):
 
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
         if not all(map(math.isfinite, four(speeds))):
-            raise InvalidGoal("a wheel's speed is finite")
+            raise InvalidGoal("a wheel's speed must be finite")
         if speeds != NO_WHEELS:
             self.locks.check()
         body, limit = self.wheels.twist_of(speeds), self.limits.twist

@@ -71,7 +71,7 @@ class SimulatedGimbal(Gimbal):
 
     def set_speed(self, pitch: float, yaw: float, *, source: str = "") -> Action:
         if not (math.isfinite(pitch) and math.isfinite(yaw)):
-            raise InvalidGoal("a speed is finite")
+            raise InvalidGoal("a speed must be finite")
         top = self.limits.speed
         speeds = GimbalAngles(max(-top, min(top, pitch)), max(-top, min(top, yaw)))
         action = self._turning
@@ -118,7 +118,7 @@ class SimulatedGimbal(Gimbal):
         source: str = "",
     ) -> Action:
         if not (math.isfinite(pitch) and math.isfinite(yaw)):
-            raise InvalidGoal("an angle is finite")
+            raise InvalidGoal("an angle must be finite")
         up, side = (
             axis.position + offset if offset else None
             for axis, offset in ((self.axes.pitch, pitch), (self.axes.yaw, yaw))
@@ -185,7 +185,7 @@ class SimulatedGimbal(Gimbal):
         if speed is None:
             return self.limits.speed
         if not speed > 0.0:
-            raise InvalidGoal(f"a speed is above 0, not {speed}")
+            raise InvalidGoal(f"a speed must be above 0, not {speed}")
         return min(speed, self.limits.speed)
 
 

@@ -260,7 +260,7 @@ class SimulatedLegs(Legs):
                 straight = performance.hit or action.status is ActionStatus.CANCELING or spec is None
                 self._become(Posture.STANDING if straight or spec is None else spec.after)
         if performance.hit or (spec and strayed(self._hull.pose, begin.compose(spec.way))):
-            raise Collided("something stood in the way")
+            raise Collided("an obstacle was in the way")
 
     # -- every tick ----------------------------------------------------------------------------------------------------
 

@@ -45,7 +45,7 @@ class SimulatedServos(Servos):
         if not abs(angle) <= self.limit + 1e-9:
             raise InvalidGoal(f"a servo goes to at most {self.limit:.4g} rad, not {angle}")
         if speed is not None and not speed > 0.0:
-            raise InvalidGoal(f"a speed is above 0, not {speed}")
+            raise InvalidGoal(f"a speed must be above 0, not {speed}")
         top = min(speed or self.speed, self.speed)
 
         async def run(action: Action) -> None:
@@ -65,7 +65,7 @@ class SimulatedServos(Servos):
     def set_speed(self, number: int, speed: float, *, source: str = "") -> Action:
         index = self._index(number)
         if not math.isfinite(speed):
-            raise InvalidGoal("a speed is finite")
+            raise InvalidGoal("a speed must be finite")
         cut = float(max(-self.speed, min(self.speed, speed)))
         action = self._turning.get(index)
         if action and action.may_go_on(source) and action.status is ActionStatus.EXECUTING and not action.paused:

@@ -66,7 +66,7 @@ class SimulatedSensorAdapters(SensorAdapters):
 
     def _input(self, adapter: int, port: int) -> _Input:
         if not (1 <= adapter <= self.count and 1 <= port <= self.ports):
-            raise NotFound(f"there is no port {port} at a sensor adapter {adapter}")
+            raise NotFound(f"there is no port {port} on sensor adapter {adapter}")
         return self._inputs[adapter - 1][port - 1]
 
 

@@ -100,7 +100,7 @@ class SimulatedBluetooth(Bluetooth):
             self._wanted, self._linked = None, False
             await self._robot.clock.sleep(self._section.connect_time)
             if not self._hears(gadget):
-                raise NotFound(f"{address} is not heard")
+                raise NotFound(f"{address} is out of radio range")
             self._wanted, self._linked = gadget, True
             device = self._described(gadget)
             await self._remember([device, *(known for known in self.history if known.address != address)])

@@ -37,10 +37,10 @@ class SimulatedDeveloper(Developer):
         if len(link) > LINK_MAX or parts.scheme not in ("http", "https") or not parts.hostname:
             raise InvalidGoal("a key's link begins with https:// and a host")
         if Network in self._robot and not self._robot[Network].state.internet:
-            raise Refused("the internet is not reached")
+            raise Refused("the internet cannot be reached")
         await self._robot.clock.sleep(FETCHING)
         if parts.path.rstrip("/").rpartition("/")[2] != self._robot.description.serial:
-            raise NotFound("the key there is not this robot's")
+            raise NotFound("the key at this link is not this robot's")
         self._open = True
         if Settings in self._robot:
             await self._robot[Settings].put(KEY, True)

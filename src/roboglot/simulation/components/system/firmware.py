@@ -150,7 +150,7 @@ class SimulatedFirmware(Firmware):
             if Battery in self._robot and self._robot[Battery].state.percentage < CHARGE_MIN:
                 raise Refused("the battery is too low for an update")
             if self._robot.actions.running(BASE):
-                raise Refused("the robot is on its way")
+                raise Refused("the robot is moving")
             self._base.locks.lock(FIRMWARE, "the robot is being updated")
             try:
                 await self._go_through(action, FirmwareState.INSTALLING, package, self._section.install_rate)

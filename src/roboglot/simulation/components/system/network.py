@@ -181,7 +181,7 @@ class SimulatedNetwork(Network):
         if on == state.dhcp:
             return
         if not on and not (state.mode is NetworkMode.STATION and state.address):
-            raise Refused("there is no address yet to keep")
+            raise Refused("there is no address to fix yet")
         await self._keep(address="" if on else state.address)
 
     async def set_priority(self, priority: Uplink) -> None:

@@ -42,7 +42,7 @@ class SimulatedPwmPorts(PwmPorts):
     def set_frequency(self, port: int, frequency: float) -> None:
         now = self.signal(port)
         if not 0.0 < frequency <= FREQUENCY_MAX:
-            raise InvalidGoal(f"a frequency is above 0 and at most {FREQUENCY_MAX:g} Hz, not {frequency}")
+            raise InvalidGoal(f"a frequency must be above 0 and at most {FREQUENCY_MAX:g} Hz, not {frequency}")
         self._signals[port - 1] = PwmSignal(now.duty, frequency)
 
     def reset(self) -> None:

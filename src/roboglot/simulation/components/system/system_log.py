@@ -85,7 +85,7 @@ class SimulatedSystemLog(SystemLog):
 
     def _reach(self) -> None:
         if Network not in self._robot or not self._robot[Network].state.internet:
-            raise Refused("the internet is not reached")
+            raise Refused("the internet cannot be reached")
 
 
 def _line(event: Event) -> str:

@@ -79,4 +79,4 @@ class Camera(Calls):
         try:
             return await self.clock.wait_for(anext(chunks, None), CHUNK_WAIT)
         except TimeoutError:
-            raise TimedOut(f"{code.name}: nothing came for {CHUNK_WAIT:g} s") from None
+            raise TimedOut(f"{code.name}: nothing arrived for {CHUNK_WAIT:g} s") from None

@@ -27,10 +27,10 @@ class CyberDogMapping(ReportedMapping):
         raise Refused("this robot does not report loop closure")
 
     def clear(self) -> None:
-        raise Refused("this robot's map is its app's")
+        raise Refused("this robot's map belongs to its app")
 
     def load(self, grid: OccupancyGrid, pose: Pose) -> None:
-        raise Refused("this robot's map is its app's")
+        raise Refused("this robot's map belongs to its app")
 
     def move_origin(self, point: Point) -> Point:
-        raise Refused("this robot's map is its app's")
+        raise Refused("this robot's map belongs to its app")

@@ -120,7 +120,7 @@ class CyberDogLegs(Legs):
         turned = (body.attitude.roll, body.attitude.pitch, body.attitude.yaw)
         shifted = (body.shift.x, body.shift.y, body.height or 0.0)
         if max(map(abs, turned)) > LIMITS.angle or max(map(abs, shifted[:2])) > LIMITS.shift:
-            raise InvalidGoal("a body pose beyond what legs can do")
+            raise InvalidGoal("the legs cannot reach this body pose")
         if body.height is not None and not relative and not LIMITS.lowest <= body.height <= LIMITS.highest:
             raise InvalidGoal(f"the body is held {LIMITS.lowest} to {LIMITS.highest} m high")
 
@@ -146,7 +146,7 @@ class CyberDogLegs(Legs):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        raise Refused("this robot takes no choreographies over its app's protocol")
+        raise Refused("this robot's app protocol has no choreographies")
 
     def _start(self, name: str, number: int, *, source: str, on_busy: OnBusy = OnBusy.REPLACE) -> Action:
         self._supervisor.link.require()

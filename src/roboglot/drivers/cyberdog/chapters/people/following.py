@@ -78,7 +78,7 @@ class CyberDogFollowing(Following):
         source: str = "",
         on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
-        raise Refused("the app's protocol of a dog takes regions of its picture, not places")
+        raise Refused("a dog's app protocol takes regions of its picture, not places")
 
     @property
     def place(self) -> Point | None:

@@ -56,7 +56,7 @@ class CyberDogPower(Power):
 
     def shut_down(self, *, source: str = "", after: float = 0.0, restart_after: float | None = None) -> Action:
         if not 0.0 <= after <= AFTER_MAX:
-            raise Refused("that is too far away")
+            raise Refused("the time is too far ahead")
         if restart_after:
             raise Refused("this dog can only restart at once")
 

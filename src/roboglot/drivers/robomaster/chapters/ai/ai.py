@@ -174,7 +174,7 @@ class UnsupportedDetector(Detector[T], Generic[T]):
         return None
 
     def subscribe(self) -> NoReturn:
-        raise Refused(f"an EP detects no {self._what}")
+        raise Refused(f"an EP cannot detect {self._what}")
 
 
 class RoboMasterVision(Vision):

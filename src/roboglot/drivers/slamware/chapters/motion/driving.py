@@ -53,7 +53,7 @@ class SlamwareDriving(Driving):
         if not all(map(math.isfinite, astuple(command))):
             raise InvalidGoal(f"not a velocity: {command}")
         if lifetime is not None and not 0 < lifetime <= LIFETIME_MAX:
-            raise InvalidGoal(f"a lifetime is above 0 and at most {LIFETIME_MAX:g} s, not {lifetime}")
+            raise InvalidGoal(f"a lifetime must be above 0 and at most {LIFETIME_MAX:g} s, not {lifetime}")
         if isinstance(command, WheelSpeeds):
             if command != WheelSpeeds():
                 raise Refused("the wheels of a Slamware robot cannot be turned one by one")
@@ -219,5 +219,5 @@ def _top(wanted: float | None, limit: float, what: str) -> float:
     if wanted is None:
         return limit
     if not wanted > 0:
-        raise InvalidGoal(f"the {what} is above 0, not {wanted}")
+        raise InvalidGoal(f"the {what} must be above 0, not {wanted}")
     return min(wanted, limit)

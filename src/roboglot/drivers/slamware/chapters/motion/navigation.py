@@ -66,7 +66,7 @@ class SlamwareNavigation(Navigation):
 
     async def plan(self, start: Point, goal: Point) -> Path:
         if start.distance_to(self._reported.pose) > HERE:
-            raise Refused("this robot only plans from where it is")
+            raise Refused("this robot only plans from its present place")
         try:
             with robot_errors():
                 found = await self._client.search_path(PathQuery(geometry.Point(goal.x, goal.y)))

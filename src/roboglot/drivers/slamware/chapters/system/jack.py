@@ -93,7 +93,7 @@ class SlamwareJack(Jack):
                 return
             moving = moving or self._stage is JackStage.MOVING
             if self._stage is not JackStage.MOVING and (moving or clock.time() - begun > BEGUN_WITHIN):
-                raise Blocked(f"the jack stays {self._stage}")
+                raise Blocked(f"the jack remains {self._stage}")
 
     async def _halt(self) -> None:
         try:

@@ -64,7 +64,7 @@ class SlamwarePower(Power):
     def shut_down(self, *, source: str = "", after: float = 0.0, restart_after: float | None = None) -> Action:
         minutes, restart = (round((seconds or 0.0) / 60 + 0.499) for seconds in (after, restart_after))
         if not (0 <= minutes <= MINUTES_MAX and 0 <= restart <= MINUTES_MAX):
-            raise InvalidGoal("that is too far away")
+            raise InvalidGoal("the time is too far ahead")
 
         async def command() -> None:
             await self._client.shutdown(Shutdown(minutes, restart))

@@ -120,7 +120,7 @@ async def set_labels(
                 context.map_gone()
         elif only_delete:
             if missing := set(names) - {label.name for label in stored.labels}:
-                raise NotFound(f"no label {missing}")
+                raise NotFound(f"there is no label {missing}")
             await library.put(replace(stored, labels=tuple(x for x in stored.labels if x.name not in names)))
         elif len(names) > LABELS_MAX or len(set(names)) < len(names) or not all(x.valid for x in labels):
             return call.refused({"success": 1}, f"at most {LABELS_MAX} labels, each with a name of its own and a place")
@@ -137,7 +137,7 @@ async def _numbered(library: MapLibrary, number: int) -> str:
     """Return the name of the map with that number. Raises NotFound."""
     names = await library.names(number=number) if number else ()
     if not names:
-        raise NotFound(f"no map of the number {number}")
+        raise NotFound(f"there is no map with the number {number}")
     return names[-1]
 
 
@@ -150,4 +150,4 @@ async def _take_number(library: MapLibrary, name: str, number: int) -> None:
 
 def _check_number(number: int) -> None:
     if not 0 <= number <= MAP_ID_MAX:
-        raise BadParameters("map_id has 64 bits and no sign")
+        raise BadParameters("map_id must be an unsigned 64-bit integer")

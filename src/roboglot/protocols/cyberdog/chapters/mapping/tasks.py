@@ -88,7 +88,7 @@ async def start_task(
     for component in NEEDS_FOR_THINGS if order.thing else NEEDS[kind]:
         context.robot[component]
     if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
-        raise InvalidGoal("a goal has goalX and goalY")
+        raise InvalidGoal("a goal needs goalX and goalY")
     manner = manner_of(relative_pos, keep_distance) if kind in FOLLOWS else manner_of(AUTOMATIC, 0.0)
     if why := _hindrance(context, order):
         return call.refused({"accepted": int(Accepted.NO)}, why)
@@ -144,7 +144,7 @@ async def stop_task(call: Call, *, type: Int32, map_name: object = "") -> dict[s
     A map under construction is saved as ``map_name``. Without a name, 5 discards it and 0 keeps it in memory.
     """
     if not isinstance(map_name, str):
-        raise BadParameters("map_name is a text")  # taken as absent, it would discard the map
+        raise BadParameters("map_name must be a text")  # taken as absent, it would discard the map
     try:
         result = await call.context.robot.clock.wait_for(_stop(call.context, type, map_name), STOP_MAX)
     except TimeoutError:

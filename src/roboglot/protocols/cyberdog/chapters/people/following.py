@@ -49,7 +49,7 @@ class Manner:
 def manner_of(relative_pos: int, keep_distance: float) -> Manner:
     """Return the manner for the wire's numbers; 0 m: default. Raises BadParameters for an unknown side."""
     if relative_pos not in SIDES:
-        raise BadParameters("relative_pos is 200 to 203")
+        raise BadParameters("relative_pos must be 200 to 203")
     distance = keep_distance if keep_distance > 0.0 else DISTANCE
     return Manner(SIDES[relative_pos], max(DISTANCE_MIN, min(DISTANCE_MAX, distance)))
 

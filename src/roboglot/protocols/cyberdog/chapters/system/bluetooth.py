@@ -136,7 +136,7 @@ async def update_device(call: Call) -> dict[str, object]:
 async def set_gear(call: Call, *, data: int) -> str:
     """Set the gear of the remote control's stick: 0 low, 1 middle, 2 high; anything else is refused."""
     if data not in list(Gear):
-        raise BadParameters("a gear is 0, 1 or 2")
+        raise BadParameters("a gear must be 0, 1 or 2")
     await call.context.robot[RemoteControl].set_gear(Gear(data))
     return ""
 

@@ -152,7 +152,7 @@ class UpdateJobs:
     async def remove(self, _: Goal) -> dict[str, object]:
         """Delete the download."""
         if self._robot[Firmware].progress.state is not FirmwareState.DOWNLOADED:
-            raise Unable(STATE, "nothing is downloaded")
+            raise Unable(STATE, "no update is downloaded")
         await self._robot[Firmware].discard()
         return {}
 
@@ -166,7 +166,7 @@ class UpdateJobs:
     async def reset(self, _: Goal) -> dict[str, object]:
         """Abort the update under way, and delete the download."""
         if self._robot[Firmware].progress.state in (FirmwareState.INSTALLED, FirmwareState.REBOOTING):
-            raise Unable(BUSY, "what is installed is there to stay")
+            raise Unable(BUSY, "an installed update cannot be removed")
         await self._robot.actions.cancel(resource=FIRMWARE, reason="reset by the app")
         await self._robot[Firmware].discard()
         return {}

@@ -143,7 +143,7 @@ class Updates:
         firmware = self._robot[Firmware]
         package = firmware.progress.package
         if package is None:
-            raise NotFound("nothing was downloaded")
+            raise NotFound("no update was downloaded")
         try:
             await firmware.install(package.digest, source=SOURCE).succeeded()
         except RobotError as error:
@@ -195,7 +195,7 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
         raise BadParameters(misfit(error, "the modules")) from None
     files = [file for module in wanted for file in module.latest.packages]
     if not files or len(wanted) > MODULES_MAX:
-        raise InvalidGoal(f"an update has files, and at most {MODULES_MAX} modules")
+        raise InvalidGoal(f"an update needs files and has at most {MODULES_MAX} modules")
     # The total size, and the first file's checksum for all: they are installed together.
     size, versions = sum(file.fileSize for file in files), {module.module: module.latest.version for module in wanted}
     package = FirmwarePackage(wanted[0].latest.version, size, files[0].md5.lower(), versions, url="app")

@@ -31,7 +31,7 @@ def carry(context: Context, options: JackTopMoveToOptions) -> Action:
     robot, wishes = context.robot, options.modify_params_move_options or JackTopWishes()
     targets = options.targets or ([options.target] if options.target else [])
     if not targets:
-        raise InvalidGoal("a target or targets are needed")
+        raise InvalidGoal("give a target or targets")
     goals = [pose_of_target(robot, target).point for target in targets]
     how = wishes.move_options or MoveOptions()
     if wishes.robot_line_speed:

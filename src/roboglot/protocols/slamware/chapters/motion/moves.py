@@ -56,7 +56,7 @@ def _directed(robot: Robot, goals: Sequence[Point], *, strictly: bool) -> list[P
     for goal in goals:
         way = way_along(tracks, here, goal, directed=True)
         if not way and strictly:
-            raise InvalidGoal("no tracks lead there in their direction")
+            raise InvalidGoal("no tracks lead there in the allowed direction")
         through += way[1:] or [goal]
         here = goal
     return through
@@ -124,7 +124,7 @@ def move_by(context: Context, options: MoveByOptions) -> Action:
     limit = context.robot[Base].limits.twist
     match options:
         case MoveByOptions(direction=None, theta=None):
-            raise InvalidGoal("either direction or theta is needed")
+            raise InvalidGoal("give either direction or theta")
         case MoveByOptions(direction=None, theta=float(theta)):
             twist = Twist(yaw=theta)
         case MoveByOptions(direction=Direction.FORWARD):

@@ -47,7 +47,7 @@ def recover_localization(context: Context, options: RecoverLocalizationOptions) 
                     await errand.do(robot[Driving].move_by(Pose(yaw=TURN), source=PART))
                 else:
                     await robot.clock.sleep(PAUSE_SECONDS)  # wait: several places fit
-        raise NotLocalized(f"no place that fits was found in {seconds:g} s")
+        raise NotLocalized(f"no matching place was found in {seconds:g} s")
 
     context.actions.abort()  # it searches at standstill
     return run_errand(context.robot, "recover localization", work, region)

@@ -49,7 +49,7 @@ def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action
     how, target = options.move_options or MoveOptions(), options.target
     navigation_options(context.robot, how, None)
     if not target.poi_name and target.pose is None:
-        raise InvalidGoal("a target has a poi_name, or a floor and a pose")
+        raise InvalidGoal("a target needs a poi_name, or a floor and a pose")
 
     async def work(errand: Errand) -> None:
         floor, pose = _place(context, target.poi_name) if target.poi_name else (None, None)

@@ -80,5 +80,5 @@ def back_off_from_tag(context: Context, options: BackOffFromTagOptions) -> Actio
 def _docking(context: Context, mark: Mark) -> TagDocking:
     docking = context.robot[TagDocking]
     if mark not in docking.marks:
-        raise InvalidGoal(f"nothing on this robot makes out such a mark: {mark}")
+        raise InvalidGoal(f"this robot cannot detect such a mark: {mark}")
     return docking

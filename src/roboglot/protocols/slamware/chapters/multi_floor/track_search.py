@@ -29,7 +29,7 @@ async def search_path_points_in_graph(context: Context, body: TrackQuery) -> Pat
         if wanted not in loaded:
             raise InvalidGoal("Invalid floor or building")
         if body.start_point is None:
-            raise InvalidGoal("the robot is on another floor: a start_point is needed")
+            raise InvalidGoal("the robot is on another floor: give a start_point")
         drawn = loaded[wanted]
     given = body.start_point
     start = Point(given.x, given.y) if given else context.robot[Localization].pose.point

@@ -217,7 +217,7 @@ def _mark(id: str, pose: Pose, metadata: dict[str, str]) -> PointOfInterest:
 def _texts(metadata: dict[str, str]) -> dict[str, str]:
     """Return a file's metadata. Raises BadMap beyond the API's limits."""
     if len(metadata) > artifact.METADATA_MAX or any(len(v) > artifact.METADATA_TEXT_MAX for v in metadata.values()):
-        raise BadMap("more metadata than an entry can have")
+        raise BadMap("an entry has too much metadata")
     return {clean(key): clean(value) for key, value in metadata.items()}
 
 

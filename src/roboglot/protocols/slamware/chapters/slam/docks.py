@@ -36,7 +36,7 @@ API = "/api/core/slam/v1"
 def _entered(robot: Robot, entry: PoseEntry) -> PointOfInterest:
     metadata = metadata_text(entry.metadata)
     if not metadata.get(NAME):
-        raise InvalidGoal(f"a dock's metadata have a {NAME}")
+        raise InvalidGoal(f"a dock's metadata need a {NAME}")
     return PointOfInterest(entry.id, pose_of(entry.pose) if entry.pose else robot[Localization].pose, metadata)
 
 
@@ -104,7 +104,7 @@ async def register_home_dock(context: Context, body: Registration) -> PoseEntry:
 def _one(docks: Docks, id: str) -> PointOfInterest:
     found = next((dock for dock in docks if dock.id == id), None)
     if found is None:
-        raise NotFound(f"no dock {id}")
+        raise NotFound(f"there is no dock {id}")
     return found
 
 

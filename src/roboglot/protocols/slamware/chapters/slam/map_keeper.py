@@ -122,7 +122,7 @@ class MapKeeper:
         """Memory to disk. Refused where the file has several floors: the others would be lost."""
         async with self._turn:
             if (floors := await self._count_saved_floors()) > 1:
-                raise Refused(f"the saved map has {floors} floors, of which one is in memory")
+                raise Refused(f"the saved map has {floors} floors, but only one is in memory")
             data = self.export()
             settings = {BASIS: {_digest(data): NOT_MOVED}, FLOOR: self.current.map_id}
 
@@ -300,7 +300,7 @@ def _parsed(data: bytes) -> list[FloorMap]:
     try:
         return floors_of(decode_stcm(data))
     except BadMap as error:
-        raise InvalidGoal(f"no composite map: {error}") from None
+        raise InvalidGoal(f"not a composite map: {error}") from None
 
 
 def _digest(data: bytes) -> str:

@@ -95,7 +95,7 @@ def _check_reach(points: Iterable[Point]) -> None:
     """Raise InvalidGoal for points so far from the origin that the map could not be saved and loaded again."""
     for point in points:
         if max(abs(point.x), abs(point.y)) > REACH_MAX:
-            raise InvalidGoal(f"something would be at ({point.x:g}, {point.y:g}), too far from the origin")
+            raise InvalidGoal(f"a drawing would be at ({point.x:g}, {point.y:g}), too far from the origin")
 
 
 def _drawn(robot: Robot) -> Iterator[Point]:

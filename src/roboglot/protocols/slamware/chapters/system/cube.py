@@ -45,7 +45,7 @@ async def set_cube_config(context: Context, body: bytes) -> None:
     try:
         config = msgspec.json.decode(body, type=CubeConfig)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InvalidGoal(f"no configuration that this robot understands: {misfit(error)}") from None
+        raise InvalidGoal(f"this robot cannot read the configuration: {misfit(error)}") from None
     robot = context.robot
     if config.disabled_sensors:
         known = {sensor.id for sensor in robot[SensorMasks].sensors}

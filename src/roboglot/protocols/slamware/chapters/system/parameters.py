@@ -31,7 +31,7 @@ async def get_system_parameter(context: Context, param: Annotated[str, msgspec.M
             _ = context.robot[Docking]
             return Text("when_not_exists")  # the actual behaviour: only a robot without a dock learns one by touch
         case _:
-            raise InvalidGoal(f"no parameter {param[:64]}")
+            raise InvalidGoal(f"there is no parameter {param[:64]}")
 
 
 @TABLE.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base, EmergencyStop))
@@ -49,7 +49,7 @@ async def set_system_parameter(context: Context, body: Parameter) -> bool:
         case "base.brake_release":
             context.robot[EmergencyStop].release_brake(_switch(body.value))
         case _:
-            raise InvalidGoal(f"no parameter {body.param}")
+            raise InvalidGoal(f"there is no parameter {body.param}")
     return True
 
 
@@ -57,10 +57,10 @@ def _number(value: str | float) -> float:
     try:
         return float(value)
     except ValueError:
-        raise InvalidGoal(f"'{value}' is no number") from None
+        raise InvalidGoal(f"'{value}' is not a number") from None
 
 
 def _switch(value: str | float) -> bool:
     if value not in SWITCH:
-        raise InvalidGoal("the value is on or off")
+        raise InvalidGoal("the value must be on or off")
     return SWITCH[str(value)]
