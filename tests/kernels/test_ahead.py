@@ -83,9 +83,9 @@ async def test_robots_share_one_compiler(cache: Path, monkeypatch: pytest.Monkey
 
 async def test_an_unwritable_cache_is_one_sentence(no_cache: None) -> None:
     with pytest.raises(KernelsUnavailable, match="cannot hold compiled kernels"):
-        compile_ahead(["smoothing"])
+        compile_ahead(["linear"])
     with pytest.raises(KernelsUnavailable, match="cannot hold compiled kernels"):
-        await compile_beside(["smoothing"])
+        await compile_beside(["linear"])
     command = [sys.executable, "-m", "roboglot.kernels"]
     ended = await asyncio.to_thread(subprocess.run, command, capture_output=True, text=True)
     assert ended.returncode == 1

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from roboglot.kernels.planes import COEFFICIENTS, FIRST
+from roboglot.kernels.layouts import COEFFICIENTS, FIRST
 from roboglot.kernels.raster import draw
 
 WIDTH, HEIGHT = 320, 200

@@ -10,8 +10,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboglot.kernels.search import shortest_path, ways_from
-from roboglot.kernels.smoothing import corners, line_cost
+from roboglot.kernels.search import corners, line_cost, shortest_path, ways_from
 
 costs = st.sampled_from([1.0, 1.0, 1.0, 2.0, 7.5, math.inf])
 

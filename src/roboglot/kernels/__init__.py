@@ -23,9 +23,8 @@ NAVIGATION = (
     "placing",
     "search",
     "relocation",
-    "smoothing",
 )
-MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "raster_rooms", "posing")
+MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "together", "raster_rooms", "posing")
 
 
 @contextmanager

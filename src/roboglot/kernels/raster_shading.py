@@ -11,7 +11,7 @@ import numpy as np
 
 from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, SingleArray, Uint16Array, Uint32Array
 from roboglot.kernels.compiled import kernel
-from roboglot.kernels.planes import FIRST
+from roboglot.kernels.layouts import FIRST
 
 STRIP = 64  # pixels
 BENT = 0.04  # relative change of distance within a textured strip

@@ -22,8 +22,7 @@ from roboglot.autonomy.traffic.doubtful import without_doubtful, without_gone
 from roboglot.autonomy.traffic.waiting_place import shun, waiting_place
 from roboglot.kernels.distance import distances
 from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, reopen
-from roboglot.kernels.search import shortest_path, ways_from
-from roboglot.kernels.smoothing import corners, line_cost
+from roboglot.kernels.search import corners, line_cost, shortest_path, ways_from
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.errors import Unreachable

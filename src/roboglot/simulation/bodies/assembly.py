@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from roboglot.model.client_context import context_of
 from roboglot.simulation.bodies.part import Fitting, Part, ordered, parts
+from roboglot.simulation.bodies.rows import Sense
 from roboglot.simulation.bodies.schedule import Job, Schedule
 
 P = TypeVar("P")
@@ -39,8 +40,15 @@ class SimulatedRobot:
         controlled = ordered((part for part, _ in fitted if part.control), lambda part: part.control_after)
         tick = fitting.tick
         self._controls = Schedule([_job(part, made[part.name], part.control) for part in controlled], tick)
-        sensed = [_periodic(part, component, turn) for part, component in fitted if part.sense]
+        sensed = [
+            _periodic(part, component, turn) for part, component in fitted if part.sense and part.together is None
+        ]
         self._senses = Schedule(sensed, tick)
+        self._together = {
+            part.name: (component, MethodType(part.sense, component))
+            for part, component in fitted
+            if part.together is not None and part.sense is not None
+        }
         self._displaced = [MethodType(part.displaced, component) for part, component in fitted if part.displaced]
         self._detach = [MethodType(part.detach, component) for part, component in fitted if part.detach]
 
@@ -50,11 +58,17 @@ class SimulatedRobot:
 
     def control(self) -> None:
         """Run the parts' control, before the physics of a tick."""
-        self._context.run(self._controls.run)
+        if not self._controls.skip():
+            self._context.run(self._controls.run)
 
     def sense(self, stamp: float) -> None:
-        """Run the parts' sensing, after the physics of a tick."""
-        self._context.run(self._senses.run_at, stamp)
+        """Run the sensing of the parts that are not sensed together, after the physics of a tick."""
+        if not self._senses.skip():
+            self._context.run(self._senses.run_at, stamp)
+
+    def together(self, name: str) -> tuple[object, Sense] | None:
+        """Return its part of this name with its sensing, for one function of all robots; None: it has none."""
+        return self._together.get(name)
 
     def displaced(self) -> None:
         """Notify the parts that the robot was lifted and put elsewhere."""

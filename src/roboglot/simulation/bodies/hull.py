@@ -11,10 +11,30 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.kernels.layouts import (
+    HULL_A,
+    HULL_BEFORE,
+    HULL_BELLY,
+    HULL_COUNTED,
+    HULL_DRIVE_X,
+    HULL_DRIVE_YAW,
+    HULL_FREE,
+    HULL_HELD,
+    HULL_LOOKED_X,
+    HULL_Q,
+    HULL_SINKING,
+    HULL_TORSO,
+    HULL_TURNED,
+    HULL_V,
+    HULL_VX,
+    HULL_X,
+)
 from roboglot.model.geometry import LEVEL as STRAIGHT
-from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
+from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull_legs import HullLegs
+from roboglot.simulation.bodies.hull_state import LEVEL, HullState
+from roboglot.simulation.bodies.rows import Seat
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.support import GRAVITY, SETTLED, Nearness, Support
 from roboglot.simulation.building.terrain import Ground
@@ -23,7 +43,7 @@ if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 DRIVE_GAIN = 150.0  # 1/s: gain from the wheels' velocity to the body's: done in one step of physics, or it swings
-LEVEL = (0.0, 0.0)
+STOREY = 0.05  # m up or down after which the floor is counted anew
 FALLING = 0.05  # m/s up or down at which wheel contact is checked
 TIPPED = 1.0  # rad
 SHELL = 0.4  # friction of the shell, relative to the wheels'
@@ -62,15 +82,23 @@ def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
     )
 
 
-class Hull:
+class Hull(HullState):
     """Handles into MuJoCo's arrays for one robot.
 
-    ``pulls``: the wheels are driven; ``rests``: it stood at the last check; ``disturbed``: moved by more than physics.
+    ``rests``: it stood at the last check; ``disturbed``: moved by more than physics.
     """
 
     def __init__(
-        self, model: MjModel, data: MjData, name: str, body: Body, elevations: list[float], ground: Ground
+        self,
+        model: MjModel,
+        data: MjData,
+        name: str,
+        body: Body,
+        elevations: list[float],
+        ground: Ground,
+        seat: Seat,
     ) -> None:
+        super().__init__(seat)
         self._model, self._data, self._elevations, self._ground = model, data, elevations, ground
         self.name, self.body = name, body
         self._q, self._v = int(model.joint(f"{name} x").qposadr[0]), int(model.joint(f"{name} x").dofadr[0])
@@ -81,43 +109,37 @@ class Hull:
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
         self._tilts = ground.uneven
         self.wheels = [model.geom(f"{name} wheel {index}").id for index in range(4 if ground.uneven else 1)]
-        self.support = Support(model, name, self.mass, self.wheels)
+        self.support = Support(model, name, self.mass, self.wheels, self._row)
         own = model.body_rootid[model.geom_bodyid] == model.body(name).id
         self.shape: list[int] = np.flatnonzero(own).tolist()  # all geoms, including those without collisions
         self._forces = model.actuator_forcerange[self._drive].copy()
-        self._share, self._free = 1.0, False
+        self._share = 1.0
         self.leash: tuple[float, float] | None = None  # N in the world: the pull of a leash
-        self.hand: float | None = None  # height in the world at which a hand holds base_link, m
         self.standing = 1.0  # share of the wheels in contact with the ground
-        self.overturned = self.pulls = self.rests = self.disturbed = False
-        self._belly: int | None = None
+        self.rests = self.disturbed = False
+        self._torso = -1  # its position in the physics, if it has legs
         self.legs: HullLegs | None = None
         if body.legs:
             self.legs = HullLegs(model, data, name, body)
-            self._belly, self._sinking = self.legs.torso, self.legs.sinking
+            self._torso, self._sinking = self.legs.torso, self.legs.sinking
+            self._row[HULL_SINKING] = self._sinking
         self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
         self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
         self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views of the current values
-        self.floor, self._counted = 0, 0.0  # and the elevation at which that was found, m
-        self.x = self.y = 0.0  # base_link in world, m
-        self.turned = 0.0  # yaw without wrapping, rad
-        self._pose: Pose | None = None  # x, y and yaw, once read
-        self.elevation = 0.0  # height of base_link in the world, m
-        self.tilt = LEVEL  # roll and pitch, rad, REP-103
+        self.floor = 0
         self.tilting = LEVEL  # their rates, rad/s
         self.loose = False  # whether the wheels may have left the ground
-        self.attitude = STRAIGHT  # the torso's attitude on its legs, relative to base_link, rad; truth, without physics
         self.shift = Point()  # the torso's centre relative to base_link, by the legs, m
         self.clearance = body.hull.clearance  # lower objects pass under the chassis, m
         self.effort = 0.0  # power of the legs besides traction, W
-        self.belly = body.hull.height - body.hull.torso_height  # height of the torso's underside above the floor, m
-        self.motion = (0.0, 0.0, 0.0, 0.0)  # along x, y and z (m/s, world; z of the torso), and the turn rate (rad/s)
-        self.before = self.motion  # the same one step earlier
         self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; zero without one
         self.touches: list[HullContact] = []  # current contacts of the hull, except docks
         self.when_touched: list[Duty] = []  # start when the hull is touched
         self.edges, self.walls = Nearness(body.hull.radius), Nearness(body.hull.radius)
-        self._looked = 0.0, 0.0, -1, 0.0  # where they were last looked up, on which floor; m for which it holds
+        self._looked = -1  # the floor on which they were last looked up; place and reach are in the row
+        row = self._row
+        row[HULL_Q], row[HULL_V], row[HULL_A], row[HULL_TORSO] = self._q, self._v, first, self._torso
+        row[HULL_BELLY] = body.hull.height - body.hull.torso_height
 
     @property
     def geoms(self) -> list[int]:
@@ -155,26 +177,26 @@ class Hull:
 
     def see(self, positions: list[float], velocities: list[float]) -> None:
         """Take pose and motion from all positions and velocities of the physics, once after every step."""
-        place, way = self._level
-        x, y, z, self.turned = positions[place]
+        (place, way), row = self._level, self._row
+        x, y, z, turned = positions[place]
         vx, vy, vz, turn = velocities[way]
         rising = vz
-        self.x, self.y, self.elevation = x, y, z
-        self._pose, self.before = None, self.motion
+        row[HULL_X], row[HULL_X + 1], row[HULL_X + 2], row[HULL_TURNED] = x, y, z, turned
+        row[HULL_BEFORE : HULL_BEFORE + 4] = row[HULL_VX : HULL_VX + 4]
         if self._tilts and not self.overturned:
             q, v = self._q, self._v
             self.tilt = positions[q + 5], positions[q + 4]
             self.tilting = velocities[v + 5], velocities[v + 4]
         self.loose = self._tilts or not -FALLING <= vz <= FALLING or self.standing < 1.0 or self.hand is not None
-        if self._belly is not None:
-            self.belly = positions[self._belly]
+        if self._torso >= 0:
+            row[HULL_BELLY] = positions[self._torso]
             vz += velocities[self._sinking]
-        self.motion = vx, vy, vz, turn
-        if not -0.05 <= z - self._counted <= 0.05:
-            self._counted = z
+        row[HULL_VX], row[HULL_VX + 1], row[HULL_VX + 2], row[HULL_VX + 3] = vx, vy, vz, turn
+        if not -STOREY <= z - row[HULL_COUNTED] <= STOREY:
+            row[HULL_COUNTED] = z
             self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
-        looked_x, looked_y, floor, free = self._looked
-        if floor != self.floor or abs(x - looked_x) + abs(y - looked_y) > free:
+        away = abs(x - row[HULL_LOOKED_X]) + abs(y - row[HULL_LOOKED_X + 1])
+        if self._looked != self.floor or away > row[HULL_FREE]:
             self._look_round(x, y)
         support, edge = self.support, self.edges.near
         if support.sprung:
@@ -184,20 +206,15 @@ class Hull:
         elif not (edge or self.loose or self.overturned) and -SETTLED <= rising <= SETTLED:
             support.rest(z)
 
-    @property
-    def pose(self) -> Pose:
-        """Pose of base_link in world (m, rad)."""
-        if self._pose is None:
-            self._pose = Pose(self.x, self.y, wrap_angle(self.turned))
-        return self._pose
-
     def _look_round(self, x: float, y: float) -> None:
         """Check for edges and walls nearby, and note the distance until the next check is due."""
         floor, edges, walls = self.floor, self.edges, self.walls
         edges.look(x, y, floor)
         if walls.look(x, y, floor):
             self.support.walls(walls.near)
-        self._looked = x, y, floor, min(edges.left(x, y, floor), walls.left(x, y, floor))
+        self._looked, row = floor, self._row
+        row[HULL_LOOKED_X], row[HULL_LOOKED_X + 1] = x, y
+        row[HULL_FREE] = min(edges.left(x, y, floor), walls.left(x, y, floor))
 
     @property
     def rise(self) -> float:
@@ -230,24 +247,22 @@ class Hull:
 
     # -- how it moves --------------------------------------------------------------------------------------------------
 
-    def drive(self, twist: Twist, seconds: float) -> None:
-        """Drive the wheels at ``twist`` (base_link) for the next ``seconds``, if they are on the ground."""
-        if self.hand is not None or self.overturned or self._free:
-            self._servos[1][:] = 0.0  # held by a hand, or lying
-            self.pulls = False
+    def turn_wheels(self, seconds: float) -> None:
+        """Turn the wheels as commanded for the next ``seconds``; a kernel does the same for all on level ground."""
+        speeds, row = self._servos[1], self._row
+        if row[HULL_HELD]:
+            speeds[:] = 0.0  # held by a hand, or lying
             return
-        vx, vy = twist.x, twist.y
+        vx, vy, turn = row[HULL_DRIVE_X], row[HULL_DRIVE_X + 1], row[HULL_DRIVE_YAW]
         if self._tilts:  # the wheels measure along the slope and hold against it
             roll, pitch = self.tilt
             vx = vx * math.cos(pitch) - GRAVITY * math.tan(pitch) / DRIVE_GAIN
             vy = vy * math.cos(roll) + GRAVITY * math.tan(roll) / DRIVE_GAIN
-        speeds = self._servos[1]
         if vx or vy:
-            yaw = self.turned + twist.yaw * seconds / 2
+            yaw = self.turned + turn * seconds / 2
             c, s = math.cos(yaw), math.sin(yaw)
             vx, vy = c * vx - s * vy, s * vx + c * vy
-        speeds[0], speeds[1], speeds[2] = vx, vy, twist.yaw
-        self.pulls = bool(vx or vy)
+        speeds[0], speeds[1], speeds[2] = vx, vy, turn
 
     def stand(self, wheels: float) -> None:
         """Set the share of wheels on the ground, which limits the drive's force."""
@@ -266,6 +281,7 @@ class Hull:
     def roll_freely(self, free: bool) -> None:
         """Release the wheels, leaving rolling resistance only; or brake with them again."""
         self._free = free
+        self._note_held()
         self._share = ROLLING if free else 1.0
         self._model.actuator_forcerange[self._drive] = self._forces * self._share
 

@@ -6,7 +6,7 @@ file needs a change (docs/components.md).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import field
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -21,6 +21,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.rows import Rows, Sense
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.values import dataclass
 
@@ -70,6 +71,9 @@ class Part(Generic[P]):
     control: called before the physics of every tick with its length (s), after the control of ``control_after``.
     sense: called after the physics with the stamp and the time since the last call (s), every ``every`` ticks (or
         as many as this answers for the part), the first time in tick ``first`` (0: when ``every`` have passed).
+    together: makes of all robots' parts of this kind one function that does for all what ``sense`` does for one, in
+        every tick, before all other parts sense; it gets all rows, and the parts with their own ``sense``. It changes
+        nothing but these parts.
     duty: answers whether the part has something to do; without one ``control`` and ``sense`` are always called.
     displaced: called when the robot was lifted and put elsewhere. ``detach``: called when the world ends.
     """
@@ -83,6 +87,7 @@ class Part(Generic[P]):
     control: Callable[[P, float], None] | None = None
     control_after: tuple[str, ...] = ()
     sense: Callable[[P, float, float], None] | None = None
+    together: Callable[[Rows, Sequence[tuple[P, Sense]]], Sense] | None = None
     every: int | Callable[[P], int] = 1
     first: int = 1
     duty: Callable[[P], Duty] | None = None

@@ -82,6 +82,13 @@ class Schedule:
         self._pass = iter(self._running)
         return self._pass
 
+    def skip(self) -> bool:
+        """Pass the next tick if nothing is due in it, and return whether so."""
+        if self._rounds[self._next]:
+            return False
+        self.due()
+        return True
+
     def run(self) -> None:
         """Run the next tick: call each due function with the s since its last call."""
         for _, call, seconds in self.due():

@@ -33,10 +33,13 @@ class Sleep:
         (qpos, qvel), (places, rates) = self._state, self._there
         return qpos.tobytes() == places and qvel.tobytes() == rates and self._same
 
-    def settle(self, velocities: list[float]) -> bool:
-        """Check a step; return whether everything rested before and after it, and its rounding was undone."""
+    def settle(self, *, rests: bool) -> bool:
+        """Check a step, after which no velocity is above RESTS (``rests``) or some are.
+
+        Return whether everything rested before and after it, and its rounding was undone.
+        """
         data = self._data
-        if data.nefc or not (_tiny(velocities) and _tiny(data.qacc.tolist())):
+        if not rests or data.nefc or not tiny(data.qacc.tolist()):
             self._kept = None
             return False
         if self._kept and self._same and abs(data.qpos - self._places).max() <= RESTS:
@@ -61,5 +64,6 @@ class Sleep:
         )
 
 
-def _tiny(numbers: list[float]) -> bool:
+def tiny(numbers: list[float]) -> bool:
+    """Return whether all are within RESTS of 0; False if there are none."""
     return bool(numbers) and max(numbers) <= RESTS and min(numbers) >= -RESTS

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from roboglot.kernels.layouts import HULL_REST, HULL_SPRUNG
 from roboglot.simulation.bodies.schedule import Duty
 
 if TYPE_CHECKING:
@@ -81,19 +82,23 @@ class Nearness:
 class Support:
     """Switches one robot between floor contacts and a spring, without moving it, and wall contacts on and off."""
 
-    def __init__(self, model: MjModel, name: str, mass: float, wheels: list[int]) -> None:
+    def __init__(self, model: MjModel, name: str, mass: float, wheels: list[int], row: memoryview[float]) -> None:
         joint = model.joint(f"{name} z")
         self._model, self._mass, self._wheels = model, mass, wheels
         self._body, self._chassis = model.body(name).id, model.geom(f"{name} chassis").id
         self._joint, self._q, self._v = joint.id, int(joint.qposadr[0]), int(joint.dofadr[0])
-        self._rest = 0.0  # m: compression of the spring at rest
+        self._row = row  # of the hull
         self._bits = STANDS | MOVES
-        self.sprung = False
+
+    @property
+    def sprung(self) -> bool:
+        """True while the spring supports it."""
+        return self._row[HULL_SPRUNG] != 0.0
 
     def rest(self, z: float) -> None:
         """Support the robot by a spring, at its present height ``z`` (m)."""
         model = self._model
-        self.sprung, self._rest = True, z
+        self._row[HULL_SPRUNG], self._row[HULL_REST] = 1.0, z
         model.jnt_stiffness[self._joint] = self._mass * SPRING
         model.dof_damping[self._v] = self._mass * DAMPER
         model.qpos_spring[self._q] = z + GRAVITY / SPRING
@@ -101,12 +106,12 @@ class Support:
 
     def lifted(self, z: float) -> bool:
         """True if the robot was moved off the floor or into it."""
-        return not -LIFTED <= z - self._rest <= LIFTED
+        return not -LIFTED <= z - self._row[HULL_REST] <= LIFTED
 
     def release(self) -> None:
         """Support the robot by contacts again: the floor may end, or a hand lifts it."""
         if self.sprung:
-            self.sprung = False
+            self._row[HULL_SPRUNG] = 0.0
             self._model.jnt_stiffness[self._joint] = self._model.dof_damping[self._v] = 0.0
             self._meet()
 

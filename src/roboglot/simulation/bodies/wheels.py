@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from msgspec.structs import replace
 
 from roboglot.model.components.motion.base import WheelSpeeds
@@ -20,7 +22,9 @@ class Wheels:
     ``dead``: wheels (field names of WheelSpeeds) without motor power.
     """
 
-    def __init__(self, section: BaseSection) -> None:
+    def __init__(self, section: BaseSection, changed: Callable[[], None] = lambda: None) -> None:
+        """``changed`` is called after ``dead`` has changed."""
+        self._changed = changed
         self.mecanum = section.drive == "mecanum"
         self.radius = section.wheel_radius
         self.lever = (section.wheel_base + section.track) / 2 if self.mecanum else section.track / 2
@@ -34,6 +38,7 @@ class Wheels:
             sides = {wheel.split("_")[1] for wheel in wheels}
             wheels = frozenset(wheel for wheel in WheelSpeeds.__struct_fields__ if wheel.split("_")[1] in sides)
         self.dead = wheels
+        self._changed()
 
     def driven(self, wheels: WheelSpeeds) -> WheelSpeeds:
         """Return the wheel speeds with 0 for dead wheels."""

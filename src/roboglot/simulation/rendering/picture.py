@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.kernels.planes import COEFFICIENTS, FIRST
+from roboglot.kernels.layouts import COEFFICIENTS, FIRST
 from roboglot.kernels.raster import draw
 from roboglot.kernels.raster_shading import shade
 from roboglot.simulation.rendering.interior import GROUND_TILE

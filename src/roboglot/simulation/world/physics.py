@@ -11,11 +11,15 @@ import mujoco
 import numpy as np
 from msgspec.structs import replace
 
+from roboglot.kernels.layouts import HULL_WIDTH
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.body import Body
-from roboglot.simulation.bodies.hull import Hull, HullContact
-from roboglot.simulation.bodies.sleep import Sleep
+from roboglot.simulation.bodies.hull import STOREY, Hull, HullContact
+from roboglot.simulation.bodies.hull_state import TABLE
+from roboglot.simulation.bodies.rows import Rows, Seat
+from roboglot.simulation.bodies.sleep import RESTS, Sleep, tiny
+from roboglot.simulation.bodies.support import LIFTED
 from roboglot.simulation.building.blueprint import Solid, SolidKind
 from roboglot.simulation.building.props import AWAY, OBSTACLES_MAX, Props
 from roboglot.simulation.building.terrain import Ground
@@ -50,9 +54,15 @@ class Physics:
         model = self._model
         self._elevations = [world.elevation(number) for number in range(len(world.floors))]
         self.ground = Ground(world)
+        self.rows = Rows(len(bodies))
+        seats = (Seat(self.rows, index) for index in range(len(bodies)))
         self.hulls = {
-            name: Hull(model, self._data, name, body, self._elevations, self.ground) for name, body in bodies.items()
+            name: Hull(model, self._data, name, body, self._elevations, self.ground, next(seats))
+            for name, body in bodies.items()
         }
+        self._all_hulls = list(self.hulls.values())
+        self._hull_rows = self.rows.table(TABLE, HULL_WIDTH)
+        self._state = self._data.qpos, self._data.qvel, self._data.ctrl  # views of the current values
         self._hull_of = {geom: hull for hull in self.hulls.values() for geom in hull.geoms}
         self._hulls_of = np.isin(np.arange(model.ngeom), list(self._hull_of))  # whether a geom belongs to a hull
         self._shape_of = np.full(model.ngeom, -1)  # by geom: the first geom of its robot
@@ -104,22 +114,32 @@ class Physics:
                 meanwhile(TIMESTEP)
         self._see()
 
+    def drive(self, seconds: float) -> None:
+        """Turn the wheels of all robots as commanded, for the next ``seconds``."""
+        if (kernels := self.rows.kernels) is not None and not self.ground.uneven:
+            kernels.drive(self._hull_rows, self._state[2], seconds)
+            return
+        for hull in self._all_hulls:
+            hull.turn_wheels(seconds)
+
     def _see(self) -> None:
         """Read positions, velocities and touches after a step."""
-        velocities = self._data.qvel.tolist()
-        if self._sleep.settle(velocities):
-            velocities = self._data.qvel.tolist()
-        positions = self._data.qpos.tolist()
-        loose = []
+        positions, velocities, _ = self._state
+        kernels, hulls = self.rows.kernels, self._all_hulls
+        rests = kernels.still(velocities, RESTS) if kernels is not None else tiny(velocities.tolist())
+        self._sleep.settle(rests=rests)
         standing = self._feet
-        for hull in self.hulls.values():
-            if hull.support.sprung:
-                standing -= len(hull.wheels)
-            hull.see(positions, velocities)
-            if hull.loose:
-                loose.append(hull)
-        if loose:
-            self._note_wheels(loose)
+        if self._touched or self._data.nefc:  # others cannot touch anything
+            standing -= sum(len(hull.wheels) for hull in hulls if hull.support.sprung)
+        if kernels is not None:
+            count = kernels.see(self._hull_rows, positions, velocities, STOREY, LIFTED, self.rows.others)
+            hulls = [hulls[index] for index in self.rows.others[:count].tolist()] if count else []
+        if hulls:
+            places, rates = positions.tolist(), velocities.tolist()
+            for hull in hulls:
+                hull.see(places, rates)
+            if loose := [hull for hull in hulls if hull.loose]:
+                self._note_wheels(loose)
         self._note_touches(standing)
 
     def _note_wheels(self, loose: list[Hull]) -> None:

@@ -27,6 +27,7 @@ from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.files import load_body
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting
+from roboglot.simulation.bodies.rounds import Rounds
 from roboglot.simulation.building.building import Building
 from roboglot.simulation.detectors.glance import Surroundings
 from roboglot.simulation.faults.faults import Faults
@@ -114,6 +115,7 @@ class World:
         self.outside = Outside("", clock)
         self.hands = noted(self.own_hands, self.outside)
         self.faults = Faults(self, description.faults)
+        self._rounds = Rounds(self._physics.rows, TICK)
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
@@ -191,9 +193,10 @@ class World:
     async def _load_kernels(self) -> None:
         """Switch the sensors to the compiled kernels; missing ones are compiled first, in a process of their own."""
         with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors continue without it
-            await compile_beside(("sweep", "rays"))
+            await compile_beside(("sweep", "rays", "together"))
             await load(self._environment.sight.load_kernel)
             await load(self._environment.rays.load_kernel)
+            await load(self._physics.rows.load_kernels)
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""
@@ -253,6 +256,7 @@ class World:
         robots = tuple(self._population.simulated.values())  # steps lie apart: one may join meanwhile
         for robot in robots:
             robot.control()
+        self._physics.drive(TICK)
         yield
         self.faults.step(stamp)
         self.building.step(stamp, TICK)
@@ -261,9 +265,7 @@ class World:
         beads = self._environment.beads
         self._physics.step(TICK, beads.fly if beads.flying else None)
         yield
-        for robot in robots:  # one robot at a time: its data stay in the cache
-            robot.sense(stamp)
-            yield
+        yield from self._rounds.sense(robots, stamp)
 
     def _walk(self) -> None:
         if not self._walkers:

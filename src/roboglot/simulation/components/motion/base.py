@@ -14,6 +14,7 @@ from roboglot.model.geometry import STILL, Twist
 from roboglot.simulation.bodies.body import BaseSection
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
+from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.wheels import Wheels, four
 from roboglot.simulation.components.motion.drive_locks import DriveLocks
 from roboglot.simulation.components.motion.hindrances import STANDS, Hindrances
@@ -28,7 +29,8 @@ class SimulatedBase(Base):
     """
 
     def __init__(self, section: BaseSection, hull: Hull) -> None:
-        self.wheels = wheels = Wheels(section)
+        self.duty = Duty()  # while speeds change or something limits them
+        self.wheels = wheels = Wheels(section, self._rewired)
         self.limits = BaseLimits(
             twist=Twist(section.speed, section.speed if wheels.mecanum else 0.0, section.yaw_speed),
             holonomic=wheels.mecanum,
@@ -39,14 +41,13 @@ class SimulatedBase(Base):
         self._target: Twist | WheelSpeeds = STILL
         self._twist = STILL
         self._speeds = NO_WHEELS
-        self.locks, self.hindrances = DriveLocks(self._stop), Hindrances()
-        self.pace = math.inf  # m/s permitted by obstacles ahead
+        self.locks, self.hindrances = DriveLocks(self._stop), Hindrances(self.duty)
         self._carried = False
         self._free = False
         self._hardest = max(1.0, (section.braking or 0.0) / section.acceleration)  # factor in an emergency
         self._haste = 1.0  # the factor in use
         self._walkable: Callable[[Twist], Twist] = _any
-        self.steer: float | None = None  # rad/s; a turn rate that replaces the commanded one
+        self._steered: float | None = None  # rad/s
 
     def set_velocity(self, twist: Twist) -> None:
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
@@ -115,6 +116,11 @@ class SimulatedBase(Base):
     def hindrance(self, command: Twist | WheelSpeeds) -> Blocked | None:
         return self.hindrances.blocks(self._twist_of(command).x)
 
+    def steer(self, rate: float | None) -> None:
+        """Turn at ``rate`` (rad/s) instead of the commanded rate from now on; None: as commanded."""
+        self._steered = rate
+        self.duty.begin()
+
     def roll_freely(self, free: bool) -> None:
         """Let the wheels roll without brake and motor, or hold them again."""
         self._free = free
@@ -123,21 +129,22 @@ class SimulatedBase(Base):
 
     def cut(self) -> None:
         """Block the wheels at once, without a ramp."""
-        self._target = self._twist = STILL
-        self._speeds = NO_WHEELS
+        self._target, self._speeds = STILL, NO_WHEELS
+        self._turn_wheels(STILL)
 
     def carry(self, twist: Twist) -> None:
         """Move base_link at ``twist`` by the legs, at once and in spite of locks."""
-        self._target = self._twist = twist
+        self._target = twist
         self._speeds, self._carried = self.wheels.speeds_of(twist), twist != STILL
+        self._turn_wheels(twist)
 
     def control(self, seconds: float) -> None:
         """Approach the target velocity within the acceleration limits."""
         if self.hindrances.bars:
             self._respect_bars()
         wanted = self._target
-        if self.steer is not None and isinstance(wanted, Twist):
-            wanted = Twist(wanted.x, wanted.y, self.steer)
+        if self._steered is not None and isinstance(wanted, Twist):
+            wanted = Twist(wanted.x, wanted.y, self._steered)
         if wanted is not self._twist:
             match wanted:
                 case Twist() as target:
@@ -146,14 +153,30 @@ class SimulatedBase(Base):
                 case WheelSpeeds() as target:
                     self._speeds = self._nearer_wheels(target, seconds)
                     self._twist = self.wheels.twist_of(self._speeds)
-        if self.pace < math.inf and self._twist.speed > self.pace and not self._carried:
-            share = self.pace / self._twist.speed
+        pace = self.hindrances.pace
+        if pace < math.inf and self._twist.speed > pace and not self._carried:
+            share = pace / self._twist.speed
             self._twist = Twist(self._twist.x * share, self._twist.y * share, self._twist.yaw)
             self._speeds = self.wheels.speeds_of(self._twist)
-        self._hull.drive(self.velocity if self.wheels.dead else self._twist, seconds)
+        self._turn_wheels(self._twist)
+        limited = self.hindrances.bars or pace < math.inf or self.wheels.dead or self._steered is not None
+        if self._twist is self._target and not limited:
+            self.duty.end()
+
+    def _turn_wheels(self, twist: Twist) -> None:
+        """Command the hull's wheels, of which some may be dead."""
+        self._twist = twist
+        self._hull.drive(self.velocity if self.wheels.dead else twist)
+        self._hull.note_wheels(twist, slack=self._free or bool(self.wheels.dead))
+
+    def _rewired(self) -> None:
+        """Note that wheels died or live again."""
+        self._hull.note_wheels(self._twist, slack=self._free or bool(self.wheels.dead))
+        self.duty.begin()
 
     def _take_time(self) -> None:
-        """End hard braking, unless the command is to stand."""
+        """Begin to follow a command; end hard braking, unless it is to stand."""
+        self.duty.begin()
         if self._target not in (STILL, NO_WHEELS):
             self._haste = 1.0
 
@@ -169,6 +192,7 @@ class SimulatedBase(Base):
     def _stop(self) -> None:
         """Brake at the next opportunity."""
         self._target = STILL
+        self.duty.begin()
 
     def _twist_of(self, command: Twist | WheelSpeeds) -> Twist:
         return command if isinstance(command, Twist) else self.wheels.twist_of(command)
@@ -209,5 +233,6 @@ PART = Part(
     section=BaseSection,
     fit=_fit,
     control=SimulatedBase.control,
+    duty=lambda base: base.duty,
     control_after=("legs", "gimbal"),  # their commands go through the base
 )

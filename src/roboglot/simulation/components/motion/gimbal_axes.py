@@ -15,7 +15,8 @@ from roboglot.model.errors import Unreachable
 from roboglot.model.geometry import Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import SETTLED, Axis
-from roboglot.simulation.bodies.hull import LEVEL, Hull
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.hull_state import LEVEL
 from roboglot.simulation.bodies.quantities import Offset, Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.values import dataclass
@@ -71,14 +72,14 @@ class GimbalAxes:
     def set_mode(self, mode: FollowMode) -> None:
         """Set which of gimbal and chassis follows the other."""
         self.mode, self._resting = mode, False
-        self._base.steer = None
+        self._base.steer(None)
 
     def suspend(self) -> None:
         """Cut the motors: the axes keep their angles to the body."""
         self.suspended = True
         self.halt()
         self.pitch.rate = self.yaw.rate = 0.0
-        self._base.steer = None
+        self._base.steer(None)
 
     def resume(self) -> None:
         """Switch the motors on again."""
@@ -184,10 +185,10 @@ class GimbalAxes:
         """Turn the base after the gimbal, unless an action other than manual driving uses the base."""
         drivers = self._robot.actions.running(BASE)
         if self._base.locks.held or not all(isinstance(driver.goal, Twist | WheelSpeeds) for driver in drivers):
-            self._base.steer = None
+            self._base.steer(None)
             return
         off, top = self.yaw.position, self._base.limits.twist.yaw
-        self._base.steer = 0.0 if abs(off) < SETTLED else max(-top, min(top, STEERING * off))
+        self._base.steer(0.0 if abs(off) < SETTLED else max(-top, min(top, STEERING * off)))
 
 
 def reaches(axis: Axis, goal: float) -> bool:

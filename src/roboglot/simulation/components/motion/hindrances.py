@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from roboglot.model.errors import Blocked
 from roboglot.model.geometry import Twist
+from roboglot.simulation.bodies.schedule import Duty
 
 STANDS = 0.01  # m/s; anything slower is standing
 GLANCING = 0.1  # cosine between the hull's motion and a contact up to which the hull slides past
@@ -12,10 +15,12 @@ GLANCING = 0.1  # cosine between the hull's motion and a contact up to which the
 class Hindrances:
     """``bars``: by holder, whether driving ahead and behind is barred, and the reason.
 
-    ``touching``: directions (unit vectors, base_link) in which the hull touches something.
+    ``touching``: directions (unit vectors, base_link) in which the hull touches something. ``duty``: the base's.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, duty: Duty) -> None:
+        self._duty = duty
+        self._pace = math.inf
         self.bars: dict[str, tuple[bool, bool, str]] = {}
         self.touching: tuple[tuple[float, float], ...] = ()
 
@@ -23,8 +28,20 @@ class Hindrances:
         """Bar driving forwards or backwards until ``who`` calls this with neither."""
         if ahead or behind:
             self.bars[who] = ahead, behind, reason
+            self._duty.begin()
         else:
             self.bars.pop(who, None)
+
+    @property
+    def pace(self) -> float:
+        """Speed that obstacles ahead permit, m/s; inf: any."""
+        return self._pace
+
+    @pace.setter
+    def pace(self, speed: float) -> None:
+        self._pace = speed
+        if speed < math.inf:
+            self._duty.begin()
 
     def blocks(self, way: float) -> Blocked | None:
         """Return the error for driving ``way`` m/s forwards; None: it is not barred."""

@@ -3,16 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from msgspec import Struct
 
+from roboglot.kernels.layouts import (
+    HULL_WIDTH,
+    IMU_WIDTH,
+    STATUS_BLOW,
+    STATUS_BLOWS,
+    STATUS_SLIPPING,
+    STATUS_STAMP,
+    STATUS_WIDTH,
+    TOGETHER,
+    USE,
+)
 from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
 from roboglot.model.geometry import Twist
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.simulation.bodies.rows import Rows, Sense
 from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.sensing.imu import TABLE as IMUS
 from roboglot.simulation.components.sensing.imu import SimulatedImu
 
 STILL_SPEED, STILL_RATE = 0.01, 0.03  # m/s and rad/s
@@ -20,6 +35,7 @@ CLIMBING = 0.01  # m/s up or down
 SLOPE, ROLLED = math.radians(5), math.radians(60)
 SLIP_SPEED, SLIP_RATE = 0.15, 0.4  # m/s and rad/s between wheels and body
 SLIP_SQUARE = SLIP_SPEED**2
+TABLE = "motion status"
 SLIP_TICKS = 5  # in a row before it counts: contacts jitter
 
 
@@ -35,9 +51,14 @@ class SimulatedMotionStatus(MotionStatus):
 
     def __init__(self, section: MotionStatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
         self._section, self._hull, self._base, self._imu = section, hull, base, imu
-        self._stamp = 0.0
-        self._blows = [-math.inf] * 3  # time of the last blow along x, y, z
-        self._slipping = 0
+        self._row = row = hull.seat.row(TABLE, STATUS_WIDTH)
+        row[USE], row[STATUS_BLOW] = TOGETHER, section.blow
+        row[STATUS_BLOWS] = row[STATUS_BLOWS + 1] = row[STATUS_BLOWS + 2] = -math.inf  # of the last along x, y, z
+
+    @property
+    def index(self) -> int:
+        """Its row."""
+        return self._hull.seat.index
 
     @property
     def flags(self) -> MotionFlags:
@@ -49,14 +70,15 @@ class SimulatedMotionStatus(MotionStatus):
         sloping = SLOPE < tilt < ROLLED and not picked_up
         wheels, (c, s) = self._base.velocity, (math.cos(hull.turned), math.sin(hull.turned))
         driven = wheels.x * (c * vx + s * vy) + wheels.y * (c * vy - s * vx) > 0.0  # the motion of the wheels
-        impacts = [self._stamp - blow <= self._section.hold for blow in self._blows]
+        row = self._row
+        impacts = [row[STATUS_STAMP] - row[STATUS_BLOWS + axis] <= self._section.hold for axis in range(3)]
         return MotionFlags(
             static=static,
             uphill=sloping and not static and vz > CLIMBING,
             downhill=sloping and vz < -CLIMBING and driven,
             sliding=sloping and vz < -CLIMBING and not driven,
             picked_up=picked_up,
-            slipping=self._slipping >= SLIP_TICKS and not picked_up and not hull.overturned,
+            slipping=row[STATUS_SLIPPING] >= SLIP_TICKS and not picked_up and not hull.overturned,
             impact_x=impacts[0],
             impact_y=impacts[1],
             impact_z=impacts[2],
@@ -66,20 +88,21 @@ class SimulatedMotionStatus(MotionStatus):
 
     def sense(self, stamp: float, _seconds: float) -> None:
         """Watch for blows and slip; after the IMU."""
-        self._stamp = stamp
+        row = self._row
+        row[STATUS_STAMP] = stamp
         (x, y, z), blow = self._imu.felt, self._section.blow
         if not -blow <= x <= blow:
-            self._blows[0] = stamp
+            row[STATUS_BLOWS] = stamp
         if not -blow <= y <= blow:
-            self._blows[1] = stamp
+            row[STATUS_BLOWS + 1] = stamp
         if abs(abs(z) - GRAVITY) > blow:
-            self._blows[2] = stamp
+            row[STATUS_BLOWS + 2] = stamp
         wheels, hull = self._base.velocity, self._hull
         vx, vy, _, turn = hull.motion
         if wheels.x or wheels.y or wheels.yaw or vx * vx + vy * vy > SLIP_SQUARE:
-            self._slipping = self._slipping + 1 if self._slips(wheels, vx, vy, turn) else 0
-        elif self._slipping:
-            self._slipping = 0
+            row[STATUS_SLIPPING] = row[STATUS_SLIPPING] + 1 if self._slips(wheels, vx, vy, turn) else 0.0
+        else:
+            row[STATUS_SLIPPING] = 0.0
 
     def _slips(self, wheels: Twist, vx: float, vy: float, turn: float) -> bool:
         """True if the body's motion (m/s, rad/s, world) differs from that of the wheels."""
@@ -89,6 +112,15 @@ class SimulatedMotionStatus(MotionStatus):
         c, s = math.cos(hull.turned), math.sin(hull.turned)
         off_x, off_y = c * vx + s * vy - wheels.x, c * vy - s * vx - wheels.y
         return off_x * off_x + off_y * off_y > SLIP_SQUARE
+
+
+def _together(rows: Rows, parts: Sequence[tuple[SimulatedMotionStatus, Sense]]) -> Sense:
+    """Return a function that watches for all robots, in one call of the kernel as far as their wheels are whole."""
+    tables = rows.table(HULLS, HULL_WIDTH), rows.table(IMUS, IMU_WIDTH), rows.table(TABLE, STATUS_WIDTH)
+    return rows.sense(
+        {status.index: sense for status, sense in parts},
+        lambda kernels, stamp, _: kernels.watch(*tables, stamp, GRAVITY, SLIP_SQUARE, SLIP_RATE, rows.others),
+    )
 
 
 def _fit(fit: Fitting) -> SimulatedMotionStatus:
@@ -103,4 +135,5 @@ PART = Part(
     fit=_fit,
     after=("base", "imu"),
     sense=SimulatedMotionStatus.sense,
+    together=_together,
 )

@@ -7,19 +7,42 @@ Roll and pitch are exact: a real filter's error in them would be negligible.
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Sequence
 
 import numpy as np
 from msgspec import Struct
 
+from roboglot.kernels.layouts import (
+    HULL_WIDTH,
+    IMU_AT,
+    IMU_FELT_X,
+    IMU_FELT_Y,
+    IMU_FELT_Z,
+    IMU_LEANT,
+    IMU_MX,
+    IMU_MY,
+    IMU_MZ,
+    IMU_NOISES,
+    IMU_RATE,
+    IMU_RATES,
+    IMU_SCALE,
+    IMU_STAMP,
+    IMU_TURNED,
+    IMU_WIDTH,
+    IMU_YAW,
+    TOGETHER,
+    USE,
+)
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Orientation, Vector3, wrap_angle
 from roboglot.model.sensing import ImuReading, RawImu
-from roboglot.simulation.bodies.hull import LEVEL, Hull, rotation
+from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.bodies.hull_state import LEVEL
+from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
+from roboglot.simulation.bodies.rows import Rows, Sense
 from roboglot.simulation.bodies.support import GRAVITY
 
 ACCELERATION_UNIT = GRAVITY / 8192  # per unit of a 16-bit converter for 4 g
@@ -28,8 +51,9 @@ FIELD_UNIT = 0.15e-6  # T
 FIELD_NOISE = 0.4e-6  # T, one standard deviation
 COUNTS_MAX = 32767
 HORIZONTAL, DOWN = 22e-6, 43e-6  # T: the earth's field at middle latitudes
-SIX = struct.Struct("6d")
+TABLE, NOISES = "imu", "imu noises"
 DRAWN = 64  # ticks for which noise is drawn at once
+NOISE_WIDTH = DRAWN * IMU_NOISES
 
 
 class ImuSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -62,22 +86,37 @@ class SimulatedImu(Imu):
         )
         self._sigma = np.array([section.gyro_noise] * 3 + [section.acceleration_noise] * 3)
         self._held = STRAIGHT  # the legs' last share of the attitude
+        self._row = row = hull.seat.row(TABLE, IMU_WIDTH)
+        row[USE], row[IMU_SCALE], row[IMU_FELT_Z] = TOGETHER, self._scale, GRAVITY
         self.forget()
-        self._yaw = 0.0
-        self.rate = 0.0  # rad/s: the gyro's mean turn rate over the last tick
-        self.felt = (0.0, 0.0, GRAVITY)  # the accelerometer's x, y, z, m/s2
-        self._level = (0.0, 0.0, 0.0, 0.0)  # stamp and rates (rad/s) of a reading that has not been read yet
-        self._reading: ImuReading | None = None
+        self._reading: ImuReading | None = None  # of the stamp in the row, once read
         self._raw: RawImu | None = None
         self._compass, self._field = compass, field  # random numbers, and the earth's field in the world's frame, T
-        self._noises, self._at = b"", 0  # six numbers per tick, and where the next ones begin
+        self._noises = hull.seat.row(NOISES, NOISE_WIDTH)
+        self.forget_noise()
 
     @property
     def reading(self) -> ImuReading:
-        if self._reading is None:
-            stamp, *rates = self._level
-            self._reading = ImuReading(stamp, Orientation(yaw=self._yaw), Vector3(*rates), Vector3(*self.felt))
+        stamp, *rates = self._row[IMU_STAMP : IMU_RATES + 3]
+        if self._reading is None or self._reading.stamp != stamp:
+            self._reading = ImuReading(stamp, Orientation(yaw=self._row[IMU_YAW]), Vector3(*rates), Vector3(*self.felt))
         return self._reading
+
+    @property
+    def rate(self) -> float:
+        """The gyro's mean turn rate over the last tick, rad/s."""
+        return self._row[IMU_RATE]
+
+    @property
+    def felt(self) -> tuple[float, float, float]:
+        """The accelerometer's x, y, z, m/s2."""
+        x, y, z = self._row[IMU_FELT_X : IMU_FELT_Z + 1]
+        return x, y, z
+
+    @property
+    def index(self) -> int:
+        """Its row."""
+        return self._hull.seat.index
 
     @property
     def raw(self) -> RawImu:
@@ -99,37 +138,42 @@ class SimulatedImu(Imu):
 
     def forget(self) -> None:
         """Forget the last motion: the robot was put elsewhere, without a measurement in between."""
-        self._turned, self._motion = self._hull.turned, self._hull.motion
+        row = self._row
+        row[IMU_TURNED] = self._hull.turned
+        row[IMU_MX], row[IMU_MY], row[IMU_MZ], _ = self._hull.motion
 
     def forget_noise(self) -> None:
         """Discard the drawn noise: the seed has changed."""
-        self._noises, self._at = b"", 0
+        self._row[IMU_AT] = len(self._noises)
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Measure one tick."""
-        hull, scale = self._hull, self._scale
-        if self._at == len(self._noises):
-            drawn = self._random.standard_normal((DRAWN, 6)) * self._sigma + self._bias
-            self._noises, self._at = drawn.tobytes(), 0
-        noise = SIX.unpack_from(self._noises, self._at)  # lists of floats would crowd the caches of a hundred robots
-        self._at += SIX.size
+        hull, scale, row = self._hull, self._scale, self._row
+        at = int(row[IMU_AT])
+        if at == len(self._noises):
+            drawn = self._random.standard_normal((DRAWN, IMU_NOISES)) * self._sigma + self._bias
+            self._noises.cast("B")[:] = drawn.data.cast("B")
+            at = 0
+        noise = list(self._noises[at : at + IMU_NOISES])
+        row[IMU_AT] = at + IMU_NOISES
         turned, motion = hull.turned, hull.motion
-        self.rate = rate = (turned - self._turned) / seconds * scale + noise[2]
-        yaw = self._yaw + rate * seconds
-        self._yaw = yaw if -math.pi < yaw <= math.pi else wrap_angle(yaw)
-        (ux, uy, uz, _), (vx, vy, vz, turning) = self._motion, motion
-        self._turned, self._motion = turned, motion
+        row[IMU_RATE] = rate = (turned - row[IMU_TURNED]) / seconds * scale + noise[2]
+        row[IMU_YAW] = wrap_angle(row[IMU_YAW] + rate * seconds)
+        ux, uy, uz = row[IMU_MX : IMU_MZ + 1]
+        vx, vy, vz, turning = motion
+        row[IMU_TURNED] = turned
+        row[IMU_MX], row[IMU_MY], row[IMU_MZ] = vx, vy, vz
         ax, ay, az = (vx - ux) / seconds, (vy - uy) / seconds, (vz - uz) / seconds
-        attitude = hull.attitude
-        straight = (attitude is STRAIGHT and self._held is STRAIGHT) or attitude == self._held == STRAIGHT
-        if hull.tilt is not LEVEL or not straight:
+        row[IMU_STAMP] = stamp
+        if hull.tilt is not LEVEL or hull.attitude != STRAIGHT or self._held != STRAIGHT:
             self._reading = reading = self._tilted(stamp, (ax, ay, az + GRAVITY), noise, seconds)
             felt = reading.linear_acceleration
-            self.felt = felt.x, felt.y, felt.z
+            row[IMU_FELT_X], row[IMU_FELT_Y], row[IMU_FELT_Z] = felt.x, felt.y, felt.z
             return
         c, s = math.cos(turned), math.sin(turned)
-        self.felt = c * ax + s * ay + noise[3], c * ay - s * ax + noise[4], az + GRAVITY + noise[5]
-        self._level = stamp, noise[0], noise[1], turning * scale + noise[2]
+        row[IMU_FELT_X], row[IMU_FELT_Y] = c * ax + s * ay + noise[3], c * ay - s * ax + noise[4]
+        row[IMU_FELT_Z] = az + GRAVITY + noise[5]
+        row[IMU_RATES], row[IMU_RATES + 1], row[IMU_RATES + 2] = noise[0], noise[1], turning * scale + noise[2]
         self._reading = None
 
     def _tilted(
@@ -138,6 +182,7 @@ class SimulatedImu(Imu):
         """Measure with a tilted body, by ground or legs; ``felt``: acceleration plus gravity, world, m/s2."""
         hull, held, before = self._hull, self._hull.attitude, self._held
         self._held = held
+        self._row[IMU_LEANT] = float(held != STRAIGHT)
         roll, pitch = hull.tilt[0] + held.roll, hull.tilt[1] + held.pitch
         rolling = hull.tilting[0] + wrap_angle(held.roll - before.roll) / seconds
         pitching = hull.tilting[1] + wrap_angle(held.pitch - before.pitch) / seconds
@@ -147,10 +192,19 @@ class SimulatedImu(Imu):
         rates = rolling - turning * sp, pitching * cr + turning * cp * sr, turning * cp * cr - pitching * sr
         return ImuReading(
             stamp,
-            Orientation(wrap_angle(roll), wrap_angle(pitch), wrap_angle(self._yaw + held.yaw)),
+            Orientation(wrap_angle(roll), wrap_angle(pitch), wrap_angle(self._row[IMU_YAW] + held.yaw)),
             Vector3(*(rate * self._scale + error for rate, error in zip(rates, noise[:3], strict=True))),
             Vector3(x + noise[3], y + noise[4], z + noise[5]),
         )
+
+
+def _together(rows: Rows, parts: Sequence[tuple[SimulatedImu, Sense]]) -> Sense:
+    """Return a function that measures with all IMUs, in one call of the kernel as far as they are level."""
+    hulls, imus, noises = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, IMU_WIDTH), rows.table(NOISES, NOISE_WIDTH)
+    return rows.sense(
+        {imu.index: sense for imu, sense in parts},
+        lambda kernels, stamp, seconds: kernels.measure(hulls, imus, noises, stamp, seconds, GRAVITY, rows.others),
+    )
 
 
 def earth_field(north: float) -> tuple[float, float, float]:
@@ -176,5 +230,6 @@ PART = Part(
     section=ImuSection,
     fit=_fit,
     sense=SimulatedImu.sense,
+    together=_together,
     displaced=SimulatedImu.forget,
 )

@@ -3,20 +3,41 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from msgspec import Struct, structs
 
+from roboglot.kernels.layouts import (
+    ALONE,
+    HULL_WIDTH,
+    IMU_WIDTH,
+    ODOMETRY_AT,
+    ODOMETRY_NOISE,
+    ODOMETRY_NOISES,
+    ODOMETRY_SCALE_X,
+    ODOMETRY_SCALE_Y,
+    ODOMETRY_STATE,
+    ODOMETRY_STILL,
+    ODOMETRY_WIDTH,
+    TOGETHER,
+    USE,
+)
 from roboglot.model.components.sensing.odometry import Odometry, OdometryNoise
 from roboglot.model.geometry import Pose, Twist, wrap_angle
 from roboglot.model.sensing import OdometryReading
+from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative, Positive
+from roboglot.simulation.bodies.rows import Rows, Seat, Sense
 from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.sensing.imu import TABLE as IMUS
 from roboglot.simulation.components.sensing.imu import SimulatedImu
 
 USUAL = OdometryNoise()
 DRAWN = 64  # ticks for which noise is drawn at once
+NOISE_WIDTH = DRAWN * ODOMETRY_NOISES
+TABLE, NOISES = "odometry", "odometry noises"
 
 
 class DescribedNoise(Struct, frozen=True, forbid_unknown_fields=True):
@@ -50,27 +71,32 @@ class SimulatedOdometry(Odometry):
     """Odometry that starts at (0, 0, 0) in odom."""
 
     def __init__(
-        self, section: OdometrySection, base: SimulatedBase, imu: SimulatedImu, random: np.random.Generator
+        self, section: OdometrySection, base: SimulatedBase, imu: SimulatedImu, random: np.random.Generator, seat: Seat
     ) -> None:
         self._section, self._base, self._imu, self._random = section, base, imu, random
         self._scale_x, self._scale_y = (1.0 + random.normal(0.0, section.scale_error, 2)).tolist()
         self._disturbs = bool(section.turn_slip or section.jump_every)
-        self._noises: list[float] = []  # two per tick to come
-        self._state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # stamp; x, y, yaw; twist; distance
-        self._reading: OdometryReading | None = None  # the same, once read
+        self.index = seat.index
+        self._row = row = seat.row(TABLE, ODOMETRY_WIDTH)
+        self._noises = seat.row(NOISES, NOISE_WIDTH)
+        row[USE] = ALONE if self._disturbs else TOGETHER
+        row[ODOMETRY_SCALE_X], row[ODOMETRY_SCALE_Y] = self._scale_x, self._scale_y
+        row[ODOMETRY_NOISE], row[ODOMETRY_STILL] = section.noise, section.still_rate
+        self.forget_noise()
+        self._reading: OdometryReading | None = None  # of the stamp in the row, once read
 
     @property
     def reading(self) -> OdometryReading:
-        if self._reading is None:
-            stamp, x, y, yaw, vx, vy, rate, way = self._state
+        stamp, x, y, yaw, vx, vy, rate, way = self._row[ODOMETRY_STATE:]
+        if self._reading is None or self._reading.stamp != stamp:
             self._reading = OdometryReading(stamp, Pose(x, y, yaw), Twist(vx, vy, rate), way)
         return self._reading
 
     @property
     def pose(self) -> Pose:
         """Pose of the reading in odom (m, rad), without building the whole reading."""
-        _, x, y, yaw, *_ = self._state
-        return Pose(x, y, yaw) if self._reading is None else self._reading.pose
+        x, y, yaw = self._row[ODOMETRY_STATE + 1 : ODOMETRY_STATE + 4]
+        return Pose(x, y, yaw)
 
     def _disturbed(self, x: float, y: float, yaw: float, seconds: float) -> tuple[float, float]:
         """Return the position (odom, m) with the errors of slip and encoder jumps."""
@@ -87,12 +113,12 @@ class SimulatedOdometry(Odometry):
 
     def forget_noise(self) -> None:
         """Discard the drawn noise: the seed has changed."""
-        self._noises.clear()
+        self._row[ODOMETRY_AT] = NOISE_WIDTH
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Add one tick's motion."""
         wheels = self._base.velocity
-        _, x, y, yaw, _, _, _, way = self._state
+        _, x, y, yaw, _, _, _, way = self._row[ODOMETRY_STATE:]
         still = not (wheels.x or wheels.y or wheels.yaw)
         # With wheels at rest, a slow rate is the gyro's own error.
         rate, section = self._imu.rate, self._section
@@ -100,10 +126,9 @@ class SimulatedOdometry(Odometry):
             rate = 0.0
         vx = vy = 0.0
         if wheels.x or wheels.y:
-            if not self._noises:
-                self._noises = self._random.standard_normal(2 * DRAWN)[::-1].tolist()
-            vx = wheels.x * (self._scale_x + section.noise * self._noises.pop())
-            vy = wheels.y * (self._scale_y + section.noise * self._noises.pop())
+            noise_x, noise_y = self._noise()
+            vx = wheels.x * (self._scale_x + section.noise * noise_x)
+            vy = wheels.y * (self._scale_y + section.noise * noise_y)
             if self._disturbs:
                 x, y = self._disturbed(x, y, yaw, seconds)
             middle = yaw + rate * seconds / 2
@@ -115,13 +140,33 @@ class SimulatedOdometry(Odometry):
             yaw += rate * seconds
             if not -math.pi < yaw <= math.pi:
                 yaw = wrap_angle(yaw)
-        self._state = stamp, x, y, yaw, vx, vy, rate, way
+        for column, number in enumerate((stamp, x, y, yaw, vx, vy, rate, way), start=ODOMETRY_STATE):
+            self._row[column] = number
         self._reading = None
+
+    def _noise(self) -> list[float]:
+        """Return the tick's two numbers."""
+        at = int(self._row[ODOMETRY_AT])
+        if at == NOISE_WIDTH:
+            self._noises.cast("B")[:] = self._random.standard_normal(NOISE_WIDTH).data.cast("B")
+            at = 0
+        self._row[ODOMETRY_AT] = at + ODOMETRY_NOISES
+        return list(self._noises[at : at + ODOMETRY_NOISES])
+
+
+def _together(rows: Rows, parts: Sequence[tuple[SimulatedOdometry, Sense]]) -> Sense:
+    """Return a function that reckons for all robots, in one call of the kernel unless they drive sideways."""
+    tables = rows.table(HULLS, HULL_WIDTH), rows.table(IMUS, IMU_WIDTH), rows.table(TABLE, ODOMETRY_WIDTH)
+    noises = rows.table(NOISES, NOISE_WIDTH)
+    return rows.sense(
+        {odometry.index: sense for odometry, sense in parts},
+        lambda kernels, stamp, seconds: kernels.reckon(*tables, noises, stamp, seconds, rows.others),
+    )
 
 
 def _fit(fit: Fitting) -> SimulatedOdometry:
     base, imu = fit.get(SimulatedBase), fit.get(SimulatedImu)
-    odometry = SimulatedOdometry(fit.body[OdometrySection], base, imu, fit.chance("odometry"))
+    odometry = SimulatedOdometry(fit.body[OdometrySection], base, imu, fit.chance("odometry"), fit.hull.seat)
     fit.world.chances.on_reseed(odometry.forget_noise)
     return odometry
 
@@ -134,4 +179,5 @@ PART = Part(
     fit=_fit,
     after=("base", "imu"),
     sense=SimulatedOdometry.sense,
+    together=_together,
 )

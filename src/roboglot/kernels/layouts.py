@@ -1,0 +1,50 @@
+"""Layouts shared by kernels and those who fill their arrays: planes of a picture, tables of a world's robots.
+
+A table has a row for each robot. Poses and motion are in world, m, rad, m/s, rad/s, unless said otherwise; a flag is 0
+or 1. Imports no Numba.
+"""
+
+from __future__ import annotations
+
+# Planes of a picture.
+FIRST = 2  # number of the first polygon; 0 and 1 are floor and ceiling
+COEFFICIENTS = 11  # of a polygon's plane, see ``raster``
+
+# Hull: the body in the physics.
+HULL_Q, HULL_V, HULL_A = 0, 1, 2  # its first position, velocity and control in the physics
+HULL_TORSO = 3  # its position in the physics, if legs move it; else -1
+HULL_SPRUNG, HULL_REST = 4, 5  # flag: a spring supports it; its height at rest
+HULL_COUNTED = 6  # height at which its floor was found
+HULL_LOOKED_X, HULL_LOOKED_Y, HULL_FREE = 7, 8, 9  # where edges and walls were looked up, and the way it holds for
+HULL_X, HULL_Y, HULL_Z, HULL_TURNED = 10, 11, 12, 13  # the last without wrapping
+HULL_VX, HULL_VY, HULL_VZ, HULL_TURN = 14, 15, 16, 17
+HULL_BEFORE = 18  # and three more: the motion one step earlier
+HULL_HELD = 22  # flag: the wheels do not drive it: it is held, lies or rolls freely
+HULL_DRIVE_X, HULL_DRIVE_Y, HULL_DRIVE_YAW = 23, 24, 25  # commanded velocity of the wheels, base_link
+HULL_LEANS = 26  # flag: hull or torso is tilted
+HULL_WHEEL_X, HULL_WHEEL_Y, HULL_WHEEL_YAW = 27, 28, 29  # present velocity of the wheels, base_link
+HULL_SLACK = 30  # flag: a wheel is dead, or all roll freely
+HULL_SINKING, HULL_BELLY = 31, 32  # speed of the torso in the physics; height of its underside above the floor, m
+HULL_WIDTH = 33
+
+TOGETHER, ALONE = 1.0, 2.0  # values of the first column of each table below; 0: no such part
+USE = 0
+
+# IMU.
+IMU_AT, IMU_SCALE, IMU_LEANT = 1, 2, 3  # the next noise; of the gyro; flag: the torso was tilted
+IMU_TURNED, IMU_MX, IMU_MY, IMU_MZ = 4, 5, 6, 7  # the hull's at the last measurement
+IMU_YAW, IMU_RATE = 8, 9  # integral of the gyro, and its mean over the last tick
+IMU_FELT_X, IMU_FELT_Y, IMU_FELT_Z = 10, 11, 12  # m/s2, base_link
+IMU_STAMP, IMU_RATES = 13, 14  # s, and three turn rates
+IMU_WIDTH = 17
+IMU_NOISES = 6  # per tick
+
+# Odometry, in odom.
+ODOMETRY_AT, ODOMETRY_SCALE_X, ODOMETRY_SCALE_Y, ODOMETRY_NOISE, ODOMETRY_STILL = 1, 2, 3, 4, 5
+ODOMETRY_STATE = 6  # and seven more: stamp; x, y, yaw; vx, vy, turn rate (base_link); distance
+ODOMETRY_WIDTH = 14
+ODOMETRY_NOISES = 2  # per tick
+
+# Motion status.
+STATUS_BLOW, STATUS_STAMP, STATUS_BLOWS, STATUS_SLIPPING = 1, 2, 3, 6  # three blows: their stamps; ticks of slip
+STATUS_WIDTH = 7

@@ -1,0 +1,147 @@
+"""Place, motion and drive of one robot's body, kept in its row. Truth, world frame."""
+
+from __future__ import annotations
+
+from roboglot.kernels.layouts import (
+    HULL_BEFORE,
+    HULL_BELLY,
+    HULL_DRIVE_X,
+    HULL_DRIVE_YAW,
+    HULL_HELD,
+    HULL_LEANS,
+    HULL_SLACK,
+    HULL_TURNED,
+    HULL_VX,
+    HULL_WHEEL_X,
+    HULL_WIDTH,
+    HULL_X,
+    HULL_Y,
+    HULL_Z,
+)
+from roboglot.model.geometry import LEVEL as STRAIGHT
+from roboglot.model.geometry import Orientation, Pose, Twist, wrap_angle
+from roboglot.simulation.bodies.rows import Seat
+
+LEVEL = (0.0, 0.0)
+TABLE = "hull"
+Motion = tuple[float, float, float, float]
+
+
+class HullState:
+    """Numbers of a hull, which a kernel may update: the properties read them anew each time."""
+
+    def __init__(self, seat: Seat) -> None:
+        self.seat = seat
+        self._row = seat.row(TABLE, HULL_WIDTH)
+        self._posed: tuple[float, Pose] | None = None  # yaw without wrapping, and the pose made of it
+        self._tilt, self._attitude = LEVEL, STRAIGHT
+        self._hand: float | None = None
+        self._overturned = self._free = False
+
+    @property
+    def x(self) -> float:
+        """Of base_link, m."""
+        return self._row[HULL_X]
+
+    @property
+    def y(self) -> float:
+        """Of base_link, m."""
+        return self._row[HULL_Y]
+
+    @property
+    def elevation(self) -> float:
+        """Height of base_link in the world, m."""
+        return self._row[HULL_Z]
+
+    @property
+    def belly(self) -> float:
+        """Height of the torso's underside above the floor, m."""
+        return self._row[HULL_BELLY]
+
+    @property
+    def turned(self) -> float:
+        """Yaw without wrapping, rad."""
+        return self._row[HULL_TURNED]
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of base_link in world (m, rad)."""
+        row, posed = self._row, self._posed
+        x, y, turned = row[HULL_X], row[HULL_Y], row[HULL_TURNED]
+        if posed is None or posed[0] != turned or posed[1].x != x or posed[1].y != y:
+            self._posed = posed = turned, Pose(x, y, wrap_angle(turned))
+        return posed[1]
+
+    @property
+    def motion(self) -> Motion:
+        """Speed along x, y and z (m/s; z of the torso), and the turn rate (rad/s)."""
+        vx, vy, vz, turn = self._row[HULL_VX : HULL_VX + 4]
+        return vx, vy, vz, turn
+
+    @property
+    def before(self) -> Motion:
+        """The same one step earlier."""
+        vx, vy, vz, turn = self._row[HULL_BEFORE : HULL_BEFORE + 4]
+        return vx, vy, vz, turn
+
+    @property
+    def pulls(self) -> bool:
+        """True if the wheels drive the robot over the ground."""
+        row = self._row
+        return not row[HULL_HELD] and bool(row[HULL_DRIVE_X] or row[HULL_DRIVE_X + 1])
+
+    @property
+    def tilt(self) -> tuple[float, float]:
+        """Roll and pitch, rad, REP-103."""
+        return self._tilt
+
+    @tilt.setter
+    def tilt(self, tilt: tuple[float, float]) -> None:
+        self._tilt = tilt
+        self._note_leaning()
+
+    @property
+    def attitude(self) -> Orientation:
+        """The torso's attitude on its legs, relative to base_link, rad; truth, without physics."""
+        return self._attitude
+
+    @attitude.setter
+    def attitude(self, attitude: Orientation) -> None:
+        self._attitude = attitude
+        self._note_leaning()
+
+    def _note_leaning(self) -> None:
+        self._row[HULL_LEANS] = float(self._tilt is not LEVEL or self._attitude != STRAIGHT)
+
+    @property
+    def hand(self) -> float | None:
+        """Height in the world at which a hand holds base_link, m."""
+        return self._hand
+
+    @hand.setter
+    def hand(self, height: float | None) -> None:
+        self._hand = height
+        self._note_held()
+
+    @property
+    def overturned(self) -> bool:
+        """True if the robot lies on a side or its back."""
+        return self._overturned
+
+    @overturned.setter
+    def overturned(self, lies: bool) -> None:
+        self._overturned = lies
+        self._note_held()
+
+    def _note_held(self) -> None:
+        self._row[HULL_HELD] = float(self._hand is not None or self._overturned or self._free)
+
+    def drive(self, twist: Twist) -> None:
+        """Drive the wheels at ``twist`` (base_link) from now on, if they are on the ground."""
+        self._row[HULL_DRIVE_X], self._row[HULL_DRIVE_X + 1], self._row[HULL_DRIVE_YAW] = twist.x, twist.y, twist.yaw
+
+    def note_wheels(self, twist: Twist, *, slack: bool) -> None:
+        """Note the wheels' present velocity (base_link) for sensors; ``slack``: some are dead, or all roll freely."""
+        row = self._row
+        row[HULL_WHEEL_X], row[HULL_WHEEL_X + 1], row[HULL_WHEEL_X + 2] = twist.x, twist.y, twist.yaw
+        row[HULL_SLACK] = float(slack)

@@ -1,0 +1,84 @@
+"""Numbers of all robots of a world in tables, a row each, so that one kernel computes a tick of all of them.
+
+A part keeps there what it computes together with its like (``Part.together``), and reads and writes its own row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from roboglot.kernels import loading
+from roboglot.kernels.arrays import FloatArray, IntArray
+
+Sense = Callable[[float, float], None]  # of stamp and time since the last call, s
+
+
+@dataclass(frozen=True, slots=True)
+class Kernels:
+    """The compiled functions of ``kernels/together.py``."""
+
+    still: Callable[..., bool]
+    drive: Callable[..., None]
+    see: Callable[..., int]
+    measure: Callable[..., int]
+    watch: Callable[..., int]
+    reckon: Callable[..., int]
+
+
+class Rows:
+    """Tables for ``robots`` robots. ``kernels``: None until they are loaded; ``others``: room for their answer."""
+
+    def __init__(self, robots: int) -> None:
+        self._robots = robots
+        self._tables: dict[str, FloatArray] = {}
+        self.kernels: Kernels | None = None
+        self.others: IntArray = np.zeros(robots, np.int64)
+
+    def load_kernels(self) -> None:
+        """Compute with the compiled kernels from now on; results stay the same, to the last bit."""
+        with loading():
+            from roboglot.kernels import together
+
+        self.kernels = Kernels(
+            together.still, together.drive, together.see, together.measure, together.watch, together.reckon
+        )
+
+    def table(self, name: str, width: int) -> FloatArray:
+        """Return the table of this name, made with zeros at first; ``width``: numbers in a row."""
+        if name not in self._tables:
+            self._tables[name] = np.zeros((self._robots, width))
+        return self._tables[name]
+
+    def sense(self, alone: Mapping[int, Sense], kernel: Callable[[Kernels, float, float], int]) -> Sense:
+        """Return a function that senses with one call of ``kernel``, and with those of ``alone`` that it leaves.
+
+        Without kernels with all of them. The keys of ``alone`` are rows; the kernel's answer is how many it has left.
+        """
+
+        def sense(stamp: float, seconds: float) -> None:
+            if self.kernels is None:
+                for one in alone.values():
+                    one(stamp, seconds)
+                return
+            if count := kernel(self.kernels, stamp, seconds):
+                for index in self.others[:count].tolist():
+                    alone[index](stamp, seconds)
+
+        return sense
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """One robot's place in all tables."""
+
+    rows: Rows
+    index: int
+
+    def row(self, name: str, width: int) -> memoryview[float]:
+        """Return its row of a table, with zeros; a number of it is read and written quicker than in an array."""
+        self.rows.table(name, width)[self.index] = 0.0
+        row: memoryview[float] = memoryview(self.rows.table(name, width)[self.index]).cast("B").cast("d")
+        return row
