@@ -1,4 +1,4 @@
-"""What is computed for all robots at once is, to the last bit, what each robot's part computes alone."""
+"""Robots that are computed together sense, to the last bit, what each would alone."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base, WheelSpeeds
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.motion.motion_status import MotionStatus
 from roboglot.model.components.sensing.imu import Imu
@@ -20,7 +21,7 @@ from roboglot.simulation.bodies.part import parts
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 
-BODIES = {"a": "universal", "b": "universal", "h": "hermes", "d": "cyberdog2"}
+BODIES = {"a": "universal", "d": "cyberdog2", "h": "hermes"}
 SECONDS = 6  # in which all that is below happens, and noise is drawn several times
 
 
@@ -47,7 +48,7 @@ async def sensed(*, together: bool) -> list[str]:
         2: lambda: world.hands.lift("h", 0.2),
         3: lambda: world.hands.let_go("h"),
         4: lambda: world.faults.inject("motor_fault", "h", duration=1.5),
-        5: lambda: robots[1][Legs].lie_down(),
+        5: lambda: (robots[1][Legs].lie_down(), robots[0][Gimbal].set_mode(FollowMode.GIMBAL_LEAD)),
         6: lambda: world.hands.place("a", Pose(22.0, 10.0, 2.0)),
         0: lambda: world.hands.add_obstacle(Pose(21.5, 10.5)),
     }
@@ -59,6 +60,8 @@ async def sensed(*, together: bool) -> list[str]:
             if dice.random() < 0.2:
                 _command(robot, next(wanted))
             values = robot[Imu].reading, robot[Odometry].reading, robot[Base].velocity
+            if Gimbal in robot:
+                lines.append(f"{robot[Gimbal].angles} {robot[Gimbal].attitude}")
             flags = robot[MotionStatus].flags if MotionStatus in robot else None
             lines.append(f"{step} {robot.id} {values} {flags} {world.truth.pose_of(robot.id)}")
         if step % 10 == 5 and (happening := happenings.get(step // 10)):

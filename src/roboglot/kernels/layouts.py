@@ -25,7 +25,8 @@ HULL_LEANS = 26  # flag: hull or torso is tilted
 HULL_WHEEL_X, HULL_WHEEL_Y, HULL_WHEEL_YAW = 27, 28, 29  # present velocity of the wheels, base_link
 HULL_SLACK = 30  # flag: a wheel is dead, or all roll freely
 HULL_SINKING, HULL_BELLY = 31, 32  # speed of the torso in the physics; height of its underside above the floor, m
-HULL_WIDTH = 33
+HULL_GAZE_PITCH, HULL_GAZE_YAW = 33, 34  # of the gimbal; zero without one
+HULL_WIDTH = 35
 
 TOGETHER, ALONE = 1.0, 2.0  # values of the first column of each table below; 0: no such part
 USE = 0
@@ -48,3 +49,8 @@ ODOMETRY_NOISES = 2  # per tick
 # Motion status.
 STATUS_BLOW, STATUS_STAMP, STATUS_BLOWS, STATUS_SLIPPING = 1, 2, 3, 6  # three blows: their stamps; ticks of slip
 STATUS_WIDTH = 7
+
+# Gimbal: its yaw axis, relative to the body.
+GIMBAL_TURNED, GIMBAL_SINCE = 1, 2  # the hull's yaw at the last tick, and its turns since the start
+GIMBAL_YAW, GIMBAL_RATE, GIMBAL_LOWEST, GIMBAL_HIGHEST, GIMBAL_ACCELERATION, GIMBAL_TOP = 3, 4, 5, 6, 7, 8
+GIMBAL_WIDTH = 9

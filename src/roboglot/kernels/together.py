@@ -13,6 +13,14 @@ from roboglot.kernels.arrays import FloatArray, IntArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.layouts import (
     ALONE,
+    GIMBAL_ACCELERATION,
+    GIMBAL_HIGHEST,
+    GIMBAL_LOWEST,
+    GIMBAL_RATE,
+    GIMBAL_SINCE,
+    GIMBAL_TOP,
+    GIMBAL_TURNED,
+    GIMBAL_YAW,
     HULL_A,
     HULL_BEFORE,
     HULL_BELLY,
@@ -21,6 +29,7 @@ from roboglot.kernels.layouts import (
     HULL_DRIVE_Y,
     HULL_DRIVE_YAW,
     HULL_FREE,
+    HULL_GAZE_YAW,
     HULL_HELD,
     HULL_LEANS,
     HULL_LOOKED_X,
@@ -97,6 +106,48 @@ def drive(hulls: FloatArray, controls: FloatArray, seconds: float) -> None:
             c, s = math.cos(yaw), math.sin(yaw)
             vx, vy = c * vx - s * vy, s * vx + c * vy
         controls[first], controls[first + 1], controls[first + 2] = vx, vy, turn
+
+
+@kernel("void(float64[::1], float64, float64, float64, float64)")
+def _trail(row: FloatArray, way: float, pull: float, settled: float, seconds: float) -> None:
+    """Shift a gimbal's yaw by ``way``, then return to the middle: ``Axis.trail``."""
+    low, high, top = row[GIMBAL_LOWEST], row[GIMBAL_HIGHEST], row[GIMBAL_TOP]
+    position, rate = row[GIMBAL_YAW] + way, row[GIMBAL_RATE]
+    if not low <= position <= high:
+        position, rate = (low if position < low else high), 0.0
+    wanted = -pull * position
+    if abs(position) < settled and abs(rate) < pull * settled:
+        row[GIMBAL_YAW] = row[GIMBAL_RATE] = 0.0
+        return
+    wanted = top if wanted > top else (-top if wanted < -top else wanted)
+    step, more = row[GIMBAL_ACCELERATION] * seconds, wanted - rate
+    rate += step if more > step else (-step if more < -step else more)
+    position += rate * seconds
+    if not low <= position <= high:
+        position, rate = (low if position < low else high), 0.0
+    row[GIMBAL_YAW], row[GIMBAL_RATE] = position, rate
+
+
+@kernel("int64(float64[:,::1], float64[:,::1], float64, float64, float64, int64[::1])")
+def follow(
+    hulls: FloatArray, gimbals: FloatArray, pull: float, settled: float, seconds: float, others: IntArray
+) -> int:
+    """Turn the gimbals of level robots after their bodies, where nothing aims them."""
+    count = 0
+    for i in range(hulls.shape[0]):
+        if gimbals[i, USE] == 0.0:
+            continue
+        if gimbals[i, USE] == ALONE or hulls[i, HULL_LEANS] != 0.0:
+            others[count] = i
+            count += 1
+            continue
+        turned = hulls[i, HULL_TURNED]
+        turn = turned - gimbals[i, GIMBAL_TURNED]
+        gimbals[i, GIMBAL_TURNED] = turned
+        gimbals[i, GIMBAL_SINCE] += turn
+        _trail(gimbals[i], -turn, pull, settled, seconds)
+        hulls[i, HULL_GAZE_YAW] = gimbals[i, GIMBAL_YAW]
+    return count
 
 
 @kernel("int64(float64[:,::1], float64[::1], float64[::1], float64, float64, int64[::1])")

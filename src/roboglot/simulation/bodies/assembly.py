@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from roboglot.model.client_context import context_of
 from roboglot.simulation.bodies.part import Fitting, Part, ordered, parts
-from roboglot.simulation.bodies.rows import Sense
+from roboglot.simulation.bodies.rows import Control, Sense
 from roboglot.simulation.bodies.schedule import Job, Schedule
 
 P = TypeVar("P")
@@ -37,7 +37,8 @@ class SimulatedRobot:
                 fitting.robot.add(part.interface, component)
             fitted.append((part, component))
         made = {part.name: component for part, component in fitted}
-        controlled = ordered((part for part, _ in fitted if part.control), lambda part: part.control_after)
+        alone = (part for part, _ in fitted if part.control and part.control_together is None)
+        controlled = ordered(alone, lambda part: part.control_after)
         tick = fitting.tick
         self._controls = Schedule([_job(part, made[part.name], part.control) for part in controlled], tick)
         sensed = [
@@ -49,6 +50,11 @@ class SimulatedRobot:
             for part, component in fitted
             if part.together is not None and part.sense is not None
         }
+        self._control_together = {
+            part.name: (component, MethodType(part.control, component))
+            for part, component in fitted
+            if part.control_together is not None and part.control is not None
+        }
         self._displaced = [MethodType(part.displaced, component) for part, component in fitted if part.displaced]
         self._detach = [MethodType(part.detach, component) for part, component in fitted if part.detach]
 
@@ -58,17 +64,21 @@ class SimulatedRobot:
 
     def control(self) -> None:
         """Run the parts' control, before the physics of a tick."""
-        if not self._controls.skip():
+        if self._controls.begin():
             self._context.run(self._controls.run)
 
     def sense(self, stamp: float) -> None:
         """Run the sensing of the parts that are not sensed together, after the physics of a tick."""
-        if not self._senses.skip():
+        if self._senses.begin():
             self._context.run(self._senses.run_at, stamp)
 
     def together(self, name: str) -> tuple[object, Sense] | None:
         """Return its part of this name with its sensing, for one function of all robots; None: it has none."""
         return self._together.get(name)
+
+    def control_together(self, name: str) -> tuple[object, Control] | None:
+        """Return the same with its control."""
+        return self._control_together.get(name)
 
     def displaced(self) -> None:
         """Notify the parts that the robot was lifted and put elsewhere."""

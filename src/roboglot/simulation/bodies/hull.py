@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.kernels.layouts import (
-    HULL_A,
     HULL_BEFORE,
     HULL_BELLY,
     HULL_COUNTED,
@@ -21,11 +20,7 @@ from roboglot.kernels.layouts import (
     HULL_FREE,
     HULL_HELD,
     HULL_LOOKED_X,
-    HULL_Q,
-    HULL_SINKING,
-    HULL_TORSO,
     HULL_TURNED,
-    HULL_V,
     HULL_VX,
     HULL_X,
 )
@@ -117,12 +112,11 @@ class Hull(HullState):
         self.leash: tuple[float, float] | None = None  # N in the world: the pull of a leash
         self.standing = 1.0  # share of the wheels in contact with the ground
         self.rests = self.disturbed = False
-        self._torso = -1  # its position in the physics, if it has legs
+        self._torso = self._sinking = -1  # its position and speed in the physics, if it has legs
         self.legs: HullLegs | None = None
         if body.legs:
             self.legs = HullLegs(model, data, name, body)
             self._torso, self._sinking = self.legs.torso, self.legs.sinking
-            self._row[HULL_SINKING] = self._sinking
         self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
         self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
         self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views of the current values
@@ -132,14 +126,11 @@ class Hull(HullState):
         self.shift = Point()  # the torso's centre relative to base_link, by the legs, m
         self.clearance = body.hull.clearance  # lower objects pass under the chassis, m
         self.effort = 0.0  # power of the legs besides traction, W
-        self.gaze = LEVEL  # pitch and yaw of the gimbal, rad; zero without one
         self.touches: list[HullContact] = []  # current contacts of the hull, except docks
         self.when_touched: list[Duty] = []  # start when the hull is touched
         self.edges, self.walls = Nearness(body.hull.radius), Nearness(body.hull.radius)
         self._looked = -1  # the floor on which they were last looked up; place and reach are in the row
-        row = self._row
-        row[HULL_Q], row[HULL_V], row[HULL_A], row[HULL_TORSO] = self._q, self._v, first, self._torso
-        row[HULL_BELLY] = body.hull.height - body.hull.torso_height
+        self.enter((self._q, self._v, first), (self._torso, self._sinking), body.hull.height - body.hull.torso_height)
 
     @property
     def geoms(self) -> list[int]:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from roboglot.kernels.layouts import (
+    HULL_A,
     HULL_BEFORE,
     HULL_BELLY,
     HULL_DRIVE_X,
     HULL_DRIVE_YAW,
+    HULL_GAZE_PITCH,
     HULL_HELD,
     HULL_LEANS,
+    HULL_Q,
+    HULL_SINKING,
     HULL_SLACK,
+    HULL_TORSO,
     HULL_TURNED,
+    HULL_V,
     HULL_VX,
     HULL_WHEEL_X,
     HULL_WIDTH,
@@ -37,6 +43,13 @@ class HullState:
         self._tilt, self._attitude = LEVEL, STRAIGHT
         self._hand: float | None = None
         self._overturned = self._free = False
+
+    def enter(self, first: tuple[int, int, int], torso: tuple[int, int], belly: float) -> None:
+        """Enter its places in the physics: first position, velocity and control; torso (-1: no legs); height, m."""
+        row = self._row
+        row[HULL_Q], row[HULL_V], row[HULL_A] = first
+        row[HULL_TORSO], row[HULL_SINKING] = torso
+        row[HULL_BELLY] = belly
 
     @property
     def x(self) -> float:
@@ -89,6 +102,15 @@ class HullState:
         """True if the wheels drive the robot over the ground."""
         row = self._row
         return not row[HULL_HELD] and bool(row[HULL_DRIVE_X] or row[HULL_DRIVE_X + 1])
+
+    @property
+    def gaze(self) -> tuple[float, float]:
+        """Pitch and yaw of the gimbal, rad; zero without one."""
+        return self._row[HULL_GAZE_PITCH], self._row[HULL_GAZE_PITCH + 1]
+
+    @gaze.setter
+    def gaze(self, gaze: tuple[float, float]) -> None:
+        self._row[HULL_GAZE_PITCH], self._row[HULL_GAZE_PITCH + 1] = gaze
 
     @property
     def tilt(self) -> tuple[float, float]:

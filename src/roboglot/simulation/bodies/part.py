@@ -21,7 +21,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.bodies.rows import Rows, Sense
+from roboglot.simulation.bodies.rows import Control, Rows, Sense
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.values import dataclass
 
@@ -74,6 +74,7 @@ class Part(Generic[P]):
     together: makes of all robots' parts of this kind one function that does for all what ``sense`` does for one, in
         every tick, before all other parts sense; it gets all rows, and the parts with their own ``sense``. It changes
         nothing but these parts.
+    control_together: the same for ``control``, before that of all other parts.
     duty: answers whether the part has something to do; without one ``control`` and ``sense`` are always called.
     displaced: called when the robot was lifted and put elsewhere. ``detach``: called when the world ends.
     """
@@ -88,6 +89,7 @@ class Part(Generic[P]):
     control_after: tuple[str, ...] = ()
     sense: Callable[[P, float, float], None] | None = None
     together: Callable[[Rows, Sequence[tuple[P, Sense]]], Sense] | None = None
+    control_together: Callable[[Rows, Sequence[tuple[P, Control]]], Control] | None = None
     every: int | Callable[[P], int] = 1
     first: int = 1
     duty: Callable[[P], Duty] | None = None

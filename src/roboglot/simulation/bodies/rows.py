@@ -6,14 +6,16 @@ A part keeps there what it computes together with its like (``Part.together``), 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from roboglot.kernels import loading
 from roboglot.kernels.arrays import FloatArray, IntArray
+from roboglot.values import dataclass
 
 Sense = Callable[[float, float], None]  # of stamp and time since the last call, s
+
+Control = Callable[[float], None]  # of the length of a tick, s
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +23,7 @@ class Kernels:
     """The compiled functions of ``kernels/together.py``."""
 
     still: Callable[..., bool]
+    follow: Callable[..., int]
     drive: Callable[..., None]
     see: Callable[..., int]
     measure: Callable[..., int]
@@ -43,7 +46,13 @@ class Rows:
             from roboglot.kernels import together
 
         self.kernels = Kernels(
-            together.still, together.drive, together.see, together.measure, together.watch, together.reckon
+            together.still,
+            together.follow,
+            together.drive,
+            together.see,
+            together.measure,
+            together.watch,
+            together.reckon,
         )
 
     def table(self, name: str, width: int) -> FloatArray:
@@ -51,6 +60,20 @@ class Rows:
         if name not in self._tables:
             self._tables[name] = np.zeros((self._robots, width))
         return self._tables[name]
+
+    def control(self, alone: Mapping[int, Control], kernel: Callable[[Kernels, float], int]) -> Control:
+        """Return a function that controls with ``kernel`` and those of ``alone``, as ``sense`` does for sensing."""
+
+        def control(seconds: float) -> None:
+            if self.kernels is None:
+                for one in alone.values():
+                    one(seconds)
+                return
+            if count := kernel(self.kernels, seconds):
+                for index in self.others[:count].tolist():
+                    alone[index](seconds)
+
+        return control
 
     def sense(self, alone: Mapping[int, Sense], kernel: Callable[[Kernels, float, float], int]) -> Sense:
         """Return a function that senses with one call of ``kernel``, and with those of ``alone`` that it leaves.

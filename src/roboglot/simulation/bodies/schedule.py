@@ -74,29 +74,27 @@ class Schedule:
             if job.duty is not None:
                 job.duty.changed = _Change(self, rank)
 
-    def due(self) -> Iterator[Entry]:
-        """Return the calls of the next tick: rank, function, s since its last call."""
+    def begin(self) -> bool:
+        """Begin the next tick; return whether something is due in it."""
         self._at = at = self._next
         self._next = at + 1 if at + 1 < self._length else self._start
-        self._running = self._rounds[at]
-        self._pass = iter(self._running)
+        self._running = running = self._rounds[at]
+        self._pass = iter(running)
+        return bool(running)
+
+    def due(self) -> Iterator[Entry]:
+        """Begin the next tick and return its calls: rank, function, s since its last call."""
+        self.begin()
         return self._pass
 
-    def skip(self) -> bool:
-        """Pass the next tick if nothing is due in it, and return whether so."""
-        if self._rounds[self._next]:
-            return False
-        self.due()
-        return True
-
     def run(self) -> None:
-        """Run the next tick: call each due function with the s since its last call."""
-        for _, call, seconds in self.due():
+        """Run the tick that was begun: call each due function with the s since its last call."""
+        for _, call, seconds in self._pass:
             call(seconds)
 
     def run_at(self, stamp: float) -> None:
-        """Run the next tick for functions that also take the stamp (s)."""
-        for _, call, seconds in self.due():
+        """Run it for functions that also take the stamp (s)."""
+        for _, call, seconds in self._pass:
             call(stamp, seconds)
 
     def change(self, rank: int, on: bool) -> None:

@@ -254,8 +254,7 @@ class World:
         self._ticks += 1
         stamp = self._origin + self._ticks * TICK
         robots = tuple(self._population.simulated.values())  # steps lie apart: one may join meanwhile
-        for robot in robots:
-            robot.control()
+        self._rounds.control(robots)
         self._physics.drive(TICK)
         yield
         self.faults.step(stamp)

@@ -146,12 +146,14 @@ class SimulatedBase(Base):
         if self._steered is not None and isinstance(wanted, Twist):
             wanted = Twist(wanted.x, wanted.y, self._steered)
         if wanted is not self._twist:
+            linear = self._haste * self.limits.linear_acceleration * seconds
             match wanted:
                 case Twist() as target:
-                    self._twist = self._nearer(target, seconds)
+                    angular = self._haste * self.limits.angular_acceleration * seconds
+                    self._twist = _nearer(self._twist, target, linear, angular)
                     self._speeds = self.wheels.speeds_of(self._twist)
                 case WheelSpeeds() as target:
-                    self._speeds = self._nearer_wheels(target, seconds)
+                    self._speeds = _nearer_wheels(self._speeds, target, linear / self.wheels.radius)
                     self._twist = self.wheels.twist_of(self._speeds)
         pace = self.hindrances.pace
         if pace < math.inf and self._twist.speed > pace and not self._carried:
@@ -203,20 +205,21 @@ class SimulatedBase(Base):
         c, s = math.cos(yaw), math.sin(yaw)
         return Twist(c * vx + s * vy, (c * vy - s * vx) if self.wheels.mecanum else 0.0, turn)
 
-    def _nearer(self, target: Twist, seconds: float) -> Twist:
-        now, linear = self._twist, self._haste * self.limits.linear_acceleration * seconds
-        angular = self._haste * self.limits.angular_acceleration * seconds
-        dx, dy, dyaw = target.x - now.x, target.y - now.y, target.yaw - now.yaw
-        way = math.hypot(dx, dy)
-        if way <= linear and abs(dyaw) <= angular:
-            return target
-        part = min(1.0, linear / way) if way else 1.0
-        return Twist(now.x + dx * part, now.y + dy * part, now.yaw + max(-angular, min(angular, dyaw)))
 
-    def _nearer_wheels(self, target: WheelSpeeds, seconds: float) -> WheelSpeeds:
-        step = self._haste * self.limits.linear_acceleration * seconds / self.wheels.radius
-        pairs = zip(four(self._speeds), four(target), strict=True)
-        return WheelSpeeds(*(now + max(-step, min(step, goal - now)) for now, goal in pairs))
+def _nearer(now: Twist, target: Twist, linear: float, angular: float) -> Twist:
+    """Return the velocity next to ``now`` on the way to ``target``, by steps of at most ``linear`` and ``angular``."""
+    dx, dy, dyaw = target.x - now.x, target.y - now.y, target.yaw - now.yaw
+    way = math.hypot(dx, dy)
+    if way <= linear and abs(dyaw) <= angular:
+        return target
+    part = min(1.0, linear / way) if way else 1.0
+    return Twist(now.x + dx * part, now.y + dy * part, now.yaw + max(-angular, min(angular, dyaw)))
+
+
+def _nearer_wheels(speeds: WheelSpeeds, target: WheelSpeeds, step: float) -> WheelSpeeds:
+    """Return the same for the speeds of wheels (rad/s)."""
+    pairs = zip(four(speeds), four(target), strict=True)
+    return WheelSpeeds(*(now + max(-step, min(step, goal - now)) for now, goal in pairs))
 
 
 def _any(twist: Twist) -> Twist:

@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from roboglot.kernels.layouts import (
+    ALONE,
+    GIMBAL_ACCELERATION,
+    GIMBAL_HIGHEST,
+    GIMBAL_LOWEST,
+    GIMBAL_RATE,
+    GIMBAL_SINCE,
+    GIMBAL_TOP,
+    GIMBAL_TURNED,
+    GIMBAL_WIDTH,
+    GIMBAL_YAW,
+    HULL_WIDTH,
+    TOGETHER,
+    USE,
+)
 from roboglot.model.components.motion.base import WheelSpeeds
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.gimbal import FollowMode, GimbalFrame
@@ -17,7 +33,9 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import SETTLED, Axis
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.hull_state import LEVEL
+from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.quantities import Offset, Positive
+from roboglot.simulation.bodies.rows import Control, Rows
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.values import dataclass
 
@@ -48,6 +66,7 @@ class Aim:
 
 
 UNAIMED = (None, None)
+TABLE = "gimbal"
 
 
 class GimbalAxes:
@@ -60,34 +79,55 @@ class GimbalAxes:
         self._hull, self._base, self._robot = hull, base, robot
         self._top_speed = section.speed
         self.pitch = Axis(-section.up, section.down, section.acceleration)
-        self.yaw = Axis(-section.sideways, section.sideways, section.acceleration)
+        self._yaw = Axis(-section.sideways, section.sideways, section.acceleration)
+        self.index = hull.seat.index
+        self._row = row = hull.seat.row(TABLE, GIMBAL_WIDTH)
+        row[USE], row[GIMBAL_TOP], row[GIMBAL_ACCELERATION] = ALONE, section.speed, section.acceleration
+        row[GIMBAL_LOWEST], row[GIMBAL_HIGHEST] = self._yaw.lowest, self._yaw.highest
         self._aims: tuple[Aim | None, Aim | None] = UNAIMED  # of pitch and yaw
         self.mode = FollowMode.CHASSIS_LEAD
         self.suspended = False
         self._resting = False
-        self._turned = hull.turned
-        self._since_start = 0.0  # the body's true rotation since the start, to count whole turns
+        self.displaced()
         self.lean = 0.0
+
+    @property
+    def yaw(self) -> Axis:
+        """The yaw axis as it is now."""
+        self._yaw.position, self._yaw.rate = self._row[GIMBAL_YAW], self._row[GIMBAL_RATE]
+        return self._yaw
+
+    @property
+    def _since_start(self) -> float:
+        """The body's true rotation since the start, to count whole turns, rad."""
+        return self._row[GIMBAL_SINCE]
+
+    def _disturb(self) -> None:
+        """Have the next tick computed alone: what the gimbal does has changed."""
+        self._resting, self._row[USE] = False, ALONE
 
     def set_mode(self, mode: FollowMode) -> None:
         """Set which of gimbal and chassis follows the other."""
-        self.mode, self._resting = mode, False
+        self.mode = mode
+        self._disturb()
         self._base.steer(None)
 
     def suspend(self) -> None:
         """Cut the motors: the axes keep their angles to the body."""
         self.suspended = True
         self.halt()
-        self.pitch.rate = self.yaw.rate = 0.0
+        self.pitch.rate = self._row[GIMBAL_RATE] = 0.0
         self._base.steer(None)
 
     def resume(self) -> None:
         """Switch the motors on again."""
-        self.suspended = self._resting = False
+        self.suspended = False
+        self._disturb()
 
     def aim(self, pitch: Aim | None, yaw: Aim | None) -> None:
         """Set the axes' aims; None: keep the direction in the world."""
-        self._aims, self._resting = (pitch, yaw), False
+        self._aims = pitch, yaw
+        self._disturb()
 
     def halt(self) -> None:
         """Stop both axes, which keep their directions in the world."""
@@ -125,28 +165,35 @@ class GimbalAxes:
 
     def control(self, seconds: float) -> None:
         """Compensate the body's motion, follow or steer the chassis, turn to the aims; before the base's control."""
-        hull = self._hull
-        turn, self._turned = hull.turned - self._turned, hull.turned
-        if self._resting and not turn and hull.tilt is LEVEL:
+        hull, row, yaw = self._hull, self._row, self.yaw
+        turn, row[GIMBAL_TURNED] = hull.turned - row[GIMBAL_TURNED], hull.turned
+        if self._resting and row[USE] == ALONE and not turn and hull.tilt is LEVEL:
             return
-        self._since_start += turn
+        row[GIMBAL_SINCE] += turn
         if hull.tilt is LEVEL and self._plain and not self.lean:
-            hull.gaze = self.pitch.position, self._follow_body(turn, seconds)
+            self._follow_body(yaw, turn, seconds)
+        elif not self._move(yaw, turn, seconds):
             return
-        lean = 0.0 if hull.tilt is LEVEL else _lean(hull.tilt, self.yaw.position)
+        row[GIMBAL_YAW], row[GIMBAL_RATE] = yaw.position, yaw.rate
+        hull.gaze = self.pitch.position, yaw.position
+        if self.mode is FollowMode.GIMBAL_LEAD:
+            self._steer(yaw.position)
+
+    def _move(self, yaw: Axis, turn: float, seconds: float) -> bool:
+        """Turn both axes by a tick, while the body has turned by ``turn`` (rad); return whether they have power."""
+        hull, self._row[USE] = self._hull, ALONE
+        lean = 0.0 if hull.tilt is LEVEL else _lean(hull.tilt, yaw.position)
         leaning, self.lean = lean - self.lean, lean
         if self.suspended:
-            return
-        if turn or self._aims[1] is not None or self.yaw.position or self.yaw.rate:
-            self._advance(1, self.yaw, -turn, seconds)
+            return False
+        if turn or self._aims[1] is not None or yaw.position or yaw.rate:
+            self._advance(1, yaw, -turn, seconds)
         if leaning or self._aims[0] is not None or self.pitch.rate:
             self._advance(0, self.pitch, -leaning, seconds)
-        hull.gaze = self.pitch.position, self.yaw.position
-        if self.mode is FollowMode.GIMBAL_LEAD:
-            self._steer()
-        rested = self._aims == (None, None) and not self.pitch.rate and not self.yaw.rate
-        centred = self.mode is FollowMode.CHASSIS_LEAD and not self.yaw.position
+        rested = self._aims == UNAIMED and not self.pitch.rate and not yaw.rate
+        centred = self.mode is FollowMode.CHASSIS_LEAD and not yaw.position
         self._resting = rested and (centred or self.mode is FollowMode.FREE)
+        return True
 
     @property
     def _plain(self) -> bool:
@@ -154,16 +201,14 @@ class GimbalAxes:
         unaimed = self._aims == UNAIMED and not self.pitch.rate
         return unaimed and self.mode is FollowMode.CHASSIS_LEAD and not self.suspended
 
-    def _follow_body(self, turn: float, seconds: float) -> float:
-        """Compensate a turn of the body (rad) and return to its front; return the yaw, rad."""
-        axis = self.yaw
-        axis.trail(-turn, FOLLOWING, self._top_speed, seconds)
-        self._resting = not axis.position and not axis.rate
-        return axis.position
+    def _follow_body(self, yaw: Axis, turn: float, seconds: float) -> None:
+        """Compensate a turn of the body (rad) and return to its front; so does the kernel from now on."""
+        yaw.trail(-turn, FOLLOWING, self._top_speed, seconds)
+        self._resting, self._row[USE] = not yaw.position and not yaw.rate, TOGETHER
 
     def displaced(self) -> None:
         """Note that the robot was put elsewhere, together with its axes."""
-        self._turned = self._hull.turned
+        self._row[GIMBAL_TURNED] = self._hull.turned
 
     def _advance(self, index: int, axis: Axis, held: float, seconds: float) -> None:
         """Move one axis; ``held``: the turn (rad) that keeps its direction in spite of the body's motion."""
@@ -181,14 +226,26 @@ class GimbalAxes:
         """Return to the body's front, at a rate that grows with the offset."""
         axis.trail(0.0, FOLLOWING, self._top_speed, seconds)
 
-    def _steer(self) -> None:
-        """Turn the base after the gimbal, unless an action other than manual driving uses the base."""
+    def _steer(self, off: float) -> None:
+        """Turn the base after the gimbal, which is ``off`` its front (rad).
+
+        Not while an action other than manual driving uses the base.
+        """
         drivers = self._robot.actions.running(BASE)
         if self._base.locks.held or not all(isinstance(driver.goal, Twist | WheelSpeeds) for driver in drivers):
             self._base.steer(None)
             return
-        off, top = self.yaw.position, self._base.limits.twist.yaw
+        top = self._base.limits.twist.yaw
         self._base.steer(0.0 if abs(off) < SETTLED else max(-top, min(top, STEERING * off)))
+
+
+def together(rows: Rows, gimbals: Sequence[tuple[GimbalAxes, Control]]) -> Control:
+    """Return a function that controls all gimbals, in one call of the kernel as far as they follow their bodies."""
+    hulls, table = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, GIMBAL_WIDTH)
+    return rows.control(
+        {axes.index: control for axes, control in gimbals},
+        lambda kernels, seconds: kernels.follow(hulls, table, FOLLOWING, SETTLED, seconds, rows.others),
+    )
 
 
 def reaches(axis: Axis, goal: float) -> bool:
