@@ -86,13 +86,15 @@ class NarrowPlaces:
             self._look(grid, here)
             self._looked_at, self._around, self._grid = now, here, grid
         (first_row, first_column), (height, width) = self._first, self._evidence.shape
-        found = np.zeros(len(points), bool)
-        for number, (column, row) in enumerate(np.floor(points / RESOLUTION).astype(np.intp).tolist()):
-            if 0 <= row - first_row < height and 0 <= column - first_column < width:
-                piece = row // TILE, column // TILE
-                if piece not in self._now:
-                    self._now[piece] = self._examined(piece)
-                found[number] = self._now[piece][row % TILE, column % TILE]
+        columns, rows = np.floor(points / RESOLUTION).astype(np.intp).T
+        within = (rows >= first_row) & (rows < first_row + height)
+        within &= (columns >= first_column) & (columns < first_column + width)
+        found, down, along = np.zeros(len(points), bool), rows // TILE, columns // TILE
+        for piece in set(zip(down[within].tolist(), along[within].tolist(), strict=True)):
+            if piece not in self._now:
+                self._now[piece] = self._examined(piece)
+            here_in = within & (down == piece[0]) & (along == piece[1])
+            found[here_in] = self._now[piece][rows[here_in] % TILE, columns[here_in] % TILE]
         return found
 
     def _look(self, grid: EvidenceGrid, here: Point) -> None:
