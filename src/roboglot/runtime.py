@@ -194,7 +194,7 @@ class Runtime:
         elif database:
             self._shared = open_registry(database)
         if database and (unused := self.config.data / FILE).exists():
-            log.warning("people in %s are let in by the database's list alone: `roboglot access copy`", unused)
+            log.warning("the list of people in %s is not used, but the database's: see `roboglot access copy`", unused)
         return Guard(self.config.data, self.config.access, self.fleet.robots, shared=self._shared)
 
     @property
@@ -371,4 +371,4 @@ async def _in_time(name: str, closing: Awaitable[None]) -> None:
     except TimeoutError:
         log.warning("%s did not close in time", name)
     except RobotError as error:
-        log.error("%s did not close as it should: %s", name, error)
+        log.error("cannot close %s cleanly: %s", name, error)

@@ -91,7 +91,7 @@ def test_running_out_of_files_is_reported_once(caplog: pytest.LogCaptureFixture)
             files.explain(loop, {"message": "accept", "exception": OSError(errno.EMFILE, "Too many open files")})
     finally:
         loop.close()
-    assert [record.getMessage()[:28] for record in caplog.records] == ["new connections are dropped:"]
+    assert [record.getMessage()[:25] for record in caplog.records] == ["dropping new connections:"]
     assert not ran_out(OSError(errno.ECONNRESET, ""))
 
 

@@ -56,7 +56,7 @@ class SessionFile:
         try:
             await self._database.run(lambda connection: connection.execute(insert, values).rowcount)
         except RobotError as error:
-            log.error("cannot keep the session of %s over a restart: %s", session.name, error)
+            log.error("cannot store the session of %s for a restart: %s", session.name, error)
 
     async def drop(self, keys: list[str]) -> None:
         """Delete sessions."""
@@ -68,7 +68,7 @@ class SessionFile:
         try:
             await self._database.run(work)
         except RobotError as error:
-            log.error("cannot end %d sessions for good, a restart brings them back: %s", len(keys), error)
+            log.error("cannot delete %d sessions, so a restart restores them: %s", len(keys), error)
 
     def close(self) -> None:
         """Finish writing."""

@@ -222,7 +222,7 @@ class Autonomy:
             course.unavailable = Refused(f"no mapping and no navigation: {reason}")
             self._report(FaultLevel.ERROR, str(course.unavailable))
             log.error("robot %s has %s", self._robot.id, course.unavailable)
-            log.debug("the kernels did not load", exc_info=error)
+            log.debug("cannot load the kernels", exc_info=error)
             return
         self._report(None, "")
         course.unavailable = None

@@ -68,7 +68,7 @@ class Console:
         try:
             self._socket = bound(self._config.address, self._config.port)
         except OSError as error:
-            log.warning("the console did not open: %s", error)
+            log.warning("cannot open the console: %s", error)
             return
         self.port = self._socket.getsockname()[1]
         for view in self._desk.views.values():
@@ -138,7 +138,7 @@ class Console:
                 file.close()
                 raise
         except (OSError, ValueError, sqlite3.Error, RobotError) as error:
-            log.error("cannot read who was signed in, all sign in again: %s: %s", self._desk.sessions, error)
+            log.error("cannot read the sessions, all must sign in again: %s: %s", self._desk.sessions, error)
             return Sessions()
 
     async def _push(self, application: Application) -> None:

@@ -84,5 +84,5 @@ class OpenFiles:
 
     def _say(self, *, full: bool) -> None:
         if full and not self._full:
-            log.error("new connections are dropped: %s", in_words())
+            log.error("dropping new connections: %s", in_words())
         self._full = full

@@ -221,7 +221,7 @@ class Recorder:
             self.save_ring(path)
             log.warning("the last minutes before %s are in %s", why, path)
         except (OSError, NotRecording) as error:
-            log.error("the last minutes before %s cannot be written: %s", why, error)
+            log.error("cannot write the last minutes before %s: %s", why, error)
 
     # -- sampling ------------------------------------------------------------------------------------------------------
 

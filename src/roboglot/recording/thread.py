@@ -132,7 +132,7 @@ class WriterThread:
             raise
         except Exception:  # one value that cannot be encoded must not end the recording
             self.dropped += 1
-            log.exception("recording: a value of %s cannot be written", entry.topic)
+            log.exception("recording: cannot write a value of %s", entry.topic)
 
     def _fail(self, error: OSError) -> None:
         if self.failure:  # already reported

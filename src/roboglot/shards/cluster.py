@@ -146,7 +146,7 @@ class ClusterFleet:
             await asyncio.wait_for(self.until(lambda: all(map(_settled, self.shards.values()))), START_MAX)
         except TimeoutError:
             waiting = [shard.plan.name for shard in self.shards.values() if not _settled(shard)]
-            log.warning("shards %s are not up yet: has the cluster room for them?", ", ".join(waiting))
+            log.warning("shards %s are not up yet; perhaps the cluster has no room", ", ".join(waiting))
         return passed
 
     async def close(self) -> None:
@@ -211,7 +211,7 @@ class ClusterFleet:
         try:
             await asyncio.wait_for(_answer(actor.stop.remote()), STOP_MAX)
         except (RayError, TimeoutError) as error:
-            log.warning("shard %s is ended by force: %s", shard.plan.name, type(error).__name__)
+            log.warning("killing shard %s: %s", shard.plan.name, type(error).__name__)
         await asyncio.to_thread(ray.kill, actor, no_restart=True)
 
     async def _look_always(self) -> None:
@@ -230,7 +230,7 @@ class ClusterFleet:
             self._missed(shard)
             return
         except RayError as error:
-            log.warning("shard %s cannot be asked: %s", shard.plan.name, error)
+            log.warning("cannot query shard %s: %s", shard.plan.name, error)
             shard.reason = str(error).strip().splitlines()[0]
             self._turn_to(shard, State.FAILED)
             return
@@ -248,7 +248,7 @@ class ClusterFleet:
         name = shard.plan.name
         if self._runs.get(name, condition.run) != condition.run:
             shard.restarts, shard.ready = shard.restarts + 1, None
-            log.warning("shard %s was started again on %s", name, condition.node)
+            log.warning("shard %s restarted on %s", name, condition.node)
         shard.pid, self._nodes[name], self._runs[name] = condition.pid, condition.node, condition.run
         shard.heard = self._loop.time()
         shard.ready = (condition.ready or shard.ready) if condition.up else None

@@ -53,7 +53,7 @@ class Overview:
         try:
             self._socket = bound(self._host, self._port)
         except OSError as error:
-            log.warning("the page of all worlds did not open: %s", error)
+            log.warning("cannot open the page of all worlds: %s", error)
             return
         self._serving = asyncio.get_running_loop().create_task(self._serve(self._socket), name="page of all worlds")
 

@@ -168,7 +168,7 @@ class Supervisor:
                 await self._forks.warm()
                 return
             except NotWarm as error:
-                log.error("no shard can start: %s", error)
+                log.error("cannot start shards: %s", error)
 
     def _fork(self, shard: Shard) -> None:
         try:
@@ -264,7 +264,7 @@ class Supervisor:
         slow = shard.beat.factor < SLOW and self._loop.time() - shard.since > SETTLING
         shard.slow_for = shard.slow_for + 1 if slow else 0
         if shard.slow_for == SLOW_FOR:
-            log.warning("shard %s does not keep up: %.2f x real time", shard.plan.name, shard.beat.factor)
+            log.warning("shard %s falls behind: %.2f x real time", shard.plan.name, shard.beat.factor)
         if self._memory_max and shard.beat.memory > self._memory_max:
             shard.reason = f"it had grown to {shard.beat.memory >> 20} MB of {self._memory_max >> 20}"
             shard.beat = Beat(0.0, 0, 0.0)  # each heartbeat is judged once

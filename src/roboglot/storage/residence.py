@@ -72,7 +72,7 @@ class Residence:
             try:
                 self._epochs = await self._homes.take(self._addresses, self._holder, silent)
             except Occupied as others:
-                log.info("robots %s are held by another program: waiting %g s for a sign of it", others, LEASE)
+                log.info("another program holds robots %s: waiting %g s for its next renewal", others, LEASE)
                 began = await self._wait_for(others.signs)
         except Occupied as others:
             raise OSError(f"another program runs robot {others}") from None
@@ -155,7 +155,7 @@ class Residence:
             try:
                 await self.renew()
             except DatabaseError as error:
-                log.warning("the registry of robots cannot be reached: %s", error)
+                log.warning("cannot reach the registry of robots: %s", error)
 
     async def _watch(self) -> None:
         """Detect the end of the lease, even while a renewal waits for an answer."""

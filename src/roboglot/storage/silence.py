@@ -57,7 +57,7 @@ class Silence:
         freed = await self._homes.free(silent, self._robots) if silent else []
         self._done |= silent
         for robot in freed:
-            log.warning("robot %s is free: its program showed no sign for %g s", robot, LEASE)
+            log.warning("robot %s is free: its program did not renew its claim for %g s", robot, LEASE)
         return freed
 
     async def look_always(self) -> None:
@@ -66,5 +66,5 @@ class Silence:
             try:
                 await self.look()
             except DatabaseError as error:
-                log.warning("the registry of robots cannot be reached: %s", error)
+                log.warning("cannot reach the registry of robots: %s", error)
             await asyncio.sleep(PERIOD)

@@ -94,7 +94,7 @@ async def test_unreadable_or_unwritable_floor_on_disk_is_reported(tour: Tour, ca
     for data in (b"", b"garbage", b"\x80"):
         await robot[FileStore].write("floors/2.msgpack", data)
         assert await shelf.take(2) is None
-    assert caplog.text.count("cannot be read") == 3
+    assert caplog.text.count("cannot read") == 3
     tour.world.faults.inject("full_disk", "a")
     storey = Storey(EvidenceGrid(), None, Annotations(), Pose(1.0), Pose())
     await shelf.put(1, storey, lasting=True)

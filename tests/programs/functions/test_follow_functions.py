@@ -75,7 +75,7 @@ async def test_who_takes_over_ends_it(caller: Caller, anna: Actor) -> None:
     await caller.clock.advance(1.5)
     caller.robot[Driving].drive(Twist(), lifetime=2.0, source="someone")
     await caller.clock.advance(1.0)
-    assert field(await caller("cyberdog.follow.state"), "describe") == "somebody else moves the robot"
+    assert field(await caller("cyberdog.follow.state"), "describe") == "another client moves the robot"
     assert [action.source for action in caller.robot.actions.running()] == ["someone"]
 
 

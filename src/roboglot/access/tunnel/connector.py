@@ -139,7 +139,7 @@ class Connector:
                 finally:
                     link.end("it was closed here")
             except OSError as error:
-                log.info("no second connection for beats: %s", error)
+                log.info("no second connection for heartbeats: %s", error)
             await asyncio.sleep(BESIDE_AGAIN)
 
     async def _greet(self, link: TunnelLink) -> Welcome:

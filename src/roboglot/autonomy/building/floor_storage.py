@@ -72,7 +72,7 @@ class StoreyShelf:
                 try:
                     storey = _unpacked(data)
                 except (msgspec.MsgspecError, zlib.error, ValueError, RobotError) as error:
-                    log.warning("the map of floor %d of robot %s cannot be read: %s", floor, self._robot.id, error)
+                    log.warning("cannot read the map of floor %d of robot %s: %s", floor, self._robot.id, error)
         return storey
 
 

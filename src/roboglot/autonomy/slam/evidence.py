@@ -75,7 +75,7 @@ class EvidenceGrid:
         if not self.full and not (_holds(rows, row0, row1) and _holds(columns, column0, column1)):
             self.full = True
             down, across = (n * RESOLUTION for n in (rows[1] - rows[0], columns[1] - columns[0]))
-            log.warning("map has its largest size, %.0f x %.0f m: scans beyond it are left out", across, down)
+            log.warning("the map has its largest size, %.0f x %.0f m: scans beyond it are left out", across, down)
         if (rows, columns) == (
             (self.first_row, self.first_row + height),
             (self.first_column, self.first_column + width),

@@ -111,7 +111,9 @@ class LoopCloser:
             return
         if len(self._frames) >= KEYFRAMES_MAX:
             if not self._full:
-                log.warning("map is not straightened from here on: it has %d keyframes, the limit", KEYFRAMES_MAX)
+                log.warning(
+                    "the map will not be straightened any further: it has %d keyframes, the limit", KEYFRAMES_MAX
+                )
             self._full = True
             return
         number = self._keep(Keyframe(scan.thinned(RAYS_KEPT_MAX), pose, way))

@@ -194,7 +194,7 @@ class Classroom:
             try:
                 await asyncio.to_thread(self._files.begin, kept.code, kept.name, kept.only, kept.until)
             except OSError as error:
-                log.error("cannot keep class %s: %s", kept.code, error)
+                log.error("cannot store class %s: %s", kept.code, error)
 
     async def end(self, code: str) -> None:
         """Forget a class, with what was handed in; pages in it hear that."""
@@ -228,7 +228,7 @@ class Classroom:
             async with self._writing:  # in order, so that the newest stays
                 await asyncio.to_thread(self._files.keep, code, pupil.bag)
         except OSError as error:
-            log.error("cannot keep what %s handed in: %s", pupil.name, error)
+            log.error("cannot store the program handed in by %s: %s", pupil.name, error)
             raise Refused("it cannot be saved on the disk of the teacher's machine") from None
 
     def place(self, joined: Class, pupil: Pupil, at: str) -> World | None:

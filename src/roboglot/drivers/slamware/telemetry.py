@@ -72,7 +72,7 @@ class TelemetryPoller:
         """Poll everything once. Topics that the robot lacks are not polled again."""
         self._absent.clear()
         if not is_there("numpy"):
-            log.warning("%s is read without scan and map: %s", self._link.address, NO_ARRAYS)
+            log.warning("reading %s without scan and map: %s", self._link.address, NO_ARRAYS)
             self._absent |= ARRAYS
         for what, _, ask in self._parts:
             if what in self._absent:

@@ -262,7 +262,9 @@ class Engine:
                 self._group.step_aside(launcher.pid)
                 self._memory.empty = usage_of(launcher.pid).memory
                 if FILTER not in self.layers:
-                    log.warning("robot programs run without a system call filter, as configured: trust each of them")
+                    log.warning(
+                        "robot programs run without a system call filter, as configured: run trusted programs only"
+                    )
             return self._launcher
 
     async def _open_group(self) -> list[str]:

@@ -133,5 +133,5 @@ class Journal:
 
     async def _give_up(self, why: str) -> None:
         self.kept = False
-        log.warning("the run of %s will not go on after a crash: %s", self._id, why)
+        log.warning("the run of %s cannot continue after a crash: %s", self._id, why)
         await self._store.remove(self._id)

@@ -162,7 +162,7 @@ class Runner:
             try:
                 await step
             except StoreError as error:
-                log.warning("cannot write down that task %s did not start: %s", id, error)
+                log.warning("cannot store that task %s did not start: %s", id, error)
 
     async def revive(self, task: StoredProgram, header: str) -> None:
         """Restore a task that was running or suspended when the server was killed; suspend it at the same place."""
@@ -255,7 +255,7 @@ class Runner:
                 try:
                     await self._store.set_state(id, run.state)
                 except StoreError as error:
-                    log.warning("cannot write down that task %s runs: %s", id, error)
+                    log.warning("cannot store that task %s runs: %s", id, error)
                 self.reports.publish(TaskReport(id, TaskOperation.START, "start task"))
         try:
             outcome = await run.execute()
@@ -273,7 +273,7 @@ class Runner:
         try:
             await self._put_away(run, TaskState.RUN, TaskOperation.STOP)
         except StoreError as error:
-            log.warning("cannot write down the end of task %s: %s", id, error)
+            log.warning("cannot store the end of task %s: %s", id, error)
         if outcome.reason is not ExitReason.FINISHED:
             self.reports.publish(TaskReport(id, TaskOperation.RUN, outcome.error, CannotExecute(outcome.error)))
         elif words := run.control.summary:
@@ -303,5 +303,5 @@ class Runner:
 def _reason(error: Exception) -> str:
     """Return why a program did not start; unexpected errors also go to the server's log."""
     if not isinstance(error, EXPECTED):
-        log.error("a program could not be started", exc_info=error)
+        log.error("cannot start a program", exc_info=error)
     return str(error) or type(error).__name__

@@ -36,7 +36,7 @@ class Timetable(Schedule):
         try:
             due = self.due(task) if task.mode == "cycle" else task.due or self._clock.epoch()
         except ProgramError as refusal:
-            log.warning("the task %s will not run: %s", task.id, refusal)
+            log.warning("task %s will not run: %s", task.id, refusal)
             return
         if due is not None:
             self.set(task.id, due)

@@ -90,7 +90,7 @@ class CertificateStore:
         try:
             renewed = ensure_certificates(self._folder)
         except OSError as error:
-            log.warning("the certificates stay as they were: %s", error)
+            log.warning("cannot load the changed certificates, the old ones stay: %s", error)
             return self._current
         if renewed != self._current:
             log.info("new certificates in %s", self._folder)

@@ -176,7 +176,7 @@ class FrameQueue:
     def _carried(self, task: asyncio.Task[None]) -> None:
         del self._sending[task]
         if not task.cancelled() and (error := task.exception()) is not None:
-            log.error("a program frame could not be sent: %s", error, exc_info=error)
+            log.error("cannot send a program frame: %s", error, exc_info=error)
         self._go_on()
 
     def _keep(self, frame: _Frame) -> None:

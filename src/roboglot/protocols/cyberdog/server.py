@@ -336,7 +336,7 @@ class _Service:
 
 
 def _note_unreadable(peer: str) -> None:
-    log.info("cannot read a request of %s: it is no SendRequest, or its params are not UTF-8", host_of(peer))
+    log.info("cannot read a request of %s: it is not a SendRequest, or its params are not UTF-8", host_of(peer))
 
 
 def _as_client(store: CertificateStore) -> object:

@@ -55,7 +55,7 @@ def turn_away_strangers(greeting: Greeting, transport: asyncio.Transport, data: 
         return greeting.check(data)
     except StrangerError as error:
         (host, *_), (_, port, *_) = transport.get_extra_info("peername"), transport.get_extra_info("sockname")
-        log.warning("robomaster: disconnected %s, which speaks %s on port %d: nothing of it was run", host, error, port)
+        log.warning("robomaster: disconnected %s, which speaks %s on port %d: no command was run", host, error, port)
         transport.abort()
         return b""
 

@@ -51,7 +51,7 @@ class ErrorBook:
         error = Error(kind, level, why, tuple((references or {}).items()), order)
         if error not in self._errors:
             self._errors = [*self._errors, error][-ERRORS_MAX:]
-            log.info("robot %s: fleet control hears %s: %s", self._robot.id, self._version.error(kind), why)
+            log.info("robot %s: fleet control is sent %s: %s", self._robot.id, self._version.error(kind), why)
         self._changed.set()
 
     def forget_order(self) -> None:

@@ -139,7 +139,7 @@ class Vda5050Door:
             await self._send_connection("ONLINE")
             await self._send_factsheet()
             log.info(
-                "robot %s: fleet control may come over %s:%d, VDA 5050 %s",
+                "robot %s: connected to the broker %s:%d, VDA 5050 %s",
                 self._robot.id,
                 host,
                 port,

@@ -88,4 +88,4 @@ class FrontEnds:
             try:
                 give(front_end)
             except Exception:
-                log.exception("cannot hand a frame to a front end")
+                log.exception("cannot pass a frame to a front end")

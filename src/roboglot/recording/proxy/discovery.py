@@ -30,7 +30,7 @@ class Announcer:
             )
             self._in, _ = await loop.create_datagram_endpoint(lambda: _Ear(self.hear), sock=_listening())
         except OSError as error:
-            log.warning("broadcasts of the robot do not pass: UDP %d: %s", PORT, error.strerror)
+            log.warning("cannot pass the robot's broadcasts: UDP %d: %s", PORT, error.strerror)
 
     def hear(self, data: bytes, sender: str) -> None:
         """Pass one broadcast on, if it is this robot's and has the known form."""

@@ -155,7 +155,7 @@ class End(asyncio.Protocol):
             try:
                 self.look(data)
             except Exception as error:  # noqa: BLE001 - bytes that cannot be parsed still pass
-                log.warning("cannot parse a connection any more, its bytes still pass: %s", error)
+                log.warning("cannot parse the rest of a connection, its bytes still pass: %s", error)
                 self.look = None
 
     def join(self, other: End) -> None:

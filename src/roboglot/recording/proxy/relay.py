@@ -138,7 +138,8 @@ class Relay:
         self._hosts.add(host)
         if own == host:
             log.warning(
-                "pushes of the robot pass by, and are not recorded: its client has this machine's address %s", own
+                "the robot's pushes bypass the proxy and are not recorded: its client has this machine's address %s",
+                own,
             )
             return
         if self._datagrams is not None:
@@ -150,7 +151,7 @@ class Relay:
                 lambda: _Pushes(self.push), local_addr=(own, PUSHES)
             )
         except OSError as error:
-            log.warning("pushes of the robot are not passed: UDP %s:%d: %s", own, PUSHES, error.strerror)
+            log.warning("cannot pass the robot's pushes: UDP %s:%d: %s", own, PUSHES, error.strerror)
 
     def push(self, data: bytes) -> None:
         """Pass one datagram on, and record it."""

@@ -189,7 +189,7 @@ class Lease(Component):
         if outside:
             self._look()
         else:
-            log.info("robot %s: the other client is done", self._robot.id)
+            log.info("robot %s: the other client has finished", self._robot.id)
         self._report()
 
     def _report(self) -> None:

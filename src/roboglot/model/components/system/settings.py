@@ -28,4 +28,4 @@ class Settings(Component):
         try:
             await self.put(key, value)
         except RobotError as error:
-            log.warning("cannot keep %s: %s", key, error)
+            log.warning("cannot store %s: %s", key, error)

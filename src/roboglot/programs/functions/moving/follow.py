@@ -83,7 +83,7 @@ class FollowedMember:
                 return str(error), False
         others = self._session.robot.actions.running(BASE)
         if not others or any(action.source != self._session.source for action in others):
-            return "somebody else moves the robot", False
+            return "another client moves the robot", False
         for action in others:  # the program's own drives take precedence
             await action.done()
         return "", False
@@ -140,6 +140,6 @@ async def cancel_follow(session: Session, preset_name: str = "") -> Record:
     """Stop following this person, or with no name anybody."""
     following = session.part(FollowedMember)
     if not following.name or preset_name not in ("", following.name):
-        return state(StateCode.FAIL, f"{preset_name or 'nobody'} is not being followed")
+        return state(StateCode.FAIL, f"the robot does not follow {preset_name or 'a person'}")
     following.stop()
     return state()

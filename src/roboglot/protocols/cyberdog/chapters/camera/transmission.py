@@ -83,7 +83,7 @@ class Transmission:
         """Return the app's peer, or a new one if there is room."""
         if uid not in self._peers:
             if len(self._peers) >= PEERS_MAX:
-                log.warning("refused pictures to %r: %d apps have some", uid, PEERS_MAX)
+                log.warning("refused pictures to %r: %d apps receive them", uid, PEERS_MAX)
                 return None
             peer = self._peers[uid] = _Peer(uid)
             peer.give_up = asyncio.get_running_loop().call_later(PATIENCE, self._late, peer)

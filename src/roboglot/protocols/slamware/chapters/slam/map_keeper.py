@@ -80,7 +80,7 @@ class MapKeeper:
         except NotFound:
             return
         except RobotError as error:
-            log.warning("the saved map of robot %s cannot be loaded: %s", self._robot.id, error)
+            log.warning("cannot load the saved map of robot %s: %s", self._robot.id, error)
 
     @property
     def ready(self) -> bool:
@@ -182,7 +182,7 @@ class MapKeeper:
         try:
             await self._parse(data)
         except InvalidGoal as error:
-            log.warning("the cloud's map is no map: %s", error)
+            log.warning("cannot read the cloud's map: %s", error)
             return
         await files.write(FILE, data)
         self._synced()
