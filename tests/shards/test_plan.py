@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboglot.shards import warmth
 from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet, save
 from roboglot.shards.warmth import ENVIRONMENT
 from roboglot.storage.database import connect
@@ -85,3 +86,11 @@ def test_rows_of_one_robot_go_and_others_stay(tmp_path: Path) -> None:
         ]
         assert connection.execute("SELECT robot FROM place").fetchall() == [("b",)]
     assert copy_robot("b", tmp_path / "none.db", new) == 0
+
+
+def test_kernels_are_compiled_in_a_process_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[list[str]] = []
+    monkeypatch.setattr(warmth.subprocess, "run", lambda command, **_: started.append(command))
+    monkeypatch.setattr("roboglot.kernels.ahead.missing", lambda: ["search"])
+    warmth._compile()
+    assert [command[1:] for command in started] == [["-m", "roboglot.kernels"]]

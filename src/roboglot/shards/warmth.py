@@ -6,6 +6,7 @@ import gc
 import importlib
 import os
 import pkgutil
+import subprocess
 import sys
 from collections.abc import Iterable, Iterator
 
@@ -45,6 +46,7 @@ class Threaded(RuntimeError):
 
 def warm() -> None:
     """Load everything, then freeze it, so that garbage collection copies no shared pages. Raises Threaded."""
+    _compile()
     gc.disable()
     for name in modules_of(PACKAGES):
         try:
@@ -64,6 +66,15 @@ def warm() -> None:
     gc.freeze()
     gc.enable()
     refuse_threads()
+
+
+def _compile() -> None:
+    """Compile missing kernels in a process of its own: here, a compiler would leave 400 MB to every fork."""
+    from roboglot.kernels.ahead import missing
+
+    if missing():
+        command = [sys.executable, "-m", "roboglot.kernels"]
+        subprocess.run(command, stdin=subprocess.DEVNULL, stdout=sys.stderr, check=False)  # else they are compiled here
 
 
 def _rehearse() -> None:
