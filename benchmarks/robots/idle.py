@@ -1,7 +1,8 @@
 """Claims with all doors up: ready in <= 0.5 s, <= 0.05 core idle, <= 130 MB also after drives, ends in 1 s.
 
-The start is measured by the clock and by processor time, which other work on the machine lengthens less.
-Forked starts are in shards.py.
+A start is cold: a new process, from its call to the line "ready", when all doors answer. Its files were read before
+(bytecode, libraries), certificates and the database are there, and kernels, which load after that line, are compiled.
+It is measured by the clock and by processor time, which other work on the machine lengthens less.
 """
 
 from __future__ import annotations
