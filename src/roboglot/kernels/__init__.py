@@ -29,7 +29,7 @@ MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "together",
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Around what imports kernels: the memory that only loading needs (80 MB) is given back behind it.
+    """Context for imports of kernels: returns the memory that only loading needs (80 MB) to the system afterwards.
 
     Costs nothing if everything was there already.
     """

@@ -1,6 +1,6 @@
 """``python -m roboglot.kernels [NAME ...]``: compile kernels ahead into the cache on disk, on all cores.
 
-With ``--compiler``, one of its processes: compiles the kernels that standard input names, a line each.
+With ``--compiler`` it is one of its own processes, which compiles the kernels named on standard input, one a line.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from roboglot.kernels.ahead import KernelsUnavailable, compile_ahead
 
 
 def compiler() -> None:
-    """Compile each kernel that a line names, and answer with its name."""
+    """Compile the kernel named on each line, and print its name."""
     gc.disable()  # collection would take a tenth of the time, and this process lives for seconds
     for line in sys.stdin:
         name = line.strip()

@@ -1,4 +1,6 @@
-"""Compiles the kernels ahead into Numba's cache on disk, on all cores, and knows which are compiled. Imports no Numba.
+"""Ahead-of-time compilation of kernels into Numba's cache on disk, on all cores, with marks for compiled ones.
+
+Imports no Numba.
 
 A kernel counts as compiled when a mark beside the cache carries the fingerprint of its source, of the kernels that are
 built into it, of Numba and of this machine's processor: a cache from another version or another processor is compiled
@@ -97,7 +99,7 @@ async def _compile_apart(modules: Sequence[str], report: Report) -> None:
 
 @cache
 def cache_folder() -> Path:
-    """Return where Numba keeps what it compiles: its own setting, beside the sources, or the user's cache folder."""
+    """Return Numba's cache folder: its own setting, a folder beside the sources, or the user's cache folder."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen)
     beside = HERE / "__pycache__"
@@ -107,7 +109,7 @@ def cache_folder() -> Path:
 
 
 def _forget(names: Sequence[str]) -> None:
-    """Remove what Numba keeps of ``names``: it looks at a kernel's own file only, not at those it is built from."""
+    """Remove Numba's cache of ``names``: it checks only a kernel's own file, not those that it is built from."""
     beside, apart = HERE / "__pycache__", f"{HERE.name}_{hashlib.sha1(str(HERE).encode()).hexdigest()}"
     folder = cache_folder()
     for name in names:
@@ -123,7 +125,7 @@ def _mark(name: str) -> str:
 
 @cache
 def _sources(name: str) -> tuple[str, ...]:
-    """Return the modules whose text becomes part of the compiled module ``name``: it and all that it imports."""
+    """Return the modules that become part of the compiled module ``name``: itself and all its imports."""
     found = [name]
     for source in found:
         text = (HERE / f"{source}.py").read_text("utf-8")
@@ -133,7 +135,7 @@ def _sources(name: str) -> tuple[str, ...]:
 
 @cache
 def _machine() -> str:
-    """Return what compiled code depends on besides its source."""
+    """Return a description of Numba and the processor, on which compiled code depends besides its source."""
     versions = []
     for package in ("numba", "llvmlite", "numpy"):
         with contextlib.suppress(PackageNotFoundError):
@@ -152,7 +154,7 @@ def _machine() -> str:
 
 @contextlib.contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Hold the folder's lock; it goes with the process."""
+    """Hold the folder's lock, which ends with the process."""
     with (folder / "roboglot.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
@@ -198,7 +200,7 @@ def _feed(
     waiting: queue.SimpleQueue[str],
     finished: queue.SimpleQueue[str | KernelsUnavailable],
 ) -> None:
-    """Give one compiler a kernel after the other."""
+    """Pass kernels to one compiler, one after the other."""
     assert compiler.stdin is not None
     assert compiler.stdout is not None
     assert compiler.stderr is not None

@@ -1,4 +1,4 @@
-"""Compilation of every kernel: ahead for its one signature, kept on disk, without the interpreter's lock.
+"""Compilation of kernels: ahead of time for one signature, cached on disk, without the interpreter's lock.
 
 No C wrapper is made, which nothing calls and which takes a tenth of the compiler's time. Kernels are written with loops
 rather than array expressions, reductions, ``np.full`` or ``np.round``: those compile ten times as slowly, and run no
@@ -21,7 +21,7 @@ CHECKED = "python"  # error model of kernels that raise ZeroDivisionError
 
 
 def kernel(signature: str | None = None, **options: object) -> Callable[[F], F]:
-    """Compile a function for this signature (None: for what it is called with); ``options`` are Numba's."""
+    """Compile a function for this signature (None: for the types of its calls); ``options`` are Numba's."""
     chosen = {"error_model": "numpy"} | options
     compiled: Callable[[F], F] = njit(signature, cache=True, nogil=True, no_cfunc_wrapper=True, **chosen)
     return compiled
@@ -29,6 +29,6 @@ def kernel(signature: str | None = None, **options: object) -> Callable[[F], F]:
 
 @typeof_impl.register(np.ndarray)
 def _typeof_array(array: np.ndarray[tuple[int, ...], np.dtype[np.generic]], _context: object) -> types.Array:
-    """Return an array's type as Numba does, but for masked arrays: to look for those takes 30 ms and 1.2 MB."""
+    """Return an array's type as Numba does, except for masked arrays: the check for those takes 30 ms and 1.2 MB."""
     dtype = from_dtype(cast("np.dtype[np.bool]", array.dtype))  # of any kind: Numba's annotation is narrower than it is
     return types.Array(dtype, array.ndim, map_layout(array), readonly=not array.flags.writeable)

@@ -119,7 +119,7 @@ def remember_low(
 def seen_since(
     seen: SingleArray, row0: int, row1: int, col0: int, col1: int, since: float, x: float, y: float, resolution: float
 ) -> FloatArray:
-    """Return the middles (n, 2; m) of cells in these rows and columns that were ``seen`` at ``since`` or later.
+    """Return the centres (n, 2; m) of cells in these rows and columns that were ``seen`` at ``since`` or later.
 
     Row by row; (x, y) is the grid's corner.
     """

@@ -16,7 +16,7 @@ NEAR_MAX = 24  # cells of a cap up to which comparing one by one is quicker
 
 @kernel("float32[:,::1](uint8[:,::1], float64)")
 def _along_columns(marked: ByteArray, cap: float) -> SingleArray:
-    """Distance in cells to the nearest marked cell of the same column, ``cap`` at most: down, then up."""
+    """Fill in the distance in cells to the nearest marked cell of the same column, at most ``cap``: down, then up."""
     height, width = marked.shape
     away = np.empty((height, width), np.float32)
     column = np.empty(width, np.float32)

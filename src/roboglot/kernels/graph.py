@@ -1,4 +1,4 @@
-"""Pose graphs: the poses that fit many measured relative poses best, by Gauss-Newton with conjugate gradients.
+"""Pose graphs: poses that best fit many measured relative poses, by Gauss-Newton with conjugate gradients.
 
 Loops instead of array expressions: Numba compiles them ten times as fast, and they run as fast.
 """
@@ -26,7 +26,7 @@ def _linearise(
     slopes: FloatArray,
     system: FloatArray,
 ) -> None:
-    """Per edge: the Jacobian (3, 6) by its two poses, and (3 residuals, 3 weights after the robust cut)."""
+    """Fill in each edge's Jacobian (3, 6) by its two poses, and its 3 residuals and 3 weights after the robust cut."""
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
         dx, dy = poses[j, 0] - poses[i, 0], poses[j, 1] - poses[i, 1]
@@ -130,7 +130,7 @@ def _product(left: FloatArray, right: FloatArray) -> float:
 
 @kernel("void(float64[:,::1], float64, float64[:,::1])")
 def _follow(direction: FloatArray, share: float, fresh: FloatArray) -> None:
-    """``direction`` = ``fresh`` + ``share`` of what it was."""
+    """``direction`` = ``fresh`` + ``share`` * ``direction``."""
     for i in range(direction.shape[0]):
         for c in range(3):
             direction[i, c] = fresh[i, c] + share * direction[i, c]

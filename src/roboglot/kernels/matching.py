@@ -1,6 +1,6 @@
 """Scan matching by Gauss-Newton: laser points against the surfaces of an occupancy grid, around an odometry prior.
 
-Each point is drawn to a line fitted to the mean hits of the cells around it (moving least squares), so the result is
+Each point is moved onto a line fitted to the mean hits of the cells around it (moving least squares), so the result is
 finer than the cells. Surfaces seen from their other side are ignored: thin walls have two faces.
 """
 
@@ -185,7 +185,7 @@ def gaps(
 ) -> FloatArray:
     """Return how far (m) each point lies off its surface, base_link at the pose, and the surface's weight (n, 2).
 
-    inf and 0: there is none near. The more hits made the surface, the greater is its weight.
+    inf and 0: no surface is near. The weight grows with the number of the surface's hits.
     """
     found, around = np.empty((points.shape[0], 2)), np.empty((1, CELLS, 5))
     cos, sin = np.cos(yaw), np.sin(yaw)

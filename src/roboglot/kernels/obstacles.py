@@ -62,7 +62,7 @@ def _note(
     noted: Int32Array,
     count: int,
 ) -> tuple[int, FloatArray]:
-    """The second half of ``remember``: what is hit."""
+    """Do the second half of ``remember``: note the hits."""
     (height, width), met, echoes = seen.shape, 0, np.empty(ends.shape)
     for i in range(ends.shape[0]):
         if hit[i] == 0:
@@ -84,7 +84,7 @@ def _note(
 
 @kernel("void(float64[:,::1], uint8[::1], float64[::1], float64, float64[:,::1], uint8[::1])")
 def _place(rays: FloatArray, hit: ByteArray, pose: FloatArray, reach: float, ends: FloatArray, near: ByteArray) -> None:
-    """Fill ``ends`` with where ``rays`` (n, 2; base_link) end, seen from the frame of ``pose``, cut at ``reach`` m.
+    """Fill ``ends`` with the ends of ``rays`` (n, 2; base_link) in the frame of ``pose``, cut at ``reach`` m.
 
     ``near`` gets 1 for what was ``hit`` within that.
     """
@@ -187,7 +187,7 @@ def inflated_cost(
 def free_way(path: FloatArray, points: FloatArray, x: float, y: float, radius: float) -> float:
     """Return how far a disc of ``radius`` can go along ``path`` (n, 2; m, dense) before it touches ``points``.
 
-    inf: all the way. Points that it only gets farther from are no hindrance: a robot close to a wall may leave it.
+    inf: all the way. Points from which it only moves away do not count: a robot close to a wall may leave it.
     """
     gone = 0.0
     for i in range(path.shape[0]):
@@ -234,7 +234,7 @@ def nearest_open(cost: SingleArray, row: float, col: float, reach: float) -> Int
 
 @kernel("int16[:,::1](int16[:,::1], int64)")
 def without_things(evidence: Int16Array, size: int) -> Int16Array:
-    """A copy in which everything is free that is occupied, at most ``size`` cells long and wide, and touches nothing.
+    """Return a copy without occupied things that are at most ``size`` cells long and wide and touch nothing else.
 
     What touches: cells with at most one free cell between them belong together, as an echo's neighbours do.
     """
@@ -300,7 +300,7 @@ def reopen(
 
 @kernel("float64(float64[:,::1], float64, int64)")
 def corridor(points: FloatArray, half: float, stretches: int) -> float:
-    """Return the widest gap between what stands to the left and to the right, m; inf: one side is open.
+    """Return the widest gap between obstacles to the left and to the right, m; inf: one side is open.
 
     Of ``points`` (n, 2; base_link, m) those count that lie less than ``half`` m ahead or behind, in so many stretches.
     """

@@ -291,7 +291,7 @@ def rays_of(
     y: float,
     least: float,
 ) -> tuple[FloatArray, ByteArray, FloatArray]:
-    """Return the rays of a scan from (x, y) that say something: ends (n, 2; m), 1 where there was an echo, the echoes.
+    """Return the usable rays of a scan from (x, y): ends (n, 2; m), 1 where there was an echo, the echoes.
 
     An echo lies between ``low`` and ``high``; rays beyond end at ``clear``, others are left out. Nothing is returned
     if less than the share ``least`` of all has an echo.

@@ -150,7 +150,7 @@ def _best_below(
 
 
 class PlaceSearch:
-    """Finds one place after another on the floor, the best first; each away from all that were found before.
+    """Search for one place after another on the floor, best first, each away from all earlier ones.
 
     ``fields``, ``floors``: pyramids of the likelihood field and of where base_link may be; ``offsets``: see above;
     ``apart``: cells and headings within which two places are one.
@@ -162,7 +162,7 @@ class PlaceSearch:
         self._roots: IntArray | None = None
 
     def next(self, enough: int) -> tuple[int, int, int, int]:
-        """(score, heading, row, col) of the next place that scores above ``enough``, no less than asked for before.
+        """Return (score, heading, row, col) of the next place that scores above ``enough``, which must never decrease.
 
         Score 0 if none does.
         """

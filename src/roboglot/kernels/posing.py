@@ -1,4 +1,4 @@
-"""Puts what moves into a picture's scene: many small meshes at once, and the soft shadows under them."""
+"""Moving objects in a picture's scene: many small meshes at once, and the soft shadows under them."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def _light(quad: FloatArray) -> float:
 
 @kernel("void(float64[:,:,::1], float64[:,:,::1], float32[:,::1], int32[::1], float64[:,::1])")
 def pose(corners: FloatArray, mappings: FloatArray, paints: SingleArray, owners: Int32Array, poses: FloatArray) -> None:
-    """Turn, move and light quads in place, each as its owner in ``poses`` (rotation row by row, then where to).
+    """Turn, move and light quads in place, each by its owner's row of ``poses`` (rotation row by row, then position).
 
-    ``corners`` (n, 4, 3), ``mappings`` (n, 3, 3) and ``paints`` (n, 8) as in a Mesh; what glows keeps its light.
+    ``corners`` (n, 4, 3), ``mappings`` (n, 3, 3) and ``paints`` (n, 8) as in a Mesh; glowing quads keep their light.
     """
     for quad in range(len(owners)):
         at = poses[owners[quad]]

@@ -1,5 +1,4 @@
-"""Rasterizer: culls, clips and projects quads and fills a depth buffer with their numbers. No colours
-here.
+"""Rasterizer: culls, clips and projects quads and fills a depth buffer with their numbers, without colours.
 
 Camera frame: x right, y down, z forward. A plane seen through a pixel is linear in 1/z, and texture coordinates times
 1/z are too, so a polygon is kept as eleven coefficients: 1/z = p0 x + p1 y + p2, u = (p3 x + p4 y + p5) z + p6, v = (p7
@@ -18,7 +17,7 @@ NEAR = 0.03  # m in front of the eye
 
 @kernel()
 def _clipped(quad: FloatArray, polygon: FloatArray) -> int:
-    """The part of ``quad`` (4 x 3, camera frame) in front of NEAR into ``polygon``; its number of corners."""
+    """Write the part of ``quad`` (4 x 3, camera frame) in front of NEAR to ``polygon``; return its corners' number."""
     count = 0
     for i in range(4):
         j = (i + 1) & 3
@@ -38,7 +37,7 @@ def _clipped(quad: FloatArray, polygon: FloatArray) -> int:
 def _plane(
     quad: FloatArray, mapping: FloatArray, rotation: FloatArray, eye: FloatArray, lens: FloatArray, plane: FloatArray
 ) -> bool:
-    """The coefficients of a quad's plane; False if it is seen from behind or edge on."""
+    """Fill in the coefficients of a quad's plane; return False if it is seen from behind or edge on."""
     ax, ay, az = quad[1, 0] - quad[0, 0], quad[1, 1] - quad[0, 1], quad[1, 2] - quad[0, 2]
     bx, by, bz = quad[2, 0] - quad[0, 0], quad[2, 1] - quad[0, 1], quad[2, 2] - quad[0, 2]
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
@@ -132,7 +131,7 @@ def draw(
     The k-th drawn one is number first + k in ``seen``; its coefficients are ``planes[first + k]``, its index among the
     quads ``sources[first + k]``. ``mappings``: texture origin and the two axes (1/m) in world. ``lens``: focal length,
     middle x, middle y in pixels. ``depth`` (1/m) and ``seen`` begin with all 0 and ``first`` with FIRST; more can be
-    drawn into them behind what was drawn before. What exceeds ``planes`` is left out.
+    drawn into them behind what was drawn before. Quads beyond the length of ``planes`` are left out.
     """
     height, width = depth.shape
     quad, polygon = np.empty((4, 3)), np.empty((8, 3))

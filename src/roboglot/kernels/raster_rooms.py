@@ -1,4 +1,4 @@
-"""A floor's plan in cells: which cells belong together as a room, and which rooms can be seen from a place."""
+"""A floor's plan in cells: the rooms that connected cells form, and the rooms that are visible from a place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The colours of a picture whose polygons are known pixel by pixel, written as YUV 4:2:0 (BT.601, limited range).
+"""Colours of a picture with a polygon number for each pixel, written as YUV 4:2:0 (BT.601, limited range).
 
 A texture is a mask that mixes two colours: 256 x 256 texels and its smaller copies behind it, each texel (8 bits) with
 its right, upper and upper right neighbour in one number. Coordinates, light and
@@ -178,7 +178,7 @@ def _shadow(cells: ByteArray, frame: FloatArray, u: float, v: float) -> float:
 
 @kernel(inline="always")
 def _run(seen: Uint16Array, y: int, x: int, limit: int) -> int:
-    """Return the end of the run of equal numbers that begins at (x, y), at ``limit`` if not before."""
+    """Return the end of the run of equal numbers that begins at (x, y), at most ``limit``."""
     number, end = seen[y, x], x
     while end + BLOCK <= limit:
         other = np.uint16(0)
@@ -211,7 +211,7 @@ def shade(
     blue: ByteArray,
     red: ByteArray,
 ) -> None:
-    """Colour what ``raster.draw`` found. Planes 0 and 1 are floor and ceiling.
+    """Colour the polygons that ``raster.draw`` found. Planes 0 and 1 are floor and ceiling.
 
     ``sources[k]`` is the row of ``paints`` and ``textures`` (-1: none) of the plane k; for the floor it is the first
     of a row per ground, and ``grounds`` says which ground a cell has. ``shadows``: the floor's brightness per cell.

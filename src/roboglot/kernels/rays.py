@@ -1,5 +1,5 @@
 """Rays in three dimensions against spheres, capsules, cylinders and boxes, exactly, as MuJoCo's own ray casting finds
-them, in a fraction of its time: what lies out of reach is left out once, what lies behind a hit is not looked at.
+them, in a fraction of its time: solids out of reach are left out once, those behind a hit are not tested.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ SPARE = 1e-6  # share of a sphere, and m2, by which a ray must clear it for its 
 
 @kernel("float64(float64, float64, float64)")
 def _first(a: float, b: float, c: float) -> float:
-    """The smaller root that is not negative of a x^2 + 2 b x + c; inf if there is none."""
+    """Return the smaller non-negative root of a x^2 + 2 b x + c; inf if there is none."""
     root = b * b - a * c
     if root < 0.0 or a < 1e-15:
         return np.inf

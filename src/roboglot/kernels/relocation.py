@@ -38,7 +38,7 @@ def correlate(
     turn_step: float,
     edge_cost: float,
 ) -> tuple[float, float, float, float]:
-    """The best of all poses within ``reach`` m (in cells) and ``turn`` rad around ``centre``: x, y, yaw, score 0..1.
+    """Return the best pose within ``reach`` m (in cells) and ``turn`` rad around ``centre``: x, y, yaw, score 0..1.
 
     ``points`` (n, 2) are in base_link, ``centre`` is (x, y from the grid's corner, yaw). A pose at the window's edge
     scores ``edge_cost`` (0..1) less than one in its middle, others by the square of their distance. Ties go to the

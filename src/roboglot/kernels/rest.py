@@ -1,4 +1,4 @@
-"""Gives back to the system what loading compiled kernels has used: pages of LLVM, and free memory of the C library.
+"""Return of memory used for loading compiled kernels to the system: LLVM's pages, and free memory of the C library.
 
 LLVM links the kernels when they are loaded, and is not needed for running them. Its pages are those of a file and never
 written to: a page that is needed again is read anew. Linux only; does nothing elsewhere.
@@ -17,7 +17,7 @@ MAPS = Path("/proc/self/smaps")
 
 
 def rest() -> int:
-    """Give back; returns how many bytes of LLVM's pages that were. May be called while another thread loads."""
+    """Return memory to the system; returns the bytes of LLVM's pages. May be called while another thread loads."""
     if sys.platform != "linux" or not MAPS.exists():
         return 0
     libc = ctypes.CDLL(None, use_errno=True)

@@ -39,7 +39,7 @@ def _trace(came: Int8Array, start: int, goal: int, width: int) -> Int32Array:
 
 @kernel("float64(int64, int64)")
 def _least_cost(rows: int, columns: int) -> float:
-    """Return the least cost of the way over so many rows and columns: octile distance on open floor."""
+    """Return the least cost of a path across this many rows and columns: octile distance on open floor."""
     rows, columns = abs(rows), abs(columns)
     return float(max(rows, columns) + (DIAGONAL - 1.0) * min(rows, columns))
 

@@ -1,4 +1,4 @@
-"""In what order to visit places from the first one: exact for a few, 2-opt and Or-opt beyond; there, or back again."""
+"""Order of visits to places, from the first one: exact for a few, 2-opt and Or-opt beyond; open or closed tours."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _exact(costs: FloatArray, closed: bool) -> IntArray:
 
 @kernel("int64[::1](float64[:,::1])")
 def _nearest_next(costs: FloatArray) -> IntArray:
-    """Always on to the nearest place left."""
+    """Fill in an order that always goes on to the nearest place left."""
     count = costs.shape[0]
     order, left = np.empty(count, np.int64), np.empty(count, np.int64)
     for other in range(count):
@@ -87,7 +87,7 @@ def _swap_runs(order: IntArray, first: int, second: int, end: int) -> None:
 
 @kernel("boolean(float64[:,::1], int64[::1], boolean)")
 def _improve(costs: FloatArray, order: IntArray, closed: bool) -> bool:
-    """One pass of 2-opt and Or-opt over ``order``, in place; whether anything got better. Costs are symmetric."""
+    """Do one pass of 2-opt and Or-opt over ``order``, in place; return True if it improved. Costs are symmetric."""
     count, better = order.shape[0], False
     end = 0 if closed else -1  # the successor of the last place
     for i in range(1, count - 1):
