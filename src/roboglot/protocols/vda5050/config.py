@@ -12,7 +12,7 @@ LEVEL_MAX = 128  # characters per level of a topic
 
 @dataclass(frozen=True, slots=True)
 class Vda5050Config:
-    """The MQTT broker, host or HOST:PORT; empty: no fleet control has the robots. ``version``: "3.0" or "2.1".
+    """The MQTT broker, host or HOST:PORT; empty: no fleet control. ``version``: "3.0" or "2.1".
 
     Topics begin with ``interface``/v3/``manufacturer``/serial number; the serial number is the robot's own, or that of
     ``serials`` by the robot's name. ``map`` is the mapId that orders name. ``tls`` encrypts; ``ca``: the file of the

@@ -97,7 +97,7 @@ class Context:
         self.touch()
 
     def near(self, node: Node) -> bool:
-        """Return whether the robot is where ``node`` is."""
+        """Return True if the robot is within the allowed deviation of ``node``."""
         place = node.node_position
         if place is None or Localization not in self.robot:
             return False
@@ -105,7 +105,7 @@ class Context:
         return bool(pose.point.distance_to(_point(node)) <= max(START_REACH, place.reach))
 
     def take_instant_actions(self, payload: bytes) -> None:
-        """Begin each of the actions; those that cannot be are FAILED, with an error. Raises Rejected."""
+        """Begin each of the actions; those that cannot begin are FAILED, with an error. Raises Rejected."""
         message = self._read(payload, InstantActions)
         self.errors.forget_kind(ErrorKind.INSTANT_ACTION)
         for action in message.actions:
@@ -148,11 +148,11 @@ class Context:
         await self.perform(state, operation, instant=True)
 
     async def perform(self, state: ActionState, operation: Operation[str], *, instant: bool = False) -> None:
-        """Do one action and keep how it goes."""
+        """Do one action and record its state."""
         await self._performer.perform(state, operation, instant=instant)
 
     def answer_retry(self, action_id: str, *, again: bool) -> None:
-        """Try an action in RETRIABLE again, or let it fail. Raises Rejected where none waits."""
+        """Try an action in RETRIABLE again, or let it fail. Raises Rejected if none waits."""
         self._performer.answer(action_id, again=again)
 
     def speed_ratio(self, edge: Edge | None) -> float:
@@ -164,12 +164,12 @@ class Context:
 
     @property
     def needs_base(self) -> bool:
-        """Return whether the robot is at, or on its way to, the last released node of an order that goes on."""
+        """Return True if the robot is at, or drives to, the last released node of an order with a horizon."""
         nodes = self.book.nodes
         return bool(nodes) and sum(node.released for node in nodes) <= 1 and not nodes[-1].released
 
     def pause(self, on: bool) -> None:
-        """Stop driving, or go on."""
+        """Pause or continue driving."""
         self.paused = on
         self._route.pause(on)
         self.touch()
@@ -192,11 +192,11 @@ class Context:
         self.paused = False
 
     def clear_instant_actions(self) -> None:
-        """Forget those that ended."""
+        """Remove ended instant actions."""
         self.instant = {key: state for key, state in self.instant.items() if not state.status.ended}
 
     def release_trigger(self) -> None:
-        """Let go on what waits. Raises Rejected where nothing does."""
+        """Resume the action that waits for the trigger. Raises Rejected if none does."""
         waiting = [
             state
             for state in self.book.actions.values()
@@ -207,7 +207,7 @@ class Context:
         self._trigger.set()
 
     async def wait_for_trigger(self) -> None:
-        """Wait for the trigger, and use it up."""
+        """Wait for the trigger and consume it."""
         self._trigger.clear()
         await self._trigger.wait()
 
@@ -216,7 +216,7 @@ class Context:
         self.book.place_at(node_id, 0)
 
     async def close(self) -> None:
-        """Stop what fleet control had the robot do."""
+        """Stop everything that fleet control began."""
         await self._route.stop()
         for task in self._tasks:
             task.cancel()

@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 
 async def answer(context: Context, name: str, payload: object) -> None:
-    """Do what one message of the topic ``name`` asks for."""
+    """Process one message of the topic ``name``."""
     data = bytes(payload) if isinstance(payload, bytes | bytearray) else str(payload or "").encode()
     tap, began = context.robot.tap, None
     if tap.watched:
@@ -31,7 +31,7 @@ async def answer(context: Context, name: str, payload: object) -> None:
 
 
 async def _refusal(context: Context, name: str, data: bytes) -> Rejected | None:
-    """Run the handler of a message; return why it was not taken, if it was not."""
+    """Run the handler of a message; return the reason of a refusal, if there is one."""
     operation = TABLE.get(name)
     try:
         if operation is None:

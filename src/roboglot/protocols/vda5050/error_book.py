@@ -19,7 +19,7 @@ LEVELS = {FaultLevel.WARNING: Level.WARNING, FaultLevel.ERROR: Level.URGENT, Fau
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """Something wrong, until it is mended: ``order`` ones go with the next order that is taken."""
+    """Error that stays until corrected; with ``order``, until the next accepted order."""
 
     kind: ErrorKind
     level: Level
@@ -29,7 +29,7 @@ class Error:
 
 
 class ErrorBook:
-    """The errors that the state reports; ``changed`` is set with each that comes."""
+    """Errors of the state; ``changed`` is set with each new one."""
 
     def __init__(self, robot: Robot, version: Version, changed: asyncio.Event) -> None:
         self._robot, self._version, self._changed = robot, version, changed
@@ -41,13 +41,13 @@ class ErrorBook:
         yield from self.faults()
 
     def refuse(self, rejected: Rejected, *, order: bool = True) -> None:
-        """Report why a message or an action was not taken."""
+        """Report the reason why a message or an action was refused."""
         self.report(rejected.kind, rejected.level, str(rejected), rejected.references, order=order)
 
     def report(
         self, kind: ErrorKind, level: Level, why: str, references: dict[str, str] | None = None, *, order: bool = True
     ) -> None:
-        """Keep an error, and send it."""
+        """Store an error and send it."""
         error = Error(kind, level, why, tuple((references or {}).items()), order)
         if error not in self._errors:
             self._errors = [*self._errors, error][-ERRORS_MAX:]
@@ -55,7 +55,7 @@ class ErrorBook:
         self._changed.set()
 
     def forget_order(self) -> None:
-        """Drop the errors about the order: another one came, or it is cancelled."""
+        """Drop the errors about the order, which was replaced or cancelled."""
         self._errors = [error for error in self._errors if not error.order]
 
     def forget_kind(self, kind: ErrorKind) -> None:
@@ -63,12 +63,12 @@ class ErrorBook:
         self._errors = [error for error in self._errors if error.kind is not kind]
 
     def forget_action(self, action_id: str) -> None:
-        """Drop the errors about one action: it is tried again."""
+        """Drop the errors about one action, which is tried again."""
         about = ("actionId", action_id)
         self._errors = [error for error in self._errors if about not in error.references]
 
     def faults(self) -> list[Error]:
-        """Return what is wrong with the robot itself now."""
+        """Return the present faults of the robot itself."""
         if Health not in self._robot:
             return []
         return [

@@ -1,4 +1,4 @@
-"""The one place where the model's errors become those of VDA 5050, and what keeps an order from being taken."""
+"""Translation of the model's errors into those of VDA 5050, and the reasons for which an order is refused."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KINDS: dict[type[RobotError], ErrorKind] = {
 
 
 class Rejected(Exception):
-    """A message of fleet control is not taken; ``references`` are the fields that it is about."""
+    """Refused message of fleet control; ``references`` name the fields concerned."""
 
     def __init__(
         self, kind: ErrorKind, why: str, references: Mapping[str, object] = NOTHING, level: Level = Level.WARNING

@@ -16,7 +16,7 @@ LOOK_PERIOD = 2.0  # s of robot time: maximum age of the list of stored maps
 
 
 class Maps:
-    """The maps of one robot. ``own`` is the mapId of what it made itself, or another client loaded."""
+    """Maps of one robot. ``own`` is the mapId of a map that it made itself or that another client loaded."""
 
     def __init__(self, robot: Robot, own: str) -> None:
         self._robot, self._own = robot, own
@@ -26,14 +26,14 @@ class Maps:
         self._loads = 0  # our own loads whose MapReplaced is still to come
 
     async def look(self) -> None:
-        """Read the names of the kept maps, if that is long ago."""
+        """Read the names of the stored maps, if the last time is long ago."""
         now = self._robot.clock.time()
         if MapLibrary in self._robot and now - self._looked_at >= LOOK_PERIOD:
             self._looked_at = now
             self._names = tuple(await self._robot[MapLibrary].names())
 
     async def follow(self) -> None:
-        """Note, for ever, when another client has the robot use another map."""
+        """Track, without end, changes of the map by other clients."""
         with self._robot.events.subscribe(MapReplaced) as replaced:
             while True:
                 event = await replaced.next()
@@ -43,18 +43,18 @@ class Maps:
                     self.in_use = self._own
 
     async def kept(self, name: str, version: str) -> StoredMap:
-        """Return a map of the library. Raises NotFound, also for a version: one map is kept of each name."""
+        """Return a stored map. Raises NotFound, also for any version: one map is stored under each name."""
         if version:
             raise NotFound(f"there is no version {version!r}: maps here have none, mapVersion is empty")
         return await self._robot[MapLibrary].get(name)
 
     def use(self, stored: StoredMap, pose: Pose) -> None:
-        """Use a map from now on, with the robot at ``pose`` in it. Raises what ``Mapping.load`` raises."""
+        """Use a map from now on, with the robot at ``pose`` in it. Raises the errors of ``Mapping.load``."""
         self._load(stored, pose)
         self.in_use = stored.name
 
     async def change(self, stored: StoredMap) -> None:
-        """Use a map, and find the robot in it; where that fails, the map in use stays, and why is raised."""
+        """Use a map and localize the robot in it; if that fails, keep the map in use and raise the reason."""
         robot = self._robot
         grid, pose = robot[Mapping].grid, robot[Localization].pose
         copied = OccupancyGrid(grid.log_odds.copy(), grid.resolution, grid.origin)
@@ -72,12 +72,12 @@ class Maps:
         self.in_use = stored.name
 
     async def remove(self, name: str) -> None:
-        """Forget a kept map. Raises NotFound."""
+        """Delete a stored map. Raises NotFound."""
         await self._robot[MapLibrary].remove(name)
         self._looked_at = float("-inf")
 
     def listed(self) -> dict[str, object]:
-        """Return the state's ``maps``; nothing for a robot that keeps none."""
+        """Return the state's ``maps``; nothing for a robot that stores none."""
         if MapLibrary not in self._robot:
             return {}
         names = dict.fromkeys((self.in_use, *self._names))

@@ -1,4 +1,4 @@
-"""The order that the robot holds: which messages it takes, what is left to do, how its actions are.
+"""The robot's order: rules for accepting messages, remaining nodes and edges, states of actions.
 
 Follows chapter 6.1 of the standard. Knows no robot and no clock: who drives says what was reached.
 """
@@ -30,13 +30,13 @@ class ActionStatus(StrEnum):
 
     @property
     def ended(self) -> bool:
-        """True if nothing more will happen."""
+        """True if the action has ended."""
         return self in (ActionStatus.FINISHED, ActionStatus.FAILED)
 
 
 @dataclass(slots=True)
 class ActionState:
-    """One action and how it went."""
+    """State of one action."""
 
     action: Action
     status: ActionStatus = ActionStatus.WAITING
@@ -75,7 +75,7 @@ class OrderBook:
                 yield edges.get(node.sequence_id - 1), node
 
     def take(self, order: OrderMessage, near: Callable[[Node], bool]) -> bool:
-        """Take an order or an update; False if it is the one that is held. Raises Rejected, and changes nothing."""
+        """Accept an order or an update; False if it is the current one. Raises Rejected, and then changes nothing."""
         known = {"orderId": order.order_id, "orderUpdateId": order.order_update_id}
         if order.order_id != self.order_id:
             self._check_new(order, near, known)
@@ -140,13 +140,13 @@ class OrderBook:
         self.edges = [edge for edge in self.edges if edge.released]
 
     def _released(self, action: Action) -> bool:
-        """Return whether an action is no longer part of the horizon."""
+        """Return True if an action is no longer part of the horizon."""
         parts: tuple[OrderPart, ...] = (*self.nodes, *self.edges)
         horizon = [part for part in parts if not part.released]
         return not any(action.action_id == other.action_id for part in horizon for other in part.actions)
 
     def pass_node(self, node: Node) -> None:
-        """Note that the robot is at ``node``, and all before it are behind."""
+        """Note that the robot is at ``node`` and has passed all nodes before it."""
         self.nodes = [left for left in self.nodes if left.sequence_id > node.sequence_id]
         self.edges = [left for left in self.edges if left.sequence_id > node.sequence_id]
         self.place_at(node.node_id, node.sequence_id)
@@ -157,7 +157,7 @@ class OrderBook:
 
     @property
     def way_since_node(self) -> float | None:
-        """Metres driven since the last node; None if there was none."""
+        """Distance driven since the last node (m); None before the first node."""
         return None if self.placed_at is None else self.measure() - self.placed_at
 
     def drop_rest(self) -> None:

@@ -1,4 +1,4 @@
-"""Check of orders: can this robot drive it and do its actions? Asked of each message before anything begins."""
+"""Check of each order, before it begins: can this robot drive it and do its actions?"""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 
 def check_order(order: OrderMessage, robot: Robot, version: Version, map_id: str) -> None:
-    """Raise Rejected for what this robot cannot use or do."""
+    """Raise Rejected for fields that this robot cannot use and actions that it cannot do."""
     if order.zone_set_id:
         raise _unsupported("this robot uses no zones", {"zoneSetId": order.zone_set_id})
     for node in order.nodes:

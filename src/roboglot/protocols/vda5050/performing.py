@@ -1,4 +1,4 @@
-"""Does the actions of orders and instant actions: their states and errors, and another try where one is wanted."""
+"""Execution of actions of orders and instant actions, with their states, errors and retries."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class Performing(Protocol):
     errors: ErrorBook
 
     def touch(self) -> None:
-        """Have the state sent."""
+        """Schedule a state message."""
 
     def check(self, operation: str, right: Right | None) -> None:
-        """Raise Rejected unless the client has the right."""
+        """Raise Rejected unless fleet control has the right."""
 
 
 async def ended(action: RobotAction) -> None:
@@ -62,7 +62,7 @@ class Performer:
             await self._try(state, operation, instant)
 
     def answer(self, action_id: str, *, again: bool) -> None:
-        """Try an action in RETRIABLE again, or let it fail. Raises Rejected where none waits."""
+        """Try an action in RETRIABLE again, or let it fail. Raises Rejected if none waits."""
         asked = self._asked.get(action_id)
         if asked is None or asked.done():
             why = f"no action {action_id} waits to be retried"

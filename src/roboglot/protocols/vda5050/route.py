@@ -1,4 +1,4 @@
-"""Drives the base of an order: from node to node by the robot's navigation, with the actions at the nodes."""
+"""Drive along the base of an order: from node to node by the robot's navigation, with the actions at the nodes."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Driven(Protocol):
     paused: bool
 
     def touch(self) -> None:
-        """Have the state sent."""
+        """Schedule a state message."""
 
     def check(self, operation: str, right: Right | None) -> None:
         """Raise Rejected unless fleet control has the right."""
@@ -85,18 +85,18 @@ class Route:
         self._more = asyncio.Event()
 
     def begin(self, first: Node) -> None:
-        """Drive a new order, whose first node is where the robot is."""
+        """Drive a new order, which begins at the robot's place."""
         self._more.clear()
         self._task = asyncio.get_running_loop().create_task(self._guarded(first))
 
     def go_on(self) -> None:
-        """Look at the order again: there is more of it."""
+        """Continue with an extended order."""
         self._more.set()
         if self._task is None or self._task.done():
             self._task = asyncio.get_running_loop().create_task(self._guarded(None))
 
     def pause(self, on: bool) -> None:
-        """Hold where the robot is, or go on."""
+        """Pause in place, or continue."""
         if not on:
             self._more.set()
         if self._driving is not None:
@@ -106,7 +106,7 @@ class Route:
                 self._driving.resume()
 
     async def stop(self) -> None:
-        """End all; returns when the robot stands."""
+        """End the drive; returns when the robot stands."""
         doomed = [task for task in (self._task, *self._beside) if task is not None and not task.done()]
         for task in doomed:
             task.cancel()
@@ -117,7 +117,7 @@ class Route:
         self._task = self._driving = None
 
     async def _guarded(self, first: Node | None) -> None:
-        """Drive, and say so if driving breaks: an order must not come to rest in silence."""
+        """Drive, and report an unexpected error: an order must not stop silently."""
         try:
             await self._run(first)
         except Exception as error:
@@ -144,7 +144,7 @@ class Route:
         self._context.touch()
 
     def _next_leg(self) -> Leg | None:
-        """Return the nodes up to the next where the robot has something to do, wants a heading or another speed."""
+        """Return the nodes up to the next one with actions, a heading or another speed."""
         leg = Leg()
         for edge, node in self._context.book.base:
             speed = self._context.speed_ratio(edge)
@@ -157,7 +157,7 @@ class Route:
         return leg if leg.nodes else None
 
     async def _drive(self, leg: Leg) -> bool:
-        """Drive it and pass its nodes; False, with an error, where the order cannot go on."""
+        """Drive the leg and pass its nodes; False, with an error, if the order cannot go on."""
         context = self._context
         try:
             context.check("order", Right.DRIVE)
@@ -194,7 +194,7 @@ class Route:
         return max(before, now)
 
     def _give_up(self, node: Node, error: RobotError) -> None:
-        """The order cannot go on; it is kept until fleet control cancels it."""
+        """Report that the order cannot go on; it is kept until fleet control cancels it."""
         book = self._context.book
         references = {"orderId": book.order_id, "orderUpdateId": str(book.update_id), "nodeId": node.node_id}
         self._context.errors.report(kind_of(error), Level.CRITICAL, str(error), references)
@@ -227,6 +227,6 @@ class Route:
 
 
 def _reached(action: RobotAction, count: int) -> int:
-    """Return how many of ``count`` goals the navigation has behind it."""
+    """Return how many of ``count`` goals the navigation has passed."""
     feedback = action.feedback
     return count - len(feedback.milestones) if isinstance(feedback, NavigationFeedback) else 0

@@ -1,4 +1,4 @@
-"""The door: dials the MQTT broker, and dials again; takes messages from there and sends what the robot has to say."""
+"""The door: connects to the MQTT broker, again and again; receives messages and sends the robot's."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ HEARD = {"v2": ("order", "instantActions"), "v3": ("order", "instantActions", "z
 
 
 class SwitchedOff(Exception):
-    """The robot was switched off; the door dials again when it is on."""
+    """Robot was switched off; the door connects again when it is on."""
 
 
 class Vda5050Door:
@@ -74,7 +74,7 @@ class Vda5050Door:
         return f"{config.interface}/{self._version.level}/{_level(config.manufacturer)}/{self._serial}/{name}"
 
     async def start(self) -> None:
-        """Begin to dial. Raises MissingExtra without aiomqtt."""
+        """Begin to connect. Raises MissingExtra without aiomqtt."""
         if self._config.broker:
             with explaining("the VDA 5050 door", "vda5050"):
                 import aiomqtt  # noqa: F401 - said now rather than at the first try
@@ -82,7 +82,7 @@ class Vda5050Door:
             self._context.run_beside(self._context.maps.follow())
 
     async def close(self) -> None:
-        """Say OFFLINE, and stop what fleet control began."""
+        """Send OFFLINE, and stop everything that fleet control began."""
         await self._context.close()
         if self._client is not None:
             with contextlib.suppress(Exception):
@@ -112,7 +112,7 @@ class Vda5050Door:
             await asyncio.sleep(RETRY)  # noqa: TID251 - the broker's time, not the robot's
 
     async def _serve(self, host: str, port: int) -> None:
-        """One connection: hear and speak until it breaks."""
+        """Receive and send over one connection until it breaks."""
         import aiomqtt
 
         config = self._config
@@ -161,7 +161,7 @@ class Vda5050Door:
         ask_for(f"{self.name} {address.rpartition(':')[0]}", address, who)
 
     async def _report(self) -> None:
-        """Send the state whenever it changed, and now and then."""
+        """Send the state after each change and periodically."""
         async for now in self._robot.clock.every(LOOK_PERIOD):
             if self._rests and self._context.hibernating:
                 continue
@@ -200,7 +200,7 @@ class Vda5050Door:
 
     @contextlib.asynccontextmanager
     async def _surviving(self, name: str) -> AsyncIterator[None]:
-        """Log what breaks one message and go on with the next; a broken link ends the connection instead."""
+        """Log an unexpected error of one message and go on with the next; a broken link ends the connection instead."""
         import aiomqtt
 
         try:
@@ -215,7 +215,7 @@ class Vda5050Door:
         return Power in self._robot and self._robot[Power].mode is PowerMode.OFF
 
     def _state(self) -> dict[str, object]:
-        """Return all that the robot says about itself."""
+        """Return the state message's fields."""
         robot, context, version = self._robot, self._context, self._version
         own = vocabulary.action_states(context.book.actions.values(), version)
         instant = vocabulary.action_states(context.instant.values(), version)
@@ -280,7 +280,7 @@ class Vda5050Door:
 
 
 async def _until_one_ends(*jobs: Awaitable[None]) -> None:
-    """Run all until the first ends, end the others, and raise what it raised."""
+    """Run all until the first ends, end the others, and raise the first one's error."""
     tasks = [asyncio.ensure_future(job) for job in jobs]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -298,7 +298,7 @@ def _level(text: str) -> str:
 
 
 def _coarse(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what counts as a change: all but where it is, how fast, and small changes of the charge."""
+    """Return the state without pose, speed and small changes of the charge, to detect changes."""
     fine = ("agvPosition", "mobileRobotPosition", "velocity", "powerSupply", "batteryState", "distanceSinceLastNode")
     battery = state.get("powerSupply") or state.get("batteryState") or {}
     charge = battery.get("stateOfCharge", battery.get("batteryCharge", 0.0))

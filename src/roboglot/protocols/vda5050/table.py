@@ -84,7 +84,7 @@ class Messages:
 
     @staticmethod
     def partly() -> dict[str, str]:
-        """Return nothing: no row is there in part."""
+        """Return no rows: none is implemented in part."""
         return {}
 
 

@@ -36,7 +36,7 @@ def timestamp(epoch: float) -> str:
 
 
 def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
-    """Return where the robot is, under the version's name; nothing for a robot that cannot know, or was never heard."""
+    """Return the robot's position under the version's name; nothing without localization or before the first report."""
     if Localization not in robot or not was_heard(robot):
         return {}
     localization = robot[Localization]
@@ -56,7 +56,7 @@ def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
 
 
 def velocity(robot: Robot) -> dict[str, object]:
-    """Return how the robot moves, in its own axes."""
+    """Return the robot's velocity in base_link."""
     if Odometry not in robot or not was_heard(robot):
         return {}
     twist = robot[Odometry].reading.twist
@@ -64,7 +64,7 @@ def velocity(robot: Robot) -> dict[str, object]:
 
 
 def is_driving(robot: Robot) -> bool:
-    """Return whether it moves over the floor or turns, for any client."""
+    """Return True if the robot moves or turns, for any client."""
     if Odometry not in robot:
         return False
     twist = robot[Odometry].reading.twist
@@ -102,7 +102,7 @@ def safety(robot: Robot, version: Version) -> dict[str, object]:
 
 
 def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, object]:
-    """Return what the jack carries, with what fleet control said of it; nothing for a robot without a jack."""
+    """Return the jack's load, with fleet control's own data about it; nothing for a robot without a jack."""
     if Jack not in robot:
         return {}
     return {"loads": [{**known, "loadPosition": JACK_POSITION}] if robot[Jack].loaded else []}
@@ -131,7 +131,7 @@ def _edge(edge: Edge) -> dict[str, object]:
 
 
 def action_states(states: Iterable[ActionState], version: Version) -> list[dict[str, Any]]:
-    """Return how actions are."""
+    """Return the states of actions."""
     result = "actionResult" if version.new_words else "resultDescription"
     return [
         {"actionId": state.action.action_id, "actionType": state.action.action_type, "actionStatus": state.status.value}
@@ -141,7 +141,7 @@ def action_states(states: Iterable[ActionState], version: Version) -> list[dict[
 
 
 def factsheet(robot: Robot, version: Version, state_period: float, visualization_period: float) -> dict[str, object]:
-    """Return what fleet control may know of the robot beforehand."""
+    """Return the factsheet, which describes the robot before any order."""
     new, plate = version.new_words, robot.description
     limits = robot[Base].limits if Base in robot else None
     speed = limits.twist.x if limits else 0.0

@@ -1,4 +1,4 @@
-"""Occupancy of the robot's place by its map: a wall, something drawn, a forbidden area."""
+"""Occupancy of the robot's place by its map: a wall, a virtual wall, a forbidden area."""
 
 from __future__ import annotations
 

@@ -142,14 +142,14 @@ def floors_of(composite: CompositeMap) -> list[FloorMap]:
 
 
 def _check_size(composite: CompositeMap) -> None:
-    """Raise BadMap for more than can be read in a few seconds."""
+    """Raise BadMap for a file too large to be read in a few seconds."""
     drawn = sum(len(layer.payload) for layer in composite.layers if layer.metadata.get("usage") in DRAWN_USAGES)
     if drawn > DRAWN_BYTES_MAX:
         raise BadMap(f"{drawn} bytes of places, lines and areas: at most {DRAWN_BYTES_MAX}")
 
 
 def _bounded(floors: Iterable[FloorMap]) -> list[FloorMap]:
-    """Return the floors. Raises BadMap if too much is drawn on them."""
+    """Return the floors. Raises BadMap for too many drawings."""
     read, count = [], 0
     for floor in floors:
         notes = floor.annotations

@@ -89,7 +89,7 @@ class MapKeeper:
         return all(part in self._robot for part in needed) and self.status is not MapLoadStatus.LOADING
 
     def export(self) -> bytes:
-        """The map in memory as a composite map. Refused while one is being loaded."""
+        """Return the map in memory as a composite map. Refused while a map is being loaded."""
         if self._loading:
             raise Refused("a map is being loaded")
         robot = self._robot
@@ -107,19 +107,19 @@ class MapKeeper:
             await self._use(floor, pose, self._put_drawings(floor, {}))  # the present drawings belong to no file
 
     async def upload(self, data: bytes) -> None:
-        """Keep the file on disk as it is, without loading it. Raises InvalidGoal unless it is a composite map."""
+        """Store the file on disk unchanged, without loading it. Raises InvalidGoal unless it is a composite map."""
         await self._parse(data)
         async with self._turn:
             await self._robot[FileStore].write(FILE, data)
 
     async def delete(self) -> None:
-        """Forget the file; the map in memory stays. Nothing happens if there is none."""
+        """Delete the file, if there is one; the map in memory stays."""
         async with self._turn:
             with contextlib.suppress(NotFound):
                 await self._robot[FileStore].remove(FILE)
 
     async def save(self) -> None:
-        """Memory to disk. Refused where the file has several floors: the others would be lost."""
+        """Save the map in memory to disk. Refused if the file has several floors, as the others would be lost."""
         async with self._turn:
             if (floors := await self._count_saved_floors()) > 1:
                 raise Refused(f"the saved map has {floors} floors, but only one is in memory")
@@ -139,7 +139,7 @@ class MapKeeper:
             return 0
 
     async def sync(self) -> None:
-        """Save and reload; the grid stays as it is, for it is the same."""
+        """Save and reload; the grid in memory stays, as it is the same."""
         await self.save()
         data = await self._robot[FileStore].read(FILE)
         self.floors, self._loaded = tuple(await self._parse(data)), _digest(data)
@@ -171,7 +171,7 @@ class MapKeeper:
             self.floors, self._loaded, self.status = tuple(floors), digest, MapLoadStatus.LOADED
 
     async def _fetch(self) -> None:
-        """The cloud's map to the disk, if it has another one."""
+        """Store the cloud's map on disk, if it differs."""
         data = self._cloud.map()
         if data is None:
             return
@@ -188,7 +188,7 @@ class MapKeeper:
         self._synced()
 
     async def enter(self, building: str, floor: str, pose: Pose | None) -> None:
-        """Use the map of another loaded floor, with what was drawn on it last. NotFound if there is none."""
+        """Use the map of another loaded floor, with its last drawings. Raises NotFound."""
         for loaded in self.floors:
             if (loaded.name.building, loaded.name.floor) == (building, floor):
                 async with self._turn:
@@ -197,7 +197,7 @@ class MapKeeper:
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
 
     async def _parse(self, data: bytes) -> list[FloorMap]:
-        """The floors in a file, which may take seconds for a hostile one: other requests do not wait for it."""
+        """Return the floors in a file, in a thread: a hostile file may take seconds."""
         if isinstance(self._robot.clock, LockstepClock):
             return _parsed(data)
         return await asyncio.to_thread(_parsed, data)
@@ -243,7 +243,7 @@ class MapKeeper:
             self._layers = ()
 
     async def move_origin(self, origin: Point) -> None:
-        """Move what is drawn in memory to the new origin; the grid's origin has been moved already."""
+        """Move the drawings in memory to the new origin; the grid's origin has been moved already."""
         async with self._turn:
             basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in self._basis.items()}
             await self._robot[MapMemory].replace(
@@ -270,7 +270,7 @@ class MapKeeper:
             others[last] = seen_from(Point(-shift[0], -shift[1]), now)
 
     async def _others(self) -> dict[str, Drawings]:
-        """Return what is drawn on the other floors, by their ids, where the robot was since the map was loaded."""
+        """Return the drawings, by id, of other floors that the robot has visited since the map was loaded."""
         try:
             return msgspec.json.decode(await self._robot[FileStore].read(DRAWN), type=dict[str, Drawings])
         except NotFound:
@@ -282,7 +282,7 @@ class MapKeeper:
 
 
 def _replacement(floor: FloorMap, basis: dict[str, Sequence[float]], drawn: dict[str, Drawings]) -> Replacement:
-    """Return what was ``drawn`` on ``floor``, else what the file has there; the others are kept."""
+    """Return the ``drawn`` lines and areas of ``floor``, else those of the file; other floors keep theirs."""
     left = dict(drawn)
     here = left.pop(floor.name.map_id, Drawings(floor.places, floor.annotations))
     return Replacement(here, {BASIS: basis, FLOOR: floor.name.map_id}, {DRAWN: _encoded(left)})
