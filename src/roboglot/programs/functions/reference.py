@@ -13,7 +13,8 @@ from roboglot.programs.functions.table import ABILITIES
 
 _HEAD = """# Functions of robot programs
 
-For authors of block programs who look up a function.
+For authors of block programs who look up a function. After this page you know its parameters, and have an example
+that runs.
 
 Made from the declarations by `python -m roboglot.programs.functions.reference docs/reference/programs.md`.
 How the language looks is in [programs](../programs/programs.md), what the functions do with the robot in
