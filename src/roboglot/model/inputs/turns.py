@@ -14,6 +14,7 @@ from collections.abc import Callable
 log = logging.getLogger(__name__)
 WINDOW = 0.1  # s
 PART = 0.5  # of a window, for the requests of all clients
+LIMIT = PART * WINDOW  # s
 ACTIVE_SECONDS = 1.0  # since its last request a client counts as one that wants its part
 LOG_SECONDS = 10.0  # between two log lines on one client
 HANDSHAKE_GAP = 0.02  # s between the beginnings of two handshakes with TLS, which hold the thread for a third of it
@@ -26,18 +27,14 @@ class Share:
 
     __slots__ = ("host", "last", "name", "named", "used", "window")
 
-    def __init__(self, name: str, host: Share | None) -> None:
-        self.name, self.host = name, host
+    def __init__(self, name: str, host: Share | None = None) -> None:
+        """``host``: the share of all connections of its host; None: this is one."""
+        self.name = name
+        self.host = host or self
         self.last = 0.0  # time of the last request
         self.named = -LOG_SECONDS  # time of the last log line
         self.used = 0.0  # s in the window of that number
         self.window = 0
-
-    def add(self, seconds: float, window: int) -> None:
-        """Count what a request took."""
-        if self.window != window:
-            self.window, self.used = window, 0.0
-        self.used += seconds
 
 
 class Turns:
@@ -58,19 +55,18 @@ class Turns:
             if len(self._shares) >= CLIENTS_MAX:
                 self._forget()
             name = peer.rpartition(":")[0]
-            host = self._hosts.setdefault(name, Share(name, None))
+            host = self._hosts.setdefault(name, Share(name))
             share = self._shares[peer] = Share(peer, host)
         return share
 
     def wait(self, share: Share) -> float:
         """Return the seconds until a client may have its next answer; the log names one that waits."""
         now = self.now()
-        assert share.host is not None
         share.last = share.host.last = now
         if now >= self._end:
             self._window += 1
             self._end, self._total, self._connections = now + WINDOW, 0.0, 0
-        if self._total < PART * WINDOW or not self._is_over(share, now):
+        if self._total < LIMIT or not self._is_over(share, now):
             return 0.0
         if now - share.host.named >= LOG_SECONDS:
             share.host.named = now
@@ -83,10 +79,15 @@ class Turns:
 
     def took(self, share: Share, seconds: float) -> None:
         """Count a request that took ``seconds``."""
-        seconds = min(seconds, COST_MAX)
-        assert share.host is not None
-        share.add(seconds, self._window)
-        share.host.add(seconds, self._window)
+        window, host = self._window, share.host
+        if seconds > COST_MAX:
+            seconds = COST_MAX
+        if share.window != window:
+            share.window, share.used = window, 0.0
+            if host.window != window:
+                host.window, host.used = window, 0.0
+        share.used += seconds
+        host.used += seconds
         self._total += seconds
 
     def wait_to_dial(self) -> float:
@@ -102,9 +103,8 @@ class Turns:
             recent = now - ACTIVE_SECONDS
             self._connections = sum(each.last >= recent for each in self._shares.values())
             self._clients = sum(each.last >= recent for each in self._hosts.values())
-        assert share.host is not None
         return any(
-            count > 1 and each.window == self._window and each.used > PART * WINDOW / count
+            count > 1 and each.window == self._window and each.used > LIMIT / count
             for each, count in ((share, self._connections), (share.host, self._clients))
         )
 
