@@ -251,7 +251,7 @@ class RobotAdmission(Admission):
         right = right or Right.ADMIN
         self._needs[operation] = right
         if right not in self._rights.get(who, NOTHING):
-            why = f"{who or 'somebody without a name'} has no right to {right} on robot {self._name}"
+            why = f"{who or 'a client without a name'} has no right to {right} on robot {self._name}"
         elif not self._guard.requests.take(who):
             why = f"{who} sends more than {self._guard.config.requests} requests a second"
         else:

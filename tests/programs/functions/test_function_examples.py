@@ -41,12 +41,12 @@ OTHERS = sorted(set(EXAMPLES) - set(WITH_PEOPLE) - set(WITH_MAP) - set(MOTIONS))
 HALVES = [0, pytest.param(1, marks=pytest.mark.slow)]
 HAPPENINGS: dict[str, Callable[[World], object]] = {
     "": lambda _world: None,
-    "somebody holds a thumb up": lambda world: world.hands.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
-    "somebody holds a flat hand up": lambda world: world.hands.person("anna").gesture(Gesture.STOP, seconds=3),
-    "somebody does squats": lambda world: world.hands.person("anna").do_sport(Sport.SQUAT, count=5, period=2.0),
-    "somebody says 暂停任务": lambda world: world.hands.person("anna").say("暂停任务"),
+    "a person holds a thumb up": lambda world: world.hands.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
+    "a person holds a flat hand up": lambda world: world.hands.person("anna").gesture(Gesture.STOP, seconds=3),
+    "a person does squats": lambda world: world.hands.person("anna").do_sport(Sport.SQUAT, count=5, period=2.0),
+    "a person says 暂停任务": lambda world: world.hands.person("anna").say("暂停任务"),
     "Anna says something": lambda world: world.hands.person("anna").say("good morning"),
-    "somebody touches it twice": lambda world: world.hands.touch("a", TouchKind.DOUBLE),
+    "a person touches it twice": lambda world: world.hands.touch("a", TouchKind.DOUBLE),
 }
 
 
