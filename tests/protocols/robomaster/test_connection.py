@@ -301,7 +301,7 @@ async def test_a_taken_address_is_named(door, robot) -> None:
 
 
 async def test_an_address_that_is_none_is_reported(robot) -> None:
-    with pytest.raises(OSError, match="no-such-host is no IPv4 address"):
+    with pytest.raises(OSError, match="no-such-host is not an IPv4 address"):
         await RoboMasterDoor(robot, "no-such-host", RoboMasterConfig(control_port=0, event_port=0)).start()
 
 
