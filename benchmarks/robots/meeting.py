@@ -124,7 +124,7 @@ def main(options: argparse.Namespace) -> None:
         if there:
             report(there, claims, Path(world).stem)
     report(list(results.values()), claims, "all")
-    print(f"{options.scenarios - sum(seed in results for seed in missing)} of them were kept in {kept}")
+    print(f"\n{len(results)} scenarios are kept in {kept}")
     claims.finish()
 
 
