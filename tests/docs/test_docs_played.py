@@ -185,7 +185,7 @@ async def test_page_of_access_lets_in_and_throws_out(tmp_path: Path) -> None:
 
         verified = await user.type(".venv/bin/roboglot audit --verify")
         assert verified.status == 0, verified
-        assert "rows, whole" in verified.said
+        assert "rows are intact" in verified.said
         answered = await user.type(".venv/bin/roboglot doctor --security")
         assert "shift-lead" in answered.said
         assert token not in answered.said

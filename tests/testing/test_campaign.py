@@ -173,7 +173,7 @@ def test_a_trial_played_again_leaves_one_row(tmp_path: Path) -> None:
 def test_other_tables_and_other_scenarios_are_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text("a,b\n1,2")  # its last line is incomplete
-    with pytest.raises(OtherCampaign, match="no table of a campaign"):
+    with pytest.raises(OtherCampaign, match="not a table of a campaign"):
         Table(path)
     assert path.read_text() == "a,b\n1,2"
     path.unlink()

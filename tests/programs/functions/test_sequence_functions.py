@@ -126,7 +126,7 @@ def refused() -> list[tuple[Record, str]]:
     """Sequences that make no sense, and words of the answer to each."""
     return [
         (sequence(name="2 hops"), "name"),
-        (sequence(), "has paces"),
+        (sequence(), "needs paces"),
         (sequence({"landing_gain": 1.6}), "landing_gain"),
         (sequence({"friction_coefficient": 0.0}), "friction"),
         (sequence({"duration": -1}), "too long or too fast"),

@@ -91,7 +91,7 @@ async def test_unreadable_requests_are_answered_in_band(sent, client, messages, 
     with caplog.at_level("INFO"):
         (said,) = await client.send("sendMsg", sent)
     assert messages.RecResponse.FromString(said) == messages.RecResponse(nameCode=0, data='{"error_code":323}')
-    assert "cannot read a request of 127.0.0.1: it is no SendRequest, or its params are not UTF-8" in caplog.text
+    assert "cannot read a request of 127.0.0.1: it is not a SendRequest, or its params are not UTF-8" in caplog.text
     (chunk,) = await client.send("getFile", sent)
     assert messages.FileChunk.FromString(chunk).error_code == FileError.ARGUMENTS
     with pytest.raises(grpc.aio.AioRpcError) as caught:

@@ -257,7 +257,7 @@ async def test_after_the_end_it_begins_anew(playing: Scene, film: Path) -> None:
 @pytest.mark.parametrize(
     ("command", "speed", "why"),
     [
-        (7, 1.0, "played (0) or paused (1)"),
+        (7, 1.0, "0 (play) or 1 (pause)"),
         (0, 0.0, "times as fast"),
         (0, float("nan"), "times as fast"),
         (0, 1e6, "times as fast"),

@@ -46,7 +46,7 @@ async def test_strangers_are_cut_off_on_every_port(door, robot, caplog, port: st
             assert await cut_off(reader), name
             writer.transport.abort()
             spoken = name if name in ("TLS", "SSH") else "HTTP"
-            assert f"speaks {spoken} on port {port_of(door, port)}: nothing of it was run" in caplog.text
+            assert f"speaks {spoken} on port {port_of(door, port)}: no command was run" in caplog.text
     assert not door.context.active
     assert robot.actions.running() == []
     assert robot[InputDevice].state.keys == ()
