@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -322,7 +322,7 @@ def test_counts_are_written_while_other_rows_come(monkeypatch: pytest.MonkeyPatc
             self.rows: list[Entry] = []
             self.done = threading.Event()
 
-        def add(self, entries: list[Entry]) -> None:
+        def add(self, entries: Sequence[Entry]) -> None:
             self.rows += entries
             if len(self.rows) >= 100 or self.counted:
                 self.done.set()
@@ -334,7 +334,7 @@ def test_counts_are_written_while_other_rows_come(monkeypatch: pytest.MonkeyPatc
             return any(row.who == "anna" and row.at == 0.5 for row in self.rows)
 
     busy = Busy()
-    kept = audit.Audit(busy)  # type: ignore[arg-type]
+    kept = audit.Audit(busy)
     kept.note(Entry(0.0, "anna", "", "a", "robomaster", "chassis speed", "done"))
     kept.note(Entry(0.5, "anna", "", "a", "robomaster", "chassis speed", "done"))
     assert busy.done.wait(10.0)

@@ -61,8 +61,8 @@ async def tunnels(port: int, drives: Callable[[], bool] = lambda: False) -> Asyn
     server = await loop.create_server(accepted, "127.0.0.1", 0)
     _, near = await loop.create_connection(TunnelLink, *server.sockets[0].getsockname())
 
-    async def opened(_: int, protocol: object) -> object:
-        return await loop.create_connection(protocol, "127.0.0.1", port)  # type: ignore[arg-type, call-overload, type-var]
+    async def opened(_: int, protocol: Callable[[], asyncio.Protocol]) -> object:
+        return await loop.create_connection(protocol, "127.0.0.1", port)
 
     far = Tunnel(await made, first=2, opened=opened, datagram=lambda *_: None, drives=drives)
     own = Tunnel(near, first=1, opened=opened, datagram=lambda *_: None)

@@ -295,7 +295,7 @@ def test_rows_not_written_at_end_are_counted(tmp_path: Path, caplog: pytest.LogC
         def add(self, _: object) -> None:
             raise DatabaseError("nobody there")
 
-    ended = Audit(Gone())  # type: ignore[arg-type]
+    ended = Audit(Gone())
     ended.note(note(1))
     ended.close()
     assert caplog.records[-1].getMessage() == "1 rows of the audit are lost: nobody there"

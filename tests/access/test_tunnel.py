@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from ipaddress import ip_address
 from pathlib import Path
+from typing import Any, NoReturn
 
 import httpx
 import pytest
@@ -58,7 +59,8 @@ async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a"
     link = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
     opened: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
     running = asyncio.ensure_future(link.run(lambda ports, _fingerprint, _new: opened.set_result(ports)))
-    await asyncio.wait([opened, running], return_when=asyncio.FIRST_COMPLETED)  # type: ignore[type-var]
+    waited: tuple[asyncio.Future[Any], ...] = opened, running
+    await asyncio.wait(waited, return_when=asyncio.FIRST_COMPLETED)
     if running.done():
         await running
     yield await opened
@@ -135,10 +137,14 @@ async def test_a_silent_end_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     server = await asyncio.start_server(lambda _reader, writer: writers.append(writer), "127.0.0.1", 0)
     _, link = await asyncio.get_running_loop().create_connection(TunnelLink, *server.sockets[0].getsockname())
     quiet = asyncio.Event()
+
+    async def refused(_port: int, _protocol: object) -> NoReturn:
+        raise ConnectionRefusedError
+
     tunnel = carrying.Tunnel(
         link,
         first=1,
-        opened=lambda _port, _protocol: None,  # type: ignore[arg-type,return-value]
+        opened=refused,
         datagram=lambda _port, _data: None,
         quiet=quiet.set,
     )

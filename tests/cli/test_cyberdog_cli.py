@@ -26,10 +26,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
     port = str(free_port())
     arguments = ("--robot", "a=cyberdog2", "--world", "playground", "--app", f"127.0.0.1:{port}")
 
-    def command(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
+    def command(*words: str, cwd: str | None = None, input: str | None = None) -> subprocess.CompletedProcess[str]:
         line = [sys.executable, "-m", "roboglot", "cyberdog", *words, "--app-port", port, "--robot", ADDRESS]
         environment = {**os.environ, "ROBOGLOT_DATA": str(data)}
-        return subprocess.run(line, capture_output=True, text=True, timeout=180, env=environment, **more)  # type: ignore[call-overload]
+        return subprocess.run(line, capture_output=True, text=True, timeout=180, env=environment, cwd=cwd, input=input)
 
     with served(data, *arguments, address=ADDRESS):
         wait_for_map()

@@ -7,6 +7,7 @@ import dataclasses
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
@@ -28,6 +29,8 @@ from tests.drivers.bad_link import Connect
 from tests.drivers.chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
 from tests.drivers.pace import settle
 from tests.drivers.rig import Rig, rig, time_passes
+
+Profile = Literal["spec", "fw60", "fw70"]
 
 
 @pytest.fixture
@@ -104,15 +107,15 @@ async def text_door() -> AsyncIterator[Open]:
 
 
 @pytest.fixture
-def profile() -> str:
+def profile() -> Profile:
     """Return the profile of the text protocol: the manual's."""
     return "spec"
 
 
 @pytest.fixture
-async def ep_door(profile: str, robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
+async def ep_door(profile: Profile, robot: Robot, forward: Forward) -> AsyncIterator[RoboMasterDoor]:
     """The simulated robot behind the text protocol."""
-    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=profile))  # type: ignore[arg-type]
+    door = RoboMasterDoor(robot, EP_ADDRESS, dataclasses.replace(ep_config(), profile=profile))
     await door.start()
     yield door
     await door.close()

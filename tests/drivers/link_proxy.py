@@ -26,7 +26,7 @@ class Fault:
 
     def heal(self) -> None:
         """End all faults."""
-        self.__init__()  # type: ignore[misc]
+        vars(self).update(vars(Fault()))
 
 
 class Proxy:

@@ -83,7 +83,10 @@ class Stage:
                         await self._answer(run, event, session, played, coming)
                     case Finished() | Failed():
                         played.ending = played.ending or event
-            played.said = [event.text if isinstance(event, Spoke) else event.name for event in heard.drain()]  # type: ignore[attr-defined]
+            for sounded in heard.drain():
+                match sounded:
+                    case Spoke(text=said) | SoundPlayed(name=said):
+                        played.said.append(said)
         session.cancel("the program has ended")
         played.seconds = self._clock.time() - start
         return played

@@ -10,6 +10,7 @@ import grpc
 import httpx
 import pytest
 
+from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.model.components.motion.navigation import Navigation
 from roboglot.model.errors import NotReady
 from roboglot.model.robot import Robot
@@ -33,7 +34,9 @@ MOVE_BY = {"action_name": "slamtec.agent.actions.MoveByAction", "options": {"dir
 
 @pytest.fixture
 def warming_up(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
-    course = robot[Navigation]._course  # type: ignore[attr-defined]
+    navigation = robot[Navigation]
+    assert isinstance(navigation, GridNavigation)
+    course = navigation._course
     monkeypatch.setattr(course, "planner", None)
     monkeypatch.setattr(course, "unavailable", NotReady("navigation is warming up: its kernels are being compiled"))
 

@@ -127,10 +127,14 @@ async def test_transactions_together_share_a_flush_and_no_failure(open_database:
 
         return work
 
-    commits = []
-    await database.run(lambda connection: connection.set_trace_callback(lambda sql: commits.append(sql == "COMMIT")))  # type: ignore[attr-defined]
+    def trace(connection: Connection, callback: Callable[[str], object] | None) -> None:
+        assert isinstance(connection, sqlite3.Connection)
+        connection.set_trace_callback(callback)
+
+    commits: list[bool] = []
+    await database.run(lambda connection: trace(connection, lambda sql: commits.append(sql == "COMMIT")))
     results = await asyncio.gather(*(database.run_together(write(n)) for n in range(40)), return_exceptions=True)
-    await database.run(lambda connection: connection.set_trace_callback(None))  # type: ignore[attr-defined]
+    await database.run(lambda connection: trace(connection, None))
     assert [n for n, result in enumerate(results) if isinstance(result, RuntimeError)] == list(range(3, 40, 7))
     settings = StoredSettings(open_database(), "a")
     assert [n for n in range(40) if settings.get(f"k{n}") is not None] == done

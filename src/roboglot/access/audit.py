@@ -11,9 +11,10 @@ import math
 import queue
 import threading
 import time
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
-from roboglot.access.trail import Entry, Trail
+from roboglot.access.trail import Entry
 from roboglot.storage.transactions import DatabaseError, DiskFull
 
 log = logging.getLogger(__name__)
@@ -24,6 +25,13 @@ AGAIN_SECONDS = 1.0  # between two attempts to write them
 REPEATED_WITHIN = 1.0  # s within which an equal row is counted instead of written again
 KINDS_MAX = 1024  # different rows whose repetitions are counted at the same time
 CLOSE_SECONDS = 5.0
+
+
+class Rows(Protocol):
+    """Keeper of rows: a ``Trail``."""
+
+    def add(self, entries: Sequence[Entry], /) -> None:
+        """Store rows before it returns. Raises DatabaseError, DiskFull."""
 
 
 class _Kind(NamedTuple):
@@ -37,7 +45,7 @@ class _Kind(NamedTuple):
 class Audit:
     """Writes to ``trail``: ``note`` from any thread, ``close`` at the end. The trail stays open."""
 
-    def __init__(self, trail: Trail) -> None:
+    def __init__(self, trail: Rows) -> None:
         self._queue: queue.SimpleQueue[Entry | None] = queue.SimpleQueue()
         self._trail = trail
         self._kinds: dict[tuple[str, ...], _Kind] = {}

@@ -103,6 +103,12 @@ class SlowLegs(Legs):
 SlowLegs.__abstractmethods__ = frozenset()  # other abilities of legs do not matter here
 
 
+def slow_legs(robot: Robot, posture: Posture) -> SlowLegs:
+    legs = SlowLegs(robot, posture)  # type: ignore[abstract]
+    robot.add(Legs, legs)
+    return legs
+
+
 @pytest.fixture
 def clock() -> LockstepClock:
     return LockstepClock()
@@ -261,7 +267,7 @@ async def test_a_paused_move_holds_and_goes_on(carted: Robot, cart: Cart, clock:
 
 
 async def test_emergency_stop_lasts_until_someone_says_stand_up(carted: Robot, clock: LockstepClock) -> None:
-    legs = carted.add(Legs, SlowLegs(carted, Posture.LIMP))  # type: ignore[abstract]
+    legs = slow_legs(carted, Posture.LIMP)
     for _ in range(3):  # a joystick keeps sending
         with pytest.raises(EmergencyStopped):
             carted[Driving].drive(Twist(x=0.5))
@@ -273,7 +279,7 @@ async def test_emergency_stop_lasts_until_someone_says_stand_up(carted: Robot, c
 
 
 async def test_a_lying_robot_stands_up_first(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
-    carted.add(Legs, SlowLegs(carted, Posture.LYING))  # type: ignore[abstract]
+    slow_legs(carted, Posture.LYING)
     action = carted[Driving].move_by(Pose(x=0.5), source="door")
     await clock.advance(1.9)
     assert action.status is ActionStatus.ACCEPTED
@@ -284,7 +290,7 @@ async def test_a_lying_robot_stands_up_first(carted: Robot, cart: Cart, clock: L
 
 
 async def test_who_cannot_stand_up_does_not_drive(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
-    carted.add(Legs, SlowLegs(carted, Posture.LYING))  # type: ignore[abstract]
+    slow_legs(carted, Posture.LYING)
     action = carted[Driving].drive(Twist(x=0.5), source="door")
     await clock.advance(1.0)
     carted.actions.running("legs")[0].cancel()

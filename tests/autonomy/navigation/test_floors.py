@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 import pytest
@@ -112,21 +112,27 @@ async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:
     assert tour.truth.x > 2.4
 
 
+class Where(TypedDict, total=False):
+    """Options of a fault."""
+
+    floor: int
+
+
 @pytest.mark.slow  # the ride itself: test_up_and_down_with_maps_and_docks
 @pytest.mark.parametrize(
     ("fault", "options", "stage", "floor"),
     [
-        ("lift_occupied", {}, RideStage.BOARDING, 0),
-        ("lift_door_blocked", {}, RideStage.BOARDING, 0),
-        ("lift_door_blocked", {"floor": 1}, RideStage.LEAVING, 1),
+        ("lift_occupied", Where(), RideStage.BOARDING, 0),
+        ("lift_door_blocked", Where(), RideStage.BOARDING, 0),
+        ("lift_door_blocked", Where(floor=1), RideStage.LEAVING, 1),
     ],
 )
 async def test_a_ride_that_is_in_somebodys_way(
-    tour: Tour, fault: str, options: dict[str, int], stage: RideStage, floor: int
+    tour: Tour, fault: str, options: Where, stage: RideStage, floor: int
 ) -> None:
     say_where_the_lift_is(tour)
     await tour.go((2.7, 10.0), deg=180)
-    (blocked,) = tour.world.faults.inject(fault, **options)  # type: ignore[arg-type]
+    (blocked,) = tour.world.faults.inject(fault, **options)
     action = await tour.end_of(tour.robot[Floors].ride(1), 400.0)
     assert isinstance(action.error, Blocked), action.reason
     assert action.feedback is stage

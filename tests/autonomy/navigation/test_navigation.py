@@ -67,12 +67,17 @@ async def test_several_goals_in_turn_are_all_passed(tour: Tour) -> None:
 @pytest.mark.world("empty")
 async def test_feedback_counts_down(tour: Tour) -> None:
     reported: list[NavigationFeedback] = []
-    tour.robot.events.listen(ActionChanged, lambda event: reported.append(event.action.feedback))  # type: ignore[arg-type]
+
+    def report(event: ActionChanged) -> None:
+        if isinstance(event.action.feedback, NavigationFeedback):
+            reported.append(event.action.feedback)
+
+    tour.robot.events.listen(ActionChanged, report)
     action = await tour.go((6.0, 5.0), deg=90.0)
-    stages = [feedback.stage for feedback in reported if feedback]
+    stages = [feedback.stage for feedback in reported]
     assert stages[0] == "planning"
     assert [s for s in stages if s != "planning"] == sorted(s for s in stages if s != "planning")  # driving, turning
-    lengths = [feedback.remaining.length for feedback in reported if feedback and feedback.stage == "driving"]
+    lengths = [feedback.remaining.length for feedback in reported if feedback.stage == "driving"]
     assert lengths == sorted(lengths, reverse=True)
     assert lengths[0] == pytest.approx(tour.start.distance_to(Point(6.0, 5.0)), abs=0.3)
     assert action.status is ActionStatus.SUCCEEDED

@@ -34,20 +34,17 @@ pytestmark = pytest.mark.world("empty")
 
 async def draw(tour: Tour, *entries: Line | Area) -> None:
     """Annotations given in the world."""
-    placed = [
-        replace(
-            entry,
-            start=tour.on_map(entry.start.x, entry.start.y),
-            end=tour.on_map(entry.end.x, entry.end.y),
-            **(
-                {"control": tuple(tour.on_map(p.x, p.y) for p in entry.control)}  # type: ignore[arg-type]
-                if isinstance(entry, Line) and entry.control
-                else {}
-            ),
-        )
-        for entry in entries
-    ]
+    placed = [placed_in(tour, entry) for entry in entries]
     await tour.robot[MapAnnotations].change(lambda now: now.with_new(*placed))
+
+
+def placed_in(tour: Tour, entry: Line | Area) -> Line | Area:
+    """The entry in the robot's map."""
+    start, end = tour.on_map(entry.start.x, entry.start.y), tour.on_map(entry.end.x, entry.end.y)
+    if isinstance(entry, Line) and entry.control:
+        first, second = (tour.on_map(p.x, p.y) for p in entry.control)
+        return replace(entry, start=start, end=end, control=(first, second))
+    return replace(entry, start=start, end=end)
 
 
 def wall(x0: float, y0: float, x1: float, y1: float) -> Line:
@@ -59,8 +56,8 @@ def track(x0: float, y0: float, x1: float, y1: float, *control: tuple[float, flo
     return Line(0, LineKind.TRACK, Point(x0, y0), Point(x1, y1), bent)
 
 
-def area(kind: AreaKind, x: float, y: float, half: float, **more: float) -> Area:
-    return Area(0, kind, Point(x - half, y), Point(x + half, y), half, **more)  # type: ignore[arg-type]
+def area(kind: AreaKind, x: float, y: float, half: float, speed_max: float | None = None) -> Area:
+    return Area(0, kind, Point(x - half, y), Point(x + half, y), half, speed_max=speed_max)
 
 
 async def watched(tour: Tour, action: Action) -> list[Pose]:

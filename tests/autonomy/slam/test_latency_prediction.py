@@ -6,7 +6,7 @@ import pytest
 
 from roboglot.autonomy.navigation.latency_prediction import Foresight
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.geometry import ORIGIN, Pose, Twist
 from roboglot.testing import assert_pose
 
@@ -15,7 +15,20 @@ class _Base(Base):
     """Late by ``delay``; moves nothing."""
 
     delay = 0.3
-    set_velocity = set_wheel_speeds = wheel_speeds = velocity = None  # type: ignore[assignment]
+
+    def set_velocity(self, twist: Twist) -> None:
+        raise NotImplementedError
+
+    def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
+        raise NotImplementedError
+
+    @property
+    def wheel_speeds(self) -> WheelSpeeds:
+        raise NotImplementedError
+
+    @property
+    def velocity(self) -> Twist:
+        raise NotImplementedError
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from roboglot.clients.errors import BadAnswer, LinkLost
 from roboglot.wire.cyberdog.codes import Accepted, Code, TaskResult
 
 Said = Mapping[str, int] | str | None  # None: the stream breaks
+Streams = list[tuple[Code, list[Said]]]
 BEGUN: list[Said] = [{"accepted": Accepted.YES}, {"feedback_code": 300}]
 
 
@@ -36,16 +37,23 @@ def talking(streams: Iterator[tuple[Code, list[Said]]]) -> CyberDogClient:
 
 async def test_a_task_whose_stream_breaks_is_joined_again() -> None:
     end: list[Said] = [{"accepted": Accepted.YES}, {"feedback_code": 308}, {"result": TaskResult.SUCCESS}]
-    streams = [(Code.START_TASK, [*BEGUN, None]), (Code.JOIN_TASK, [None]), (Code.JOIN_TASK, end)]
+    streams: Streams = [
+        (Code.START_TASK, [*BEGUN, None]),
+        (Code.JOIN_TASK, [None]),
+        (Code.JOIN_TASK, end),
+    ]
     heard: list[int] = []
-    task = await talking(iter(streams)).navigate(1.0, 0.0, on_feedback=heard.append)  # type: ignore[arg-type]
+    task = await talking(iter(streams)).navigate(1.0, 0.0, on_feedback=heard.append)
     await task
     assert heard == [300, 308]
 
 
 async def test_task_that_vanished_has_not_succeeded() -> None:
-    streams = [(Code.START_TASK, [*BEGUN, None]), (Code.JOIN_TASK, [{"accepted": Accepted.NOTHING_TO_JOIN}])]
-    task = await talking(iter(streams)).navigate(1.0, 0.0)  # type: ignore[arg-type]
+    streams: Streams = [
+        (Code.START_TASK, [*BEGUN, None]),
+        (Code.JOIN_TASK, [{"accepted": Accepted.NOTHING_TO_JOIN}]),
+    ]
+    task = await talking(iter(streams)).navigate(1.0, 0.0)
     with pytest.raises(TaskFailed) as failed:
         await task
     assert failed.value.feedback == 300

@@ -11,6 +11,7 @@ Client = RoboMasterClient
 BUILDS = pytest.mark.parametrize("profile", ["spec", "fw60", "fw70"], indirect=True)
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
+ARM = (5, 4)
 CALLS: dict[str, tuple[Callable[[Client], Awaitable[object]], object]] = {
     "command": (lambda c: c.command(), None),
     "robot mode": (lambda c: c.robot.mode("free"), None),
@@ -56,7 +57,7 @@ CALLS: dict[str, tuple[Callable[[Client], Awaitable[object]], object]] = {
     "servo recenter": (lambda c: c.servo.recenter(1), None),
     "servo angle ?": (lambda c: c.servo.get_angle(1), float),
     "robotic_arm move": (lambda c: c.robotic_arm.move(1, 0), None),
-    "robotic_arm moveto": (lambda c: c.robotic_arm.moveto(*ARM), None),  # type: ignore[has-type]
+    "robotic_arm moveto": (lambda c: c.robotic_arm.moveto(*ARM), None),
     "robotic_arm recenter": (lambda c: c.robotic_arm.recenter(wait=True), None),
     "robotic_arm stop": (lambda c: c.robotic_arm.stop(), None),
     "robotic_arm position ?": (lambda c: c.robotic_arm.get_position(), "ArmPosition"),
@@ -76,7 +77,6 @@ CALLS: dict[str, tuple[Callable[[Client], Awaitable[object]], object]] = {
     "version": (lambda c: c.version(), str),
     "quit": (lambda c: c.quit(), None),
 }
-ARM = (5, 4)
 MESSAGES = {row.key for row in contract("robomaster") if row.key.startswith("> ")}
 
 

@@ -50,9 +50,9 @@ async def fake():
 
 
 @pytest.fixture
-async def faked(fake, clock: LockstepClock):
+async def faked(fake, clock: LockstepClock, monkeypatch: pytest.MonkeyPatch):
     client = RoboMasterClient("127.0.0.1", clock=clock, ports=Ports(control=fake.port, event=fake.port, push=1))
-    client._events.open = lambda _host: asyncio.sleep(0)  # type: ignore[assignment, method-assign]
+    monkeypatch.setattr(client._events, "open", lambda _host: asyncio.sleep(0))
     await client.connect()
     yield client
     await client.close()

@@ -26,6 +26,7 @@ from roboglot.model.events import ArmorHit
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
 from roboglot.simulation.components.interaction.armor import SimulatedArmor
+from roboglot.simulation.components.sensing.camera import SimulatedCamera
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from tests.drivers.chain import Open, Script
@@ -212,7 +213,9 @@ async def test_pictures_come_through(driven_ep: Robot, robot: Robot, forward: Fo
     assert (frame.width, frame.height) == (real.width, real.height)
     assert abs(frame.luma.astype(int) - real.luma).mean() < 12
     await forward(seconds=0.2)
-    assert not robot[Camera]._feed.viewers  # type: ignore[attr-defined]  # no one looks: the robot films no more
+    simulated = robot[Camera]
+    assert isinstance(simulated, SimulatedCamera)
+    assert not simulated._feed.viewers  # no one looks: the robot films no more
     camera.set_exposure(-0.8)
     await forward(seconds=0.1)
     assert (camera.exposure, robot[Camera].exposure) == (-1.0, -1.0)

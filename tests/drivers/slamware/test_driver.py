@@ -10,6 +10,7 @@ import pytest
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.config import RobotConfig
 from roboglot.drivers.slamware.capabilities import APPROXIMATIONS
+from roboglot.drivers.slamware.chapters.motion.base import SlamwareBase
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
@@ -153,7 +154,9 @@ async def test_limit_of_killed_program_is_restored_next_time(
         first.robots["b"][Driving].drive(Twist(x=0.1), source="test")
         await forward(seconds=1)
         dead = SlamwareClient("127.0.0.1", 9, clock=clock)  # a killed program sends nothing more
-        first.robots["b"][Base]._limit_restore._client = dead  # type: ignore[attr-defined]
+        base = first.robots["b"][Base]
+        assert isinstance(base, SlamwareBase)
+        base._limit_restore._client = dead
         await first.close()
         dead.close()
         assert float(await other.get_system_parameter("base.max_moving_speed")) == pytest.approx(0.1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -28,14 +29,20 @@ STANDING: list[tuple[str, int]] = [("1111", 1)]
 TROT = [("0110", 6), ("1111", 1), ("1001", 6), ("1111", 1)]
 
 
+def record(kind: str, **fields: object) -> Any:
+    """A new record of the language, whose constructor is made with its class."""
+    make: Callable[..., object] = RECORDS.class_of(kind)
+    return make(**fields)
+
+
 def sequence(*paces: dict[str, Any], name: str = "hop", gaits: list[tuple[str, int]] = STANDING) -> Record:
     """A sequence as the worker sends it; a gait lists standing feet in the order of FEET, and 30 ms units."""
-    made: Any = RECORDS.class_of("MotionSequence")(name=name)  # type: ignore[call-arg]
+    made = record("MotionSequence", name=name)
     for down, duration in gaits:
         fields = {foot: int(digit) for foot, digit in zip(FEET, down, strict=True)}
-        made.gait_list.push_back(RECORDS.class_of("MotionSequenceGait")(duration=duration, **fields))  # type: ignore[call-arg]
+        made.gait_list.push_back(record("MotionSequenceGait", duration=duration, **fields))
     for pace in paces:
-        meta: Any = RECORDS.class_of("MotionSequencePace")()
+        meta = record("MotionSequencePace")
         for path, value in pace.items():
             *way, last = path.split("__")
             part = meta

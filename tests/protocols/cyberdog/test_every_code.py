@@ -22,7 +22,7 @@ def numbers(names: frozenset[str]) -> set[int]:
             continue
         for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(function, ast.Call) and _name(function.func) in names:
-                found |= {node.value for node in function.args if _is_number(node)}  # type: ignore[attr-defined]
+                found |= {number for node in function.args if (number := _number(node)) is not None}
     return found
 
 
@@ -33,8 +33,11 @@ def _name(function: ast.expr) -> str:
     return ""
 
 
-def _is_number(node: ast.expr) -> bool:
-    return isinstance(node, ast.Constant) and type(node.value) is int
+def _number(node: ast.expr) -> int | None:
+    match node:
+        case ast.Constant(value=int(number)) if not isinstance(number, bool):
+            return number
+    return None
 
 
 def test_every_request_is_sent_and_every_push_read() -> None:

@@ -86,11 +86,12 @@ def dog_of_no_robot() -> Any:
         def forget(self) -> None:
             """Do nothing: no robot is known."""
 
+    known = Robot("a", plate, LockstepClock())
+
     class Context:
-        robot = Robot("a", plate, LockstepClock())
+        robot, gaits = known, Gaits(known)
         app, tasks, stored_map, pursuit, relay, address, files = Silent(), Tasks(), "", None, None, "", None
 
-    Context.gaits = Gaits(Context.robot)  # type: ignore[attr-defined]
     return Context()
 
 

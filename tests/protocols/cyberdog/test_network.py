@@ -21,11 +21,11 @@ from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from tests.drivers.link_proxy import Fault, Proxy
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, Stream, context_of, state
-from tests.protocols.cyberdog.test_upkeep import FILE, MD5, MODULE
+from tests.protocols.cyberdog.test_upkeep import MD5, module
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")
 Passing = Callable[[Callable[[], object]], Awaitable[None]]
-SMALL = {**MODULE, "latest": {**MODULE["latest"], "packages": [{**FILE, "fileSize": 20_000_000}]}}  # type: ignore[dict-item]
+SMALL = module(fileSize=20_000_000)
 
 
 @dataclass

@@ -28,13 +28,21 @@ from tests.protocols.cyberdog.phone import ADDRESS, App, answered, until
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 MD5 = "0123456789abcdef0123456789abcdef"
 FILE = {"version": "1.3.2.0", "type": "FULL_PACKAGE", "md5": MD5, "fileSize": 100_000_000, "fileName": "dog.zip"}
-MODULE = {
-    "product": "l91",
-    "device": "l91.NX",
-    "module": "l91.NX.OTA",
-    "current": {"version": None},
-    "latest": {"version": "1.3.2.0", "packages": [FILE], "forceUpdateFlag": False},
-}
+
+
+def module(**changes: object) -> dict[str, object]:
+    """An update as the app describes it; ``changes`` of its package."""
+    package = {**FILE, **changes}
+    return {
+        "product": "l91",
+        "device": "l91.NX",
+        "module": "l91.NX.OTA",
+        "current": {"version": None},
+        "latest": {"version": "1.3.2.0", "packages": [package], "forceUpdateFlag": False},
+    }
+
+
+MODULE = module()
 
 
 async def test_low_power_is_left_on_request(client, robot, forward) -> None:
@@ -162,7 +170,7 @@ async def test_an_update_that_cannot_be(client, app, robot, passing, forward) ->
     await client.ask(10001)
     await passing(lambda: app.connected)
     assert await client.ask(5003, {"modules": [{"module": "x"}]}) == {"error_code": 323}
-    broken = {**MODULE, "latest": {**MODULE["latest"], "packages": [{**FILE, "md5": "short"}]}}  # type: ignore[dict-item]
+    broken = module(md5="short")
     assert await client.ask(5003, {"modules": [broken]}) == {"response": False, "code": 5710}
     robot[Disk].rubbish = robot[Disk].free - 1000
     assert await client.ask(5003, {"modules": MODULE}) == {"response": True, "code": 0}

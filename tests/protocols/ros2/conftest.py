@@ -68,7 +68,8 @@ class Peer:
 
     def graph(self) -> list[list[str]]:
         """Return the known tokens, each cut at its slashes."""
-        return [str(reply.ok.key_expr).split("/") for reply in self.session.liveliness().get("@ros2_lv/0/**")]  # type: ignore[union-attr]
+        replies = self.session.liveliness().get("@ros2_lv/0/**")
+        return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok is not None]
 
     async def until(self, true: Callable[[], object], seconds: float = 0.0) -> None:
         """Wait until that is so; robot time passes too, at most ``seconds`` of it."""

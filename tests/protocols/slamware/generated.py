@@ -243,8 +243,8 @@ class Generator:
         if isinstance(value, list):
             if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", 1 << 30):
                 return f"{path}: {len(value)} entries"
-            misfits = (self.misfit(entry, schema.get("items", {}), f"{path}[]", more=more) for entry in value)  # type: ignore[assignment]
-            return next(filter(None, misfits), "")
+            found = (self.misfit(entry, schema.get("items", {}), f"{path}[]", more=more) for entry in value)
+            return next(filter(None, found), "")
         return self._object_misfit(value, schema, path, more) if isinstance(value, dict) else ""
 
     def _object_misfit(self, value: dict[str, Any], schema: Schema, path: str, anything: bool) -> str:

@@ -12,6 +12,7 @@ import subprocess
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -94,15 +95,15 @@ async def _clear(one: Yard, number: int) -> None:
 
 def _orders(count: int) -> list[dict[str, object]]:
     """That many random orders; their number, and so the sample, is always the same."""
-    made: list[dict[str, object]] = []
+    made: list[dict[str, Any]] = []
 
     @settings(max_examples=count // 10 + 1, database=None, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(st.lists(valid_orders(), min_size=10, max_size=10))
-    def collect(orders: list[dict[str, object]]) -> None:
+    def collect(orders: list[dict[str, Any]]) -> None:
         made.extend(orders)
 
     while len(made) < count:
         collect()
     for order in made[::3]:  # the others start too far away
-        order["nodes"][0]["nodePosition"] |= {"x": 0.0, "y": 0.0, "allowedDeviationXY": 2.0}  # type: ignore[index]
+        order["nodes"][0]["nodePosition"] |= {"x": 0.0, "y": 0.0, "allowedDeviationXY": 2.0}
     return made[:count]

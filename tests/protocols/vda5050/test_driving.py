@@ -13,6 +13,7 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import PERSON, Lease
 from roboglot.model.geometry import Twist
 from roboglot.protocols.vda5050 import vocabulary
+from roboglot.protocols.vda5050.server import Vda5050Door
 from tests.protocols.vda5050.conftest import Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
 
@@ -174,12 +175,13 @@ async def test_the_broker_says_when_the_robot_is_gone(yard: Opened) -> None:
 async def test_a_message_that_breaks_the_door_ends_nothing(yard: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
     one = await yard()
     (door,) = one.runtime.doors["a"]._doors
+    assert isinstance(door, Vda5050Door)
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("a defect")
 
     with monkeypatch.context() as patch:
-        patch.setattr(door._context, "check", broken)  # type: ignore[attr-defined]
+        patch.setattr(door._context, "check", broken)
         one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
         await one.until(lambda: any("broke" in e["errorDescription"] for e in one.control.state["errors"]))
     one.control.send("order", order("two", [(0, 0), (0.5, 0)]))

@@ -71,7 +71,10 @@ def main(ip: str) -> None:  # noqa: PLR0915 - one tour
     seen["fire"] = robot.blaster_fire()
     print("TOUCH ME", flush=True)
     events.work()
-    seen["event"] = dataclasses.astuple(happened.get())  # type: ignore[call-overload]
+    event = happened.get()
+    assert dataclasses.is_dataclass(event)
+    assert not isinstance(event, type)
+    seen["event"] = dataclasses.astuple(event)
     events._conn.close()
 
     seen["audio"] = [robot.audio(True), robot.audio(False)]

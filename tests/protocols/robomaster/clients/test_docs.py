@@ -93,7 +93,9 @@ async def test_the_transcripts_are_true(
         events._buffer.clear()
         return [*said, *pushes.texts(), *(text.replace(ADDRESS, "127.0.0.1") for text in broadcasts.texts())]
 
-    wrong, reported, answer = [], [], ""
+    wrong: list[tuple[str, ...]] = []
+    reported: list[str] = []
+    answer = ""
     for line in transcripts(page)[index]:
         kind, _, text = line.partition(" ")
         match kind:
@@ -106,7 +108,7 @@ async def test_the_transcripts_are_true(
                 assert waited or text in CAUSES, text
                 reported = await reported_meanwhile(CAUSES.get(text, "time"), float(waited[1]) if waited else 3)
             case "*":
-                wrong += [] if any(alike(text, each) for each in reported) else [(line, *sorted(reported)[:9])]  # type: ignore[list-item]
+                wrong += [] if any(alike(text, each) for each in reported) else [(line, *sorted(reported)[:9])]
             case _:
                 raise AssertionError(line)
     assert not wrong

@@ -128,7 +128,10 @@ async def test_a_cabinet_that_gives_nothing(screen: Screen, cloud: Path) -> None
 @pytest.mark.slow  # a long story; in short: test_a_task_of_a_cabinet
 async def test_an_industrial_round(screen: Screen, cloud: Path) -> None:
     await screen.prepare(saw=(1.5, 0.0, ""), press=(3.0, 0.0, ""))
-    targets = [{"target_name": "saw", "action": "load", "wait_time": 20}, {"target_name": "press", "action": "unload"}]
+    targets: list[dict[str, object]] = [
+        {"target_name": "saw", "action": "load", "wait_time": 20},
+        {"target_name": "press", "action": "unload"},
+    ]
     give(cloud, "round", type="INDUSTRY", task_targets=targets, order_id="r-1")
     seen: list[str] = []
     for _ in range(90):
@@ -146,7 +149,7 @@ async def test_an_industrial_round(screen: Screen, cloud: Path) -> None:
     ]
     assert_pose(screen.pose, x=3.0, y=0.0, within=0.15)
     assert (task["task"]["type"], task["task"]["order_id"], task["status"]) == ("INDUSTRY", "r-1", "RUNNING")
-    assert task["task"]["task_targets"] == [targets[0], targets[1] | {"wait_time": 0}]  # type: ignore[operator]
+    assert task["task"]["task_targets"] == [targets[0], targets[1] | {"wait_time": 0}]
     assert (await screen.client.get(INDUSTRY, params={"type": "carry_calling"})).json() == []
     assert (await screen.client.get(f"{API}/tasks")).json() == []
     assert await screen.say("end_operation") == 204

@@ -22,7 +22,7 @@ ACTIONS = f"{MOTION}/actions"
 FIRMWARE_4, FIRMWARE_6 = "slamtec.agent.actions.", "agent.actions."
 
 
-async def start(client: httpx.AsyncClient, name: str, prefix: str = FIRMWARE_4, **options: object) -> Any:
+async def start(client: httpx.AsyncClient, name: str, prefix: str = FIRMWARE_4, /, **options: object) -> Any:
     """POST the action and check the answer's form."""
     reply = await client.post(ACTIONS, json={"action_name": prefix + name, "options": options})
     assert reply.status_code == 200, reply.text
