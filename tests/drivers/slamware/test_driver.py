@@ -257,7 +257,7 @@ async def test_the_lease_tells_who_moves_the_robot(
 async def test_what_it_cannot_do_is_refused(driven: Robot) -> None:
     with pytest.raises(Refused, match="one by one"):
         driven[Driving].drive(WheelSpeeds(1, 1, 1, 1), source="test")
-    with pytest.raises(Refused, match="where it is"):
+    with pytest.raises(Refused, match="present place"):
         await driven[Navigation].plan(Point(5, 5), Point(0, 0))
 
 
