@@ -322,7 +322,7 @@ async def test_address_that_is_no_cloud_is_reported_plainly(cloud: Cloud) -> Non
     server = await asyncio.start_server(chatty, HOST, 0)
     link = CloudLink(f"http://{HOST}:{server.sockets[0].getsockname()[1]}", "t", "a")
     words = [b"HTTP/1.1 200 OK\r\n\r\nhello", b"220 mail"]
-    for message in ("no answer of a cloud", "no HTTP"):
+    for message in ("no answer of a cloud", "does not speak HTTP"):
         with pytest.raises(BadAnswer, match=message):
             await link.post("{}")
     server.close()
