@@ -12,7 +12,7 @@ import platform
 import re
 from collections.abc import Awaitable, Mapping, Sequence
 from datetime import UTC, datetime
-from time import perf_counter
+from time import perf_counter, thread_time
 from typing import TYPE_CHECKING
 
 from roboglot.autonomy import Autonomy
@@ -36,7 +36,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.components.system.ledger import Ledger
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.geometry import Pose
-from roboglot.model.inputs.turns import Turns
+from roboglot.model.inputs.fairness import Fairness
 from roboglot.model.robot import Description, Robot
 from roboglot.model.stand_in import StandIn
 from roboglot.simulation.bodies.files import body_source
@@ -114,7 +114,8 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
     """Build all robots of the configuration in ``world`` (a name or path). Raises ValueError in plain words."""
     placements = [_placement(robot) for robot in robots if robot.is_simulated]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
-    turns = None if isinstance(clock, LockstepClock) else Turns(perf_counter)  # lockstep answers in order
+    in_order = isinstance(clock, LockstepClock)  # time waits for every answer
+    fairness = None if in_order else Fairness(perf_counter, thread_time)
     built, drivers = dict[str, Robot](), Drivers(own=frozenset(robot.address for robot in robots))
     for config in robots:
         with concerning(config.name):
@@ -133,7 +134,7 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
                 robot[TrafficRadio].priority = config.priority
             _add_memory(robot, clock, database)
             robot.add(Lease, Lease(robot))
-            robot.turns = turns
+            robot.fairness = fairness
     return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers.all)
 
 

@@ -12,8 +12,8 @@ from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.events import EventStream
+from roboglot.model.inputs.fairness import Fairness
 from roboglot.model.inputs.outside import Outside
-from roboglot.model.inputs.turns import Turns
 from roboglot.model.stand_in import StandIn
 from roboglot.model.tap import Tap
 from roboglot.values import dataclass
@@ -46,7 +46,7 @@ class Robot:
     tap: Tap = field(init=False)
     outside: Outside = field(init=False)
     admission: Admission = field(default_factory=Admission)
-    turns: Turns | None = None  # of the clients of all robots of a program; None: no one waits for others
+    fairness: Fairness | None = None  # to the clients of all robots of a program; None: no one waits for others
     stand_in: StandIn | None = None  # answers at the doors in the robot's place
     _components: dict[type[Component], Component] = field(default_factory=dict)
 

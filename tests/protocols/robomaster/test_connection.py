@@ -10,7 +10,7 @@ import pytest
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.geometry import Twist
-from roboglot.model.inputs.turns import Share, Turns
+from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.protocols.robomaster import limits
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
@@ -20,12 +20,12 @@ FLOOD = 50_000
 PATIENCE = 100  # s, on a busy machine
 
 
-class Scripted(Turns):
+class Scripted(Fairness):
     """Lets clients wait as the test says."""
 
     waits: Sequence[float] = ()
 
-    def wait(self, share: Share) -> float:
+    def wait(self, share: Use) -> float:
         super().wait(share)
         first, *self.waits = self.waits or (0.0,)
         return first
@@ -229,17 +229,17 @@ async def test_flood_behind_a_waiting_command_is_answered_whole(client, connect,
 
 
 async def test_flood_waits_for_turns_and_is_answered(connect, robot) -> None:
-    robot.turns = turns = Scripted(lambda: 0.0)
+    robot.fairness = fairness = Scripted(lambda: 0.0, lambda: 0.0)
     greedy = await connect()
     assert await greedy.ask("command;") == "ok;"
-    turns.waits = [0.01, 0.01, 0.0, 0.01]
+    fairness.waits = [0.01, 0.01, 0.0, 0.01]
     greedy.send("robot mode ?;" * (3 * limits.BATCH_MAX))
     for _ in range(3 * limits.BATCH_MAX):
         assert await greedy.reply() == "chassis_lead;"
-    assert not turns.waits
-    turns.waits = [60.0]
+    assert not fairness.waits
+    fairness.waits = [60.0]
     greedy.send("robot mode ?;")
-    await until(lambda: not turns.waits)
+    await until(lambda: not fairness.waits)
     assert await (await connect()).ask("version;") == "version 00.00.00.70;"
     await greedy.close()
 

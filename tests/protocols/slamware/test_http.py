@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from roboglot.model.inputs.turns import Share, Turns
+from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware import parameters
@@ -48,14 +48,14 @@ async def test_missing_things_are_reported_by_name(
 async def test_client_beyond_its_share_waits(
     bare: Robot, bare_client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bare.turns = turns = Turns(lambda: 0.0)
-    waits, shares = [0.02, 0.0], list[Share]()
+    bare.fairness = fairness = Fairness(lambda: 0.0, lambda: 0.0)
+    waits, shares = [0.02, 0.0], list[Use]()
 
-    def wait(share: Share) -> float:
+    def wait(share: Use) -> float:
         shares.append(share)
         return waits.pop(0)
 
-    monkeypatch.setattr(turns, "wait", wait)
+    monkeypatch.setattr(fairness, "wait", wait)
     begun = asyncio.get_running_loop().time()
     assert (await bare_client.get(POIS)).status_code == 200
     assert asyncio.get_running_loop().time() >= begun + 0.02
@@ -63,7 +63,7 @@ async def test_client_beyond_its_share_waits(
     assert shares[0] is shares[1]
     assert shares[0].name.startswith("127.0.0.1:")
     assert shares[0].used > 0.0
-    assert turns.of(shares[0].name) is shares[0]
+    assert fairness.of(shares[0].name) is shares[0]
 
 
 def test_literals_win_over_parameters() -> None:

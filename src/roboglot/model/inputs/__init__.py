@@ -1,1 +1,1 @@
-"""Inputs from outside: those that are no requests at doors, noted and given again; the turns of clients."""
+"""Inputs from outside: those that are no requests at doors, noted and given again; fairness to clients."""

@@ -143,7 +143,7 @@ class CyberDogDoor:
                 self._config.app,
                 self._config.app_port,
                 last=str(kept(robot, APP, "")),
-                pace=lambda: robot.turns.wait_to_dial() if robot.turns and certificates else 0.0,
+                pace=lambda: robot.fairness.wait_to_dial() if robot.fairness and certificates else 0.0,
                 unasked=Legs in robot or Base not in robot,  # a program's other bodies have no app until one calls
             ),
             ticks=lambda own: ticks(context, own),
@@ -251,11 +251,11 @@ class _Service:
             return
         code = request.nameCode
         await self._count(peer, len(request.params))
-        tap, turns = self._context.robot.tap, self._context.robot.turns
-        share = turns.of(peer.partition(":")[2]) if turns else None
-        if turns and share:
-            await pay(turns.wait(share))
-            begun = turns.now()
+        tap, fairness = self._context.robot.tap, self._context.robot.fairness
+        use = fairness.of(peer.partition(":")[2]) if fairness else None
+        if fairness and use:
+            await pay(fairness.wait(use))
+            begun = fairness.now()
 
         async def reply(value: object) -> None:
             if tap.watched:
@@ -271,8 +271,8 @@ class _Service:
         except asyncio.CancelledError:  # the app does not wait for the end
             self._note_end(peer, code, call.began)
             raise
-        if turns and share:
-            turns.took(share, turns.now() - begun)
+        if fairness and use:
+            fairness.took(use, fairness.now() - begun)
         if last is not None:
             await self._say(rpc, _answer(code, last))
 

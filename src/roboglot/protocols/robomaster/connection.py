@@ -9,8 +9,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import cast
 
+from roboglot.model.inputs.fairness import Use
 from roboglot.model.inputs.outside import CAME, GONE
-from roboglot.model.inputs.turns import Share
 from roboglot.model.lateness import late
 from roboglot.protocols.robomaster.context import Context, speak_as
 from roboglot.protocols.robomaster.dispatch import DOOR, Answer, answer
@@ -39,7 +39,7 @@ class ControlConnection(asyncio.Protocol):
     host: str
     driver: DrivingClient
     _name: str  # host and port of the client
-    _share: Share | None  # of the program's time
+    _use: Use | None  # of the program's time
     _shown: str  # in the log: its identity if known, and its host
 
     def __init__(
@@ -78,8 +78,8 @@ class ControlConnection(asyncio.Protocol):
             transport.abort()
             return
         self.driver = DrivingClient(self._name, self.host, transport.get_extra_info("socket"))
-        turns = self._context.robot.turns
-        self._share = turns.of(self._name) if turns else None
+        fairness = self._context.robot.fairness
+        self._use = fairness.of(self._name) if fairness else None
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)
@@ -144,15 +144,15 @@ class ControlConnection(asyncio.Protocol):
             self._worker = None
         if not self._commands or self._worker is not None or self._turn or self.transport.is_closing():
             return
-        turns, share = self._context.robot.turns, self._share
-        if turns is None or share is None:
+        fairness, use = self._context.robot.fairness, self._use
+        if fairness is None or use is None:
             self._begin()
-        elif seconds := turns.wait(share):
+        elif seconds := fairness.wait(use):
             self._turn = asyncio.get_running_loop().call_later(seconds, self._take_turn)
         else:
-            begun = turns.now()
+            begun = fairness.now()
             self._begin()
-            turns.took(share, turns.now() - begun)
+            fairness.took(use, fairness.now() - begun)
 
     def _take_turn(self) -> None:
         self._turn = None

@@ -105,8 +105,8 @@ class Application:
         client = f"slamware {peer[0]}".strip()
         address = f"{peer[0]}:{peer[1]}"
         ask_for(client, address)
-        if turns := self._context.robot.turns:
-            await pay(turns.wait(turns.of(address)))
+        if fairness := self._context.robot.fairness:
+            await pay(fairness.wait(fairness.of(address)))
         begun = perf_counter()
         shared: Headers = []
         why = ""
@@ -129,8 +129,8 @@ class Application:
             self._log(client, scope, status, body, perf_counter() - begun)
         if self._tap.watched:
             self._note_reply(scope, status, body, why)
-        if turns:
-            turns.took(turns.of(address), perf_counter() - begun)
+        if fairness:
+            fairness.took(fairness.of(address), perf_counter() - begun)
         await late(self._context.robot)
         headers += shared
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []

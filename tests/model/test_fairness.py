@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from roboglot.model.inputs.turns import CLIENTS_MAX, COST_MAX, HANDSHAKE_GAP, LOG_SECONDS, PART, WINDOW, Turns
+from roboglot.model.inputs.fairness import CLIENTS_MAX, COST_MAX, HANDSHAKE_GAP, LOG_SECONDS, PART, WINDOW, Fairness
 
 GREEDY, MODEST = "10.0.0.7:4001", "10.0.0.8:4002"
 
@@ -15,18 +15,20 @@ class Machine:
     """Time that passes when the test says so, and a loop that answers requests one after another."""
 
     def __init__(self) -> None:
-        self.time = 100.0
-        self.turns = Turns(lambda: self.time)
+        self.time = self.worked = 100.0
+        self.held = 0.0  # part of a request's time in which other programs have the processor
+        self.fairness = Fairness(lambda: self.time, lambda: self.worked)
 
     def ask(self, peer: str, seconds: float) -> float:
         """Answer a request that takes ``seconds``; return how long it waited before."""
-        share = self.turns.of(peer)
+        share = self.fairness.of(peer)
         waited = 0.0
-        while wait := self.turns.wait(share):
+        while wait := self.fairness.wait(share):
             waited += wait
             self.time += wait
         self.time += seconds
-        self.turns.took(share, seconds)
+        self.worked += (1.0 - self.held) * seconds
+        self.fairness.took(share, seconds)
         return waited
 
 
@@ -85,22 +87,29 @@ def test_no_client_waits_where_there_is_time(machine: Machine) -> None:
         machine.time += WINDOW / 3
 
 
+def test_no_client_waits_while_other_programs_hold_the_processor(machine: Machine) -> None:
+    machine.held = 0.8
+    for _ in range(30):
+        assert machine.ask(MODEST, 0.001) == 0.0
+        assert machine.ask(GREEDY, 0.02) == 0.0
+
+
 def test_long_request_counts_little(machine: Machine) -> None:
     machine.ask(MODEST, 0.001)
     machine.ask(GREEDY, 100 * COST_MAX)
-    assert machine.turns.of(GREEDY).used == COST_MAX
+    assert machine.fairness.of(GREEDY).used == COST_MAX
 
 
 def test_handshakes_of_many_robots_follow_each_other(machine: Machine) -> None:
-    assert machine.turns.wait_to_dial() == 0.0
-    waits = [machine.turns.wait_to_dial() for _ in range(99)]
+    assert machine.fairness.wait_to_dial() == 0.0
+    waits = [machine.fairness.wait_to_dial() for _ in range(99)]
     assert waits == pytest.approx([HANDSHAKE_GAP * number for number in range(1, 100)])
     machine.time += 100 * HANDSHAKE_GAP
-    assert machine.turns.wait_to_dial() == 0.0
+    assert machine.fairness.wait_to_dial() == 0.0
 
 
 def test_memory_is_bounded(machine: Machine) -> None:
     for number in range(3 * CLIENTS_MAX):
         machine.ask(f"10.{number >> 8}.0.{number & 255}:1", 0.0)
-    assert len(machine.turns._shares) <= CLIENTS_MAX
-    assert len(machine.turns._hosts) <= CLIENTS_MAX
+    assert len(machine.fairness._uses) <= CLIENTS_MAX
+    assert len(machine.fairness._hosts) <= CLIENTS_MAX
