@@ -273,8 +273,9 @@ def _work() -> None:
     _parent = WarmParent(ours)
     for name in [name for name in sys.modules if f"{name}.".startswith(REWRITTEN)]:
         del sys.modules[name]
-    package = importlib.import_module("roboglot")
-    package.__doc__ = f"{package.__doc__}\nPYTEST_DONT_REWRITE"  # else pytest warns that it is imported already
+    for name in ("roboglot", "tests"):  # else pytest warns that they are imported already
+        package = importlib.import_module(name)
+        package.__doc__ = f"{package.__doc__}\nPYTEST_DONT_REWRITE"
     sys.argv, sys.path[0] = ["-c"], ""
     exec(eval(sys.stdin.readline()), _new_main())
 
