@@ -87,7 +87,7 @@ def test_no_client_waits_where_there_is_time(machine: Machine) -> None:
         machine.time += WINDOW / 3
 
 
-def test_no_client_waits_while_other_programs_hold_the_processor(machine: Machine) -> None:
+def test_no_client_waits_while_others_hold_the_processor(machine: Machine) -> None:
     machine.held = 0.8
     for _ in range(30):
         assert machine.ask(MODEST, 0.001) == 0.0

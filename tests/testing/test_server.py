@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
+from xml.etree import ElementTree
 
 import pytest
 
@@ -109,9 +111,9 @@ class TestCase(RobotTestCase):
 
 
 def test_failed_tests_leave_recording_map_and_exchanges(tmp_path: Path) -> None:
-    done = run_pytest(tmp_path, FAILING, "--junitxml", "junit.xml")
+    done = run_pytest(tmp_path, FAILING, "--junitxml", "junit.xml", "--roboglot-failures", "left")
     assert "2 failed, 1 passed" in done.stdout, done.stdout + done.stderr
-    left = sorted((tmp_path / "roboglot-failures").iterdir())
+    left = sorted((tmp_path / "left").iterdir())
     assert len(left) == 2
     for folder in left:
         assert (folder / "map.png").read_bytes().startswith(b"\x89PNG")
@@ -120,8 +122,10 @@ def test_failed_tests_leave_recording_map_and_exchanges(tmp_path: Path) -> None:
         assert any("power/status" in exchange.operation for exchange in recorded.exchanges)
     [page] = [text for folder in left if "on purpose&lt;/b" in (text := (folder / "exchanges.html").read_text())]
     assert "<b>" not in page
-    assert "[[ATTACHMENT|" in done.stdout
-    assert 'name="roboglot.recording"' in (tmp_path / "junit.xml").read_text()
+    files = sorted(str(path) for folder in left for path in folder.iterdir())
+    assert sorted(re.findall(r"^\[\[ATTACHMENT\|(.*)\]\]$", done.stdout, re.MULTILINE)) == files
+    properties = ElementTree.parse(tmp_path / "junit.xml").iter("property")
+    assert sorted(entry.attrib["value"] for entry in properties) == files
 
 
 def test_unknown_word_in_a_marker_is_an_error(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import unittest
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -19,7 +19,8 @@ class RobotTestCase(unittest.TestCase):
 
     ``world``, ``robots``, ``body``, ``seed``, ``speed``, ``lockstep``, ``recording``, ``doors`` are as in the pytest
     marker; ``faults`` are names of faults, or pairs of name and options. Artifacts of a failed test are in
-    ``roboglot-failures``, or in the folder that ROBOGLOT_FAILURES names.
+    ``roboglot-failures``, in pytest's folder for them, or in the one that ROBOGLOT_FAILURES names; ``artifacts`` lists
+    them, and pytest reports them as those of its own tests.
     """
 
     world: ClassVar[str] = "office"
@@ -32,6 +33,8 @@ class RobotTestCase(unittest.TestCase):
     faults: ClassVar[tuple[str | tuple[str, Mapping[str, object]], ...]] = ()
     doors: ClassVar[Mapping[str, object]] = {}
     server: RobotServer
+    artifacts: Sequence[Path] = ()
+    leave: Path | None = None  # pytest's folder for them
 
     def run(self, result: unittest.TestResult | None = None) -> unittest.TestResult | None:
         """Start the robot, run the test, save artifacts if it fails."""
@@ -47,8 +50,8 @@ class RobotTestCase(unittest.TestCase):
         """Save artifacts and clean up: unittest knows here whether the test failed, and the robot is still up."""
         super().doCleanups()
         if not getattr(getattr(self, "_outcome", None), "success", True):
-            folder = folder_of(Path(os.environ.get("ROBOGLOT_FAILURES", FOLDER)), self.id())
-            save(self.server, folder, self.id(), "failed: see the test's own output")
+            folder = folder_of(Path(os.environ.get("ROBOGLOT_FAILURES") or self.leave or FOLDER), self.id())
+            self.artifacts = save(self.server, folder, self.id(), "failed: see the test's own output")
 
     @property
     def rest(self) -> Blocking:

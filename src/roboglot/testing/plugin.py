@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import AsyncIterator, Callable, Generator, Iterator
+import sys
+from collections.abc import AsyncIterator, Callable, Generator, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from roboglot.simulation.world.world import World
     from roboglot.testing import Forward
     from roboglot.testing.blocking import Blocking
+    from roboglot.testing.case import RobotTestCase
     from roboglot.testing.server import RobotServer
     from roboglot.testing.wanted import Wanted
 
@@ -225,22 +227,49 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 # -- files left by failed tests --------------------------------------------------------------------------------------
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_call(item: pytest.Item) -> None:
+    """Tell a ``RobotTestCase`` pytest's folder; it saves its artifacts itself, while its robot is up."""
+    case = _case(item)
+    if case is not None:
+        case.leave = _root(item)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     report = yield
-    server = item.stash.get(_SERVER, None)
-    if server is not None and report.failed and report.when != "teardown":
-        _attach(item, report, server)
+    if report.failed and report.when != "teardown":
+        server, case = item.stash.get(_SERVER, None), _case(item)
+        if server is not None:
+            _attach(item, report, _save(item, report, server))
+        elif case is not None:
+            _attach(item, report, case.artifacts)
     return report
 
 
-def _attach(item: pytest.Item, report: pytest.TestReport, server: RobotServer) -> None:
-    """Save artifacts while the robot is still up, and list them in the report's properties, for JUnit."""
+def _case(item: pytest.Item) -> RobotTestCase | None:
+    """Return the test's ``RobotTestCase``, if it is a method of one."""
+    if "roboglot.testing.case" not in sys.modules:
+        return None
+    from roboglot.testing.case import RobotTestCase
+
+    case = getattr(item, "instance", None)
+    return case if isinstance(case, RobotTestCase) else None
+
+
+def _root(item: pytest.Item) -> Path:
+    folder: str = item.config.getoption(OPTION)
+    return item.config.rootpath / folder
+
+
+def _save(item: pytest.Item, report: pytest.TestReport, server: RobotServer) -> Sequence[Path]:
+    """Save artifacts while the robot is still up."""
     from roboglot.testing.artifacts import folder_of, save
 
-    root = Path(item.config.getoption(OPTION))
-    folder = folder_of(root if root.is_absolute() else item.config.rootpath / root, item.nodeid)
-    saved = save(server, folder, item.nodeid, report.longreprtext)
-    lines = [f"[[ATTACHMENT|{path}]]" for path in saved]
-    report.sections.append(("roboglot", "\n".join(lines)))
+    return save(server, folder_of(_root(item), item.nodeid), item.nodeid, report.longreprtext)
+
+
+def _attach(item: pytest.Item, report: pytest.TestReport, saved: Sequence[Path]) -> None:
+    """List artifacts in the report, and in its properties for JUnit."""
+    report.sections.append(("roboglot", "\n".join(f"[[ATTACHMENT|{path}]]" for path in saved)))
     item.user_properties += [(f"roboglot.{path.stem}", str(path)) for path in saved]
