@@ -28,7 +28,8 @@ from roboglot.recording.ring import Ring
 from roboglot.recording.thread import WriterThread
 from tests.recording.doctor import Doctor
 
-CHILD = Path(__file__).parent / "writing_child.py"
+CHILD = [sys.executable, "-m", "tests.recording.writing_child"]  # warm, so it ends with this process
+ROOT = Path(__file__).parents[2]
 KILLS = 10
 ORIGIN = Origin({"version": "1"}, [Attachment("world.toml", "text/plain", b"x = 1")])
 
@@ -70,7 +71,7 @@ def test_what_was_written_survives_kill_9(tmp_path: Path, rounds: int, kills: in
 def kill_writers(tmp_path: Path, kills: int) -> None:
     """Kill programs that write, and look at what they have written."""
     children = [
-        subprocess.Popen([sys.executable, CHILD, tmp_path / f"{n}.mcap"], stdout=subprocess.PIPE) for n in range(kills)
+        subprocess.Popen([*CHILD, tmp_path / f"{n}.mcap"], stdout=subprocess.PIPE, cwd=ROOT) for n in range(kills)
     ]
     killed = dict[int, int]()
     for child in children:
