@@ -134,7 +134,7 @@ async def test_a_recording_is_begun_marked_and_ended(served: Served, open_consol
         await page.click("button:has-text('Mark')")
     await served.clock.advance(1.0)
     await page.click("text=End the recording")
-    await page.wait_for_selector("text=of the data.")
+    await page.wait_for_selector("text=of the data folder.")
     (file,) = (served.runtime.config.data / "recordings").glob("*.mcap")
     assert read_recording(file).topics["/marks"] == 1
 

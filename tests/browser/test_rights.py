@@ -164,7 +164,7 @@ async def test_buttons_are_on_for_those_who_may(guarded: Guarded, open_page: Ope
     page = await open_page()
     await sign_in(page, who)
     if who == "none":
-        await page.wait_for_selector("text=may see none of the robots")
+        await page.wait_for_selector("text=no right to see any of these robots")
         return
     await page.wait_for_selector("text=Scan fits map")
     assert {what for what in BUTTONS if await offered(page, what)} == MAY[who], who

@@ -93,10 +93,10 @@ async def test_files_without_a_program_are_refused(studio: Open) -> None:
         ("a.py", b"#" * 262_145, "it is too large"),
         ("b.json", b" " * 4_000_001, "it is too large"),
         ("c.json", json.dumps({"blocks": {"blocks": [{"type": "forever"}] * 6001}}).encode(), "it is too large"),
-        ("d.json", b"null", "it is no program"),
-        ("e.json", b'{"style": "{"}', "it is no program"),
-        ("f.json", b"[1, 2", "it is no program"),
-        ("g.txt", b"\x89PNG\x00\x00", "it is no program"),
+        ("d.json", b"null", "it is not a program"),
+        ("e.json", b'{"style": "{"}', "it is not a program"),
+        ("f.json", b"[1, 2", "it is not a program"),
+        ("g.txt", b"\x89PNG\x00\x00", "it is not a program"),
     ):
         await page.click("text=Programs")
         await page.evaluate(FADE)

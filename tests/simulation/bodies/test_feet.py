@@ -170,9 +170,9 @@ async def test_a_raised_foot_stays_up(dog):
 @pytest.mark.parametrize(
     ("falls", "holds", "words"),
     [
-        ([Footfall(0.31, frozenset())], (), "fall over on 0"),
-        ([Footfall(0.4, DIAGONAL), Footfall(0.4, DIAGONAL), Footfall(1.0, ALL)], (), "fall over on 2"),
-        ([Footfall(0.4, DIAGONAL), Footfall(1.0, ALL), Footfall(0.4, DIAGONAL)], (), "fall over on 2"),
+        ([Footfall(0.31, frozenset())], (), "would fall with 0 feet"),
+        ([Footfall(0.4, DIAGONAL), Footfall(0.4, DIAGONAL), Footfall(1.0, ALL)], (), "would fall with 2 feet"),
+        ([Footfall(0.4, DIAGONAL), Footfall(1.0, ALL), Footfall(0.4, DIAGONAL)], (), "would fall with 2 feet"),
         ([Footfall(0.01, ALL)], (), "a footfall takes"),
         ([Footfall(math.nan, ALL)], (), "a footfall takes"),
         ([Footfall(0.1, ALL)] * 1001, (), "at most 1000 footfalls"),
