@@ -39,6 +39,7 @@ class Place:
 
     def __init__(self, folder: Path) -> None:
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), installation.WARM: "1", COLD: "1"}
+        self.environment.pop("GRPC_VERBOSITY", None)  # the parent's own, or of a test before
         self.parents: list[subprocess.Popen[str]] = []
 
     def start(self, code: str, *words: str, **environment: str) -> subprocess.Popen[str]:

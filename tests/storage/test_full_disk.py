@@ -47,4 +47,4 @@ async def test_what_no_client_waits_for_leaves_line_only(fleet, world, caplog: p
     world.faults.inject("full_disk", "a")
     with caplog.at_level(logging.WARNING):
         await fleet.robots["a"][Settings].keep("slamware.totals", [1.0, 2.0])
-    assert "cannot keep slamware.totals: the disk is full" in caplog.text
+    assert "cannot store slamware.totals: the disk is full" in caplog.text
