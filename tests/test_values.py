@@ -6,8 +6,9 @@ import copy
 import dataclasses
 import inspect
 import pickle
+import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar, cast, get_type_hints
 
 import msgspec
 import pytest
@@ -140,3 +141,80 @@ def test_nothing_is_compiled_before_it_is_used() -> None:
     assert inspect.isfunction(vars(Unused)["__eq__"])
     assert isinstance(vars(Unused)["__repr__"], values._Later)
     assert inspect.signature(Unused.__init__).parameters.keys() == {"self", "number"}
+
+
+@BOTH
+def test_what_the_library_refuses_is_refused(dataclass: Callable[..., Any]) -> None:
+    @dataclass(frozen=True)
+    class Fixed:
+        x: int = 1
+
+    @dataclass
+    class Open:
+        x: int = 1
+
+    with pytest.raises(TypeError, match="frozen"):
+        dataclass(type("Opened", (Fixed,), {}))
+    with pytest.raises(TypeError, match="frozen"):
+        dataclass(frozen=True)(type("Closed", (Open,), {}))
+    with pytest.raises(TypeError, match="non-default argument 'y' follows default argument"):
+        dataclass(type("Late", (Open,), {"__annotations__": {"y": "int"}}))
+    with pytest.raises(ValueError, match="mutable default"):
+        dataclass(type("Shared", (), {"__annotations__": {"y": "list[int]"}, "y": []}))
+
+
+def test_initialisation_only_variables_are_refused() -> None:
+    """They would be left out silently: the library's decorator is for them."""
+    with pytest.raises(TypeError, match=r"Begun\.x is an InitVar"):
+        values.dataclass(type("Begun", (), {"__annotations__": {"x": dataclasses.InitVar[int]}}))
+
+
+@BOTH
+def test_annotations_class_variables_and_subclasses(dataclass: Callable[..., Any]) -> None:
+    @dataclass(frozen=True, slots=True)
+    class Base:
+        number: int
+        shared: ClassVar[int] = 7
+        _: dataclasses.KW_ONLY
+        word: str = "a"
+
+    class Plain(Base):
+        """Has no fields of its own, and a ``__dict__``."""
+
+        def __init__(self) -> None:
+            super().__init__(3, word="b")
+
+    plain: Any = Plain()
+    assert get_type_hints(Base.__init__) == {"number": int, "word": str, "return": type(None)}
+    assert Base.__match_args__ == ("number",)
+    assert (plain.number, plain.word, Base.shared) == (3, "b", 7)
+    assert repr(plain).endswith("Plain(number=3, word='b')")
+    assert plain != Base(3, word="b")
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        plain.number = 4
+    with pytest.raises(TypeError, match=r"Base\.__init__\(\) missing 1 required positional argument: 'number'"):
+        cast("Any", Base)()
+    assert str(inspect.signature(Base, eval_str=True)) == "(number: int, *, word: str = 'a') -> None"
+
+
+def test_threads_may_use_a_class_first() -> None:
+    for _ in range(20):
+        made: list[object] = []
+
+        @values.dataclass(frozen=True, slots=True)
+        class Shared:
+            number: int
+
+        start = threading.Barrier(4)
+
+        def work(kind: Any = Shared, start: threading.Barrier = start, made: list[object] = made) -> None:
+            start.wait()
+            made.append((hash(kind(1)), repr(kind(1)), kind(1) == kind(1)))
+
+        threads = [threading.Thread(target=work) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(made) == 4
+        assert len(set(made)) == 1

@@ -8,6 +8,7 @@ that library's own, made when they are first looked up. For type checkers it is 
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Callable
 from types import MemberDescriptorType
 from typing import TYPE_CHECKING, TypeVar, cast
@@ -62,6 +63,7 @@ else:
         def decorate(plain: C) -> C:
             own = {*vars(plain)} - ({"__hash__"} if _is_unhashable_by_eq(plain) else set())
             made = dataclasses.dataclass(init=False, repr=False, eq=False, slots=slots, kw_only=kw_only)(plain)
+            _check(made, frozen=frozen)
             _give_methods(made, own, frozen=frozen, eq=eq)
             if frozen:
                 _freeze(made, own, slots=slots)
@@ -73,6 +75,24 @@ else:
 def _is_unhashable_by_eq(plain: type) -> bool:
     """Return whether Python took ``__hash__`` away because the class defines ``__eq__``."""
     return "__eq__" in vars(plain) and vars(plain).get("__hash__") is None
+
+
+def _check(made: type, *, frozen: bool) -> None:
+    """Refuse what the library refuses, and what is not made here. Raises TypeError."""
+    for field in vars(made)["__dataclass_fields__"].values():
+        if field._field_type is vars(dataclasses)["_FIELD_INITVAR"]:  # fields() leaves these out
+            raise TypeError(f"{made.__name__}.{field.name} is an InitVar: use the library's dataclass")
+    for base in made.__mro__[1:-1]:
+        if "__dataclass_fields__" in vars(base) and ("__setattr__" in vars(base)) is not frozen:
+            raise TypeError(f"{made.__name__} and {base.__name__} are not both frozen")
+    default = ""
+    for field in dataclasses.fields(made):
+        if not field.init or field.kw_only:
+            continue
+        if field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING:
+            default = field.name
+        elif default:
+            raise TypeError(f"non-default argument {field.name!r} follows default argument {default!r}")
 
 
 def _give_methods(made: type, own: set[str], *, frozen: bool, eq: bool) -> None:
@@ -177,8 +197,11 @@ def _initialiser(owner: type, *, frozen: bool) -> Callable[..., object]:
     if hasattr(owner, "__post_init__"):
         lines.append("self.__post_init__()")
     parameters = ", ".join(["self", *in_order, *(["*", *by_name] if by_name else [])])
-    exec("\n ".join([f"def __init__({parameters}):", *(lines or ["pass"])]), known)
-    method = cast("Callable[..., object]", known["__init__"])
+    # A closure in the class's module: annotations are looked up there.
+    text = "\n  ".join([f"def create({', '.join(known)}):\n def __init__({parameters}):", *(lines or ["pass"])])
+    found: dict[str, Callable[..., Callable[..., object]]] = {}
+    exec(f"{text}\n return __init__", vars(sys.modules[owner.__module__]), found)
+    method = found["create"](**known)
     method.__annotations__ = {field.name: field.type for field in dataclasses.fields(owner) if field.init}
     method.__annotations__["return"] = None
     return method
