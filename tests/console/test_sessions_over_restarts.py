@@ -52,6 +52,21 @@ async def test_file_lets_no_one_in_but_the_cookie(tmp_path: Path) -> None:
     third.close()
 
 
+async def test_a_clock_set_back_prolongs_no_session(tmp_path: Path) -> None:
+    """A board without a clock of its own begins in 1970 until it has asked for the time."""
+    now = 1_900_000_000.0
+    first = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)
+    cookie = await first.open(PROOF, "anna")
+    first.close()
+    now = 0.0
+    second = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)
+    assert second.find(cookie) is not None
+    now = LIFETIME
+    assert second.find(cookie) is None
+    assert second.all() == []
+    second.close()
+
+
 async def test_putting_out_while_signing_in_lasts(tmp_path: Path) -> None:
     now = 1000.0
     first = Sessions(SessionFile(tmp_path / "s.db"), lambda: now)

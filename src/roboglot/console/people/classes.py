@@ -149,7 +149,8 @@ class Classes:
         kept = self._file.load() if self._file is not None else None
         if kept is None or kept.until <= self._now():
             return None
-        lesson = Lesson(kept.code, kept.name, kept.until)
+        latest = self._now() + MINUTES_MAX * 60.0  # also where the clock was set back
+        lesson = Lesson(kept.code, kept.name, min(kept.until, latest))
         for identity, robot in kept.seats.items():
             if robot in self._desk.robots:
                 lesson.seats[identity] = Seat(identity, robot, kept.code, None, studio=False)
@@ -263,7 +264,6 @@ class Classes:
     async def _give_back(self, lesson: Lesson, seat: Seat) -> None:
         """Release a pupil's robot; the pupil must join again."""
         del lesson.seats[seat.identity]
-        await self._save(lesson)
         self._desk.pupils.discard(seat.identity)
         if seat.robot in self._desk.locked and seat.robot not in {left.robot for left in lesson.seats.values()}:
             self._desk.locked.discard(seat.robot)
@@ -271,6 +271,7 @@ class Classes:
                 await _release(self._desk.robots[seat.robot])
         await self._desk.robots[seat.robot].admission.shut_out(seat.identity)
         await self._put_out(seat.identity)
+        await self._save(lesson)  # last: a slow disk must not leave the pupil a right
 
     def _check_teacher(self) -> None:
         if not self._desk.may_teach:

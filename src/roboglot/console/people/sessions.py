@@ -44,7 +44,10 @@ class Sessions:
     def __init__(self, file: SessionFile | None = None, now: Callable[[], float] | None = None) -> None:
         self._file, self._now = file, now or SteadyTime()
         left = file.load(self._now()) if file is not None else []
-        self._sessions = {kept.key: Session(NO_PROOF, kept.name, kept.until, kept.robot, kept.code) for kept in left}
+        latest = self._now() + LIFETIME  # also where the clock was set back, or a board without one starts in 1970
+        self._sessions = {
+            kept.key: Session(NO_PROOF, kept.name, min(kept.until, latest), kept.robot, kept.code) for kept in left
+        }
         self._sealed = {kept.key: kept.sealed for kept in left}  # proofs of sessions not used since the start
 
     def all(self) -> list[Session]:
