@@ -7,13 +7,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
 from roboglot.cli.warm import installation
-from roboglot.cli.warm.command import socket_path
+from roboglot.cli.warm.installation import socket_path
 from tests.warm_start import COLD
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks of a warm parent are there on Linux only")
@@ -42,11 +42,12 @@ class Place:
         self.environment.pop("GRPC_VERBOSITY", None)  # the parent's own, or of a test before
         self.parents: list[subprocess.Popen[str]] = []
 
-    def start(self, code: str, *words: str, **environment: str) -> subprocess.Popen[str]:
+    def start(self, code: str, *words: str, files: Sequence[int] = (), **environment: str) -> subprocess.Popen[str]:
         """Start ``python -c`` from the warm parent."""
         command = [sys.executable, "-m", "roboglot.cli.warm.command", "-u", "-c", code, *words]
         whole = self.environment | environment
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=whole)
+        pipe = subprocess.PIPE
+        return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=whole, pass_fds=files)
 
     def open(self) -> int:
         """Start a parent that has loaded nothing, wait until it listens; return its process id."""
@@ -103,6 +104,56 @@ def test_a_command_has_its_callers_folder_and_environment(place: Place, tmp_path
     code += "os.environ.get('GRPC_VERBOSITY'))"
     process = place.start(f"import os; os.chdir({str(tmp_path)!r}); " + code, WORD="here", TZ="XYZ-3")
     assert process.communicate(timeout=PATIENCE)[0].split() == ["XYZ", str(tmp_path), "here", oct(umask()), "None"]
+
+
+def test_a_command_has_the_shells_files(place: Place) -> None:
+    """``roboglot test <(…)`` reads /dev/fd/63."""
+    reading, writing = os.pipe()
+    os.dup2(reading, 63)
+    os.write(writing, b"from the shell")
+    os.close(writing)
+    try:
+        code = "import os; print(open('/dev/fd/63').read(), os.listdir('/proc/self/fd'))"
+        process = place.start(code, files=[63])
+        out, err = process.communicate(timeout=PATIENCE)
+    finally:
+        os.close(reading)
+        os.close(63)
+    assert (out, err) == ("from the shell ['0', '1', '2', '3', '63']\n", "")
+
+
+def test_a_caller_with_other_rights_is_refused(place: Place) -> None:
+    """A sandbox that can reach the socket gains nothing by it."""
+    path = str(socket_path(place.environment))
+    sandboxed = "import ctypes, pathlib; ctypes.CDLL(None).prctl(38, 1, 0, 0, 0)\n"  # PR_SET_NO_NEW_PRIVS
+    sandboxed += "from roboglot.cli.warm import command as w\nw.launch = print\n"
+    sandboxed += f"w.installation.socket_path = lambda _: pathlib.Path({path!r})\nprint(w.run(w.CODE, ['pass']))"
+    asked = [sys.executable, "-c", sandboxed]
+    done = subprocess.run(asked, env=place.environment, capture_output=True, text=True, check=True)
+    assert done.stdout == f"{path}\nNone\n"
+    assert place.parent() == place.parents[0].pid
+
+
+def test_another_priority_has_a_parent_of_its_own(place: Place) -> None:
+    code = "import os; os.nice(1); from roboglot.cli.warm.installation import socket_path as s; print(s(os.environ))"
+    asked = [sys.executable, "-c", code]
+    found = subprocess.run(asked, env=place.environment, capture_output=True, text=True, check=True).stdout
+    assert found.strip() != str(socket_path(place.environment))
+
+
+def test_path_too_long_for_a_socket_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="too long"):
+        socket_path({"XDG_RUNTIME_DIR": str(tmp_path / ("long" * 30))})
+
+
+def test_a_changed_class_file_changes_the_stamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(installation, "PACKAGE", tmp_path)
+    body = tmp_path / "bodies" / "own.toml"
+    body.parent.mkdir()
+    body.write_text("mass = 1\n")
+    before = installation.stamp()
+    body.write_text("mass = 10\n")
+    assert installation.stamp() != before
 
 
 def umask() -> int:
@@ -184,7 +235,8 @@ def test_another_users_folder_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("environment", "wanted"), [({}, True), ({"CI": "true"}, False), ({"ROBOGLOT_WARM": "0"}, False)]
+    ("environment", "wanted"),
+    [({}, True), ({"CI": "true"}, False), ({"JENKINS_URL": "http://ci"}, False), ({"ROBOGLOT_WARM": "0"}, False)],
 )
 def test_no_parent_is_started_in_ci(environment: dict[str, str], wanted: bool) -> None:
     assert installation.is_wanted(environment) is wanted

@@ -15,7 +15,6 @@ import shlex
 import signal
 import socket
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from types import FrameType
 
@@ -27,6 +26,7 @@ LIMITS = (resource.RLIMIT_NOFILE, resource.RLIMIT_CPU, resource.RLIMIT_AS, resou
 PYTHON = f"{shlex.quote(sys.executable)} -m {__spec__.name if __spec__ else __name__}"  # instead of ``python``
 LENGTH = 8  # bytes before a message, its length
 MESSAGE_MAX = 4 << 20
+DESCRIPTORS_MAX, HIGHEST = 64, 255  # of the files that a command inherits; with others it starts cold
 BROKEN = 70  # exit status if the parent was killed
 
 
@@ -36,7 +36,7 @@ def run(kind: str, words: list[str]) -> int | None:
         return None
     before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # what comes from now on is for the command
     try:
-        path = socket_path(os.environ)
+        path = installation.socket_path(os.environ)
         parent = _connected(path, kind, words)
         if parent is not None:
             with parent:
@@ -47,11 +47,6 @@ def run(kind: str, words: list[str]) -> int | None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
     launch(path)
     return None
-
-
-def socket_path(environment: Mapping[str, str]) -> Path:
-    """Return the socket of this installation's parent. Raises OSError."""
-    return installation.folder_of(environment) / f"{installation.name_of(environment)}.socket"
 
 
 def end_like(status: int) -> None:
@@ -95,8 +90,9 @@ def _connected(path: Path, kind: str, words: list[str]) -> socket.socket | None:
     parent = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         parent.connect(bytes(path))
-        wish = json.dumps(_wish(kind, words)).encode()
-        socket.send_fds(parent, [len(wish).to_bytes(LENGTH)], [0, 1, 2])
+        descriptors = _inherited()
+        wish = json.dumps(_wish(kind, words, descriptors)).encode()
+        socket.send_fds(parent, [len(wish).to_bytes(LENGTH)], descriptors)
         parent.sendall(wish)
         if parent.recv(1) == b"+":
             return parent
@@ -106,13 +102,26 @@ def _connected(path: Path, kind: str, words: list[str]) -> socket.socket | None:
     return None
 
 
-def _wish(kind: str, words: list[str]) -> dict[str, object]:
+def _inherited() -> list[int]:
+    """Return the descriptors that a program inherits: a shell gives more than three for ``<(…)``. Raises OSError."""
+    found = [0, 1, 2]
+    for number in sorted(int(name) for name in os.listdir("/proc/self/fd")):
+        with contextlib.suppress(OSError):  # that of the listing itself
+            if number > 2 and os.get_inheritable(number):
+                found.append(number)
+    if len(found) > DESCRIPTORS_MAX or found[-1] > HIGHEST:
+        raise OSError("too many open files to send")
+    return found
+
+
+def _wish(kind: str, words: list[str], descriptors: list[int]) -> dict[str, object]:
     """Return all that the command would have inherited from this process. Raises OSError."""
     os.umask(umask := os.umask(0o077))
     return {
         "stamp": installation.stamp(),
         "kind": kind,
         "words": words,
+        "descriptors": descriptors,
         "folder": os.getcwd(),
         "environment": dict(os.environ),
         "path": sys.path,

@@ -15,15 +15,23 @@ from pathlib import Path
 WARM = "ROBOGLOT_WARM"  # 0: no command starts warm; 1: even where CI is set
 PACKAGE = Path(__file__).parents[2]
 # What changes an interpreter or a library while it is loaded, so that a fork with other values would differ.
-OF_THE_INTERPRETER = ("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_")
+OF_THE_INTERPRETER = (
+    *("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_"),
+    *("FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS", "TERMINAL_WIDTH", "_TYPER_", "TYPER_"),  # read by Typer
+)
+IN_CI = ("CI", "BUILD_BUILDID", "CODEBUILD_BUILD_ID", "JENKINS_URL", "TEAMCITY_VERSION", "TF_BUILD")
+LOADED = (".py", ".toml", ".json", ".sql")  # files of the package that a parent may have read
 CREDENTIALS = ("Uid:", "Gid:", "Groups:", "CapEff:", "CapBnd:", "NoNewPrivs:", "Seccomp:")
 NAMESPACES = ("cgroup", "ipc", "mnt", "net", "pid", "user", "uts")
+PATH_MAX = 107  # bytes of a socket's path
 
 
 def is_wanted(environment: Mapping[str, str]) -> bool:
     """Return True if commands may start warm here. In CI they do not: nothing should outlive its job."""
     choice = environment.get(WARM, "")
-    return sys.platform == "linux" and choice != "0" and (choice == "1" or "CI" not in environment)
+    return (
+        sys.platform == "linux" and choice != "0" and (choice == "1" or not any(map(environment.__contains__, IN_CI)))
+    )
 
 
 def folder_of(environment: Mapping[str, str]) -> Path:
@@ -37,18 +45,32 @@ def folder_of(environment: Mapping[str, str]) -> Path:
     return folder
 
 
+def socket_path(environment: Mapping[str, str]) -> Path:
+    """Return the socket of this installation's parent. Raises OSError, also if its path is too long for one."""
+    path = folder_of(environment) / f"{name_of(environment)}.socket"
+    if len(bytes(path)) > PATH_MAX:
+        raise OSError(f"{path} is too long for a socket")
+    return path
+
+
 def name_of(environment: Mapping[str, str]) -> str:
-    """Return the name of the parent for this installation, user, interpreter settings, rights and namespaces."""
+    """Return the name of the parent for this installation, user, interpreter settings, priority and rights."""
     parts = [sys.prefix, sys.executable, sys.version, str(PACKAGE)]
     parts += sorted(f"{key}={value}" for key, value in environment.items() if key.startswith(OF_THE_INTERPRETER))
-    with open("/proc/self/status", encoding="utf-8") as status:
-        parts += [line for line in status if line.startswith(CREDENTIALS)]
-    parts += [os.readlink(f"/proc/self/ns/{kind}") for kind in NAMESPACES if os.path.exists(f"/proc/self/ns/{kind}")]
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+    parts += [str(os.getpriority(os.PRIO_PROCESS, 0)), str(os.sched_getscheduler(0)), *rights_of("self")]
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()[:16]
+
+
+def rights_of(process: int | str) -> list[str]:
+    """Return what a process may do, and the namespaces that it is in. Raises OSError."""
+    with open(f"/proc/{process}/status", encoding="utf-8", errors="replace") as status:
+        rights = [line for line in status if line.startswith(CREDENTIALS)]
+    ours = [kind for kind in NAMESPACES if os.path.exists(f"/proc/self/ns/{kind}")]
+    return rights + [os.readlink(f"/proc/{process}/ns/{kind}") for kind in ours]
 
 
 def stamp() -> str:
-    """Return a text that changes when a source file or an installed package changes."""
+    """Return a text that changes when a file of the package or an installed library changes."""
     count = size = newest = 0
     for entry in _sources(str(PACKAGE)):
         found = entry.stat()
@@ -60,7 +82,7 @@ def stamp() -> str:
 def _sources(folder: str) -> Iterator[os.DirEntry[str]]:
     with os.scandir(folder) as entries:
         for entry in entries:
-            if entry.name.endswith(".py"):
+            if entry.name.endswith(LOADED):
                 yield entry
             elif entry.name != "__pycache__" and entry.is_dir(follow_symlinks=False):
                 yield from _sources(entry.path)

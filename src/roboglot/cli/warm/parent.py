@@ -26,7 +26,7 @@ from typing import NoReturn, TypedDict
 from roboglot.cli import main as run_command
 from roboglot.cli import run_to_end
 from roboglot.cli.warm import installation
-from roboglot.cli.warm.command import BROKEN, CODE, LENGTH, MESSAGE_MAX
+from roboglot.cli.warm.command import BROKEN, CODE, DESCRIPTORS_MAX, LENGTH, MESSAGE_MAX
 from roboglot.shards.warmth import ENVIRONMENT, modules_of, refuse_threads, warm
 
 IDLE = 300.0  # s
@@ -37,7 +37,7 @@ COMMANDS = ("roboglot.cli.program", "typer.main", "typer.rich_utils")
 PACKAGES = ("clients", "recording")  # beside those of all robots; not the test kit, whose modules pytest rewrites
 PR_SET_NAME, PR_SET_PDEATHSIG = 15, 1
 PEER = struct.Struct("3i")  # pid, uid, gid
-DESCRIPTORS_MAX = 1 << 16
+OPEN_MAX = 1 << 16
 
 
 class Wanted(TypedDict):
@@ -46,6 +46,7 @@ class Wanted(TypedDict):
     stamp: str
     kind: str
     words: list[str]
+    descriptors: list[int]
     folder: str
     environment: dict[str, str]
     path: list[str]
@@ -61,6 +62,7 @@ class WarmParent:
     def __init__(self, path: Path, lock: int, stamp: str) -> None:
         """Listen at ``path``; ``lock`` is held while we do; ``stamp`` is of the sources that were loaded."""
         self._path, self._lock, self._stamp = path, lock, stamp
+        self._rights = installation.rights_of("self")
         self._callers: dict[int, tuple[int, socket.socket]] = {}  # by descriptor: process and connection
         self._ending: dict[int, float] = {}  # process and when it is killed, s
         self._libc = ctypes.CDLL(None, use_errno=True)
@@ -129,18 +131,21 @@ class WarmParent:
     def _read(self, caller: socket.socket, descriptors: list[int]) -> Wanted:
         """Return what a caller wants; its descriptors are added. Raises OSError, ValueError."""
         credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, PEER.size)
-        if PEER.unpack(credentials)[1] != os.getuid():
-            raise PermissionError("the caller is another user")
-        head, given, _, _ = socket.recv_fds(caller, LENGTH, 3)
+        pid, uid, _ = PEER.unpack(credentials)
+        if uid != os.getuid() or installation.rights_of(pid) != self._rights:
+            raise PermissionError("the caller is another user, or in a sandbox")
+        head, given, _, _ = socket.recv_fds(caller, LENGTH, DESCRIPTORS_MAX)
         descriptors += given
         length, text = int.from_bytes(head), b""
-        if len(head) != LENGTH or length > MESSAGE_MAX or len(given) != 3:
+        if len(head) != LENGTH or length > MESSAGE_MAX:
             raise ValueError("this is no wish")
         while len(text) < length:
             if not (more := caller.recv(min(1 << 16, length - len(text)))):
                 raise ValueError("the caller has gone")
             text += more
         wanted: Wanted = json.loads(text)
+        if wanted["descriptors"][:3] != [0, 1, 2] or len(given) != len(wanted["descriptors"]):
+            raise ValueError("files are missing")
         return wanted
 
     def _fork(self, wanted: Wanted, descriptors: list[int]) -> int:
@@ -205,9 +210,7 @@ def become(wanted: Wanted, descriptors: list[int]) -> NoReturn:
     """Become the command, in the fork: with all that its caller would have given it."""
     try:
         os.setpgid(0, 0)  # in our session, so that the commands of one caller share its part of the processors
-        for number, descriptor in enumerate([os.dup(given) for given in descriptors]):
-            os.dup2(descriptor, number)
-        os.closerange(3, min(os.sysconf("SC_OPEN_MAX"), DESCRIPTORS_MAX))
+        _take(descriptors, wanted["descriptors"])
         for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}:
             with contextlib.suppress(OSError, ValueError):
                 signal.signal(number, signal.SIG_IGN if number in wanted["ignored"] else signal.SIG_DFL)
@@ -228,6 +231,15 @@ def become(wanted: Wanted, descriptors: list[int]) -> NoReturn:
     except BaseException as error:  # noqa: BLE001 - a forked child has no caller to raise to
         sys.excepthook(*sys.exc_info())
         os._exit(130 if isinstance(error, KeyboardInterrupt) else 1)
+
+
+def _take(descriptors: list[int], numbers: list[int]) -> None:
+    """Give descriptors the numbers (ascending) that they had at the caller's, and close all others."""
+    copies = [fcntl.fcntl(given, fcntl.F_DUPFD, numbers[-1] + 1) for given in descriptors]
+    for copy, number in zip(copies, numbers, strict=True):
+        os.dup2(copy, number)
+    for number, following in zip(numbers, [*numbers[1:], min(os.sysconf("SC_OPEN_MAX"), OPEN_MAX)], strict=True):
+        os.closerange(number + 1, following)
 
 
 def _signal(pid: int, number: int) -> None:
