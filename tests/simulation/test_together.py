@@ -89,3 +89,22 @@ def test_part_sensed_together_needs_none_sensed_later(name: str) -> None:
 
 async def test_robots_computed_together_sense_what_each_would_alone() -> None:
     assert await sensed(together=True) == await sensed(together=False)
+
+
+def test_a_robot_may_join_within_a_tick() -> None:
+    """Other tasks come between the steps of a tick, and one of them may equip a robot."""
+    clock = LockstepClock()
+    world = World(load_world("office"), [RobotPlacement(name, body) for name, body in BODIES.items()], clock=clock)
+    robots = [Robot(name, world.description_of(name), clock) for name in BODIES]
+    world.equip(robots[0])
+    world._physics.rows.load_kernels()
+    for joining in robots[1:]:
+        steps = world._tick()
+        next(steps)
+        world.equip(joining)
+        for _ in steps:
+            pass
+    for _ in world._tick():
+        pass
+    assert all(robot[Imu].reading.stamp > 0.0 for robot in robots)
+    world.close()

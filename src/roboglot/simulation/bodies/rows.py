@@ -88,7 +88,8 @@ class Rows:
                 return
             if count := kernel(self.kernels, stamp, seconds):
                 for index in self.others[:count].tolist():
-                    alone[index](stamp, seconds)
+                    if (one := alone.get(index)) is not None:  # else it joined in this tick, and begins with the next
+                        one(stamp, seconds)
 
         return sense
 
