@@ -46,7 +46,7 @@ def context(folder: Path | None, names: tuple[str, str], purpose: ssl.Purpose) -
         return None
     made = ssl.create_default_context(purpose)
     made.check_hostname, made.verify_mode = False, ssl.CERT_NONE
-    made.load_cert_chain(*(folder / name for name in names))
+    made.load_cert_chain(folder / names[0], folder / names[1])
     made.set_alpn_protocols(["h2"])
     return made
 

@@ -122,8 +122,8 @@ async def measure(door: str, robot: Robot, requests: int, claims: Claims) -> Non
     name = f"{door}{' with TLS' if has_tls else ''}"
     print(f"{name:20} median: direct {direct:.2f}, bare relay {relayed:.2f}, proxy {passed:.2f} ms;", end=" ")
     print("p99: direct {:.2f}, bare relay {:.2f}, proxy {:.2f} ms".format(*tails))
-    (line,) = (one for one in said if one.startswith("passing"))
-    inside = [float(word) for word in line.split() if word[0].isdigit() and "." in word]
+    (passing,) = (one for one in said if one.startswith("passing"))
+    inside = [float(word) for word in passing.split() if word[0].isdigit() and "." in word]
     claims.at_most(f"{name}: inside, median", inside[0], ADDED_MAX, "ms")
     claims.at_most(f"{name}: inside, p99", inside[1], ADDED_MAX, "ms")
     claims.at_most(f"{name}: on the processor, p99", inside[3], ADDED_MAX, "ms")
