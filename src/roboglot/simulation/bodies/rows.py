@@ -88,8 +88,8 @@ class Rows:
                 return
             if count := kernel(self.kernels, stamp, seconds):
                 for index in self.others[:count].tolist():
-                    if (one := alone.get(index)) is not None:  # else it joined in this tick, and begins with the next
-                        one(stamp, seconds)
+                    if index in alone:  # else it joined in this tick, and begins with the next
+                        alone[index](stamp, seconds)
 
         return sense
 
