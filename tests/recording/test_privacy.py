@@ -20,7 +20,7 @@ from roboglot.recording.playback import Playback
 from roboglot.recording.reader import read_messages, read_recording
 from roboglot.recording.redaction import FIELDS, Redaction
 from roboglot.recording.replaying import sendable
-from roboglot.recording.secrets import ORDINARY
+from roboglot.recording.secrets import KNOWN_MAX, ORDINARY
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.visual.replies import feedback, responses
 from tests.recording.everything import Session, begun
@@ -214,3 +214,23 @@ def test_people_have_no_names_whatever_stands_between(
     listed = [{"b": 1}, {"mode": "voiceprint", "describe": "[redacted]"}]
     assert found == values | {"list": listed, "describe": "[redacted]" if is_person else name}
     assert list(found) == order
+
+
+def test_the_latest_of_many_secrets_are_redacted() -> None:
+    """A client that sends one after the other cannot make a recording keep those of the others."""
+    redaction = Redaction()
+    for number in range(KNOWN_MAX + 5):
+        redaction(b'{"password": "%d-hidden \xc3\xa4"}' % number)
+    last = KNOWN_MAX + 4
+    said = f"no 4-hidden ä, {last}-hidden ä, \\u00e4 {last - 1}-hidden \\u00e4 or 5-hidden ä".encode()
+    assert redaction(said) == rb"no 4-hidden \xc3\xa4, [redacted], \u00e4 [redacted] or [redacted]".replace(
+        rb"\xc3\xa4", b"\xc3\xa4"
+    )
+    assert redaction(b"nothing of theirs") == b"nothing of theirs"
+
+
+def test_escapes_of_escapes_take_no_time() -> None:
+    """Each of these quotes was looked for to the end, which took minutes."""
+    parts = (b'x%b"password%b":%b"' % ((b"\\" * number,) * 3) for number in range(1000, 0, -1))
+    payload = b'{"password":"hidden"}' + b"".join(parts)
+    assert Redaction()(payload).startswith(b'{"password":"[redacted]"}x')

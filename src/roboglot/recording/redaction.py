@@ -91,7 +91,7 @@ class Redaction:
         self._names = sorted(name for name in low if not any(other in name for other in low - {name}))
         # JSON, also inside a JSON string, where each quote is escaped once or more.
         self._in_json = re.compile(
-            rb'(?<!\\)(\\*)"('
+            rb'(?<!\\)(\\{0,63})"('
             + names
             + rb')\1"(\s*:\s*)(?P<value>\1"'
             + _TEXT

@@ -7,10 +7,12 @@ vendor's, so no field says where the name is.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from urllib.parse import quote, quote_plus
 
 REDACTED = b"[redacted]"
-KNOWN_MAX = 200  # values
+KNOWN_MAX = 200  # values; then a new one takes the place of the oldest
+FEW = 50  # forms that are looked for one by one
 LONGEST = 256  # characters of one
 SHORTEST = 3  # characters, in ASCII; a Chinese name has two
 ORDINARY = frozenset(  # values that say nothing, and stand in many messages
@@ -25,34 +27,56 @@ class Secrets:
 
     def __init__(self, fields: frozenset[str] = frozenset()) -> None:
         self._public = ORDINARY | fields
-        self._known: set[str] = set()
-        self._forms: list[bytes] = []  # the longest first
+        self._known: dict[str, set[bytes]] = {}  # forms by value, the oldest first
+        self._by_start: dict[tuple[int, ...], list[bytes]] = {}  # all forms by their first bytes
+        self._count = 0  # of forms
 
     def learn(self, text: str) -> None:
         """Redact this value from now on, if it tells one person or network from another."""
         shortest = SHORTEST if text.isascii() else 2
         if not shortest <= len(text) <= LONGEST or text in self._known or text.strip().lower() in self._public:
             return
-        if len(self._known) < KNOWN_MAX and any(map(str.isalnum, text)):
-            self._known.add(text)
-            self._forms = sorted({*self._forms, *_forms(text)}, key=lambda form: (-len(form), form))
+        if not any(map(str.isalnum, text)):
+            return
+        if len(self._known) >= KNOWN_MAX:
+            self._forget(next(iter(self._known)))
+        self._known[text] = _forms(text)
+        self._count += len(self._known[text])
+        for form in self._known[text]:
+            self._by_start.setdefault(_start(form), []).append(form)
+
+    def _forget(self, text: str) -> None:
+        for form in self._known.pop(text):
+            alike = self._by_start[_start(form)]
+            alike.remove(form)
+            self._count -= 1
+            if not alike:
+                del self._by_start[_start(form)]
 
     def without(self, payload: bytes) -> bytes:
         """Return ``payload`` without the known values; bytes that are no text stay."""
-        for form in self._forms:
-            if form in payload:
-                return self._replaced(payload)
-        return payload
+        forms = {form for start in self._starts(payload) for form in self._by_start[start] if form in payload}
+        return _replaced(payload, forms) if forms else payload
 
-    def _replaced(self, payload: bytes) -> bytes:
-        try:
-            payload.decode()
-        except UnicodeDecodeError:
-            return payload
-        for form in self._forms:
-            if form in payload:
-                payload = _without(payload, form)
+    def _starts(self, payload: bytes) -> Iterable[tuple[int, ...]]:
+        """Return the first bytes of forms that may be in ``payload``; few are not compared, which takes longer."""
+        if self._count <= FEW:
+            return self._by_start
+        return set(filter(self._by_start.__contains__, zip(payload, payload[1:], payload[2:], strict=False)))
+
+
+def _start(form: bytes) -> tuple[int, ...]:
+    return tuple(form[:SHORTEST])
+
+
+def _replaced(payload: bytes, forms: Iterable[bytes]) -> bytes:
+    try:
+        payload.decode()
+    except UnicodeDecodeError:
         return payload
+    for form in sorted(forms, key=lambda form: (-len(form), form)):  # the longest first
+        payload = _without(payload, form)
+    return payload
 
 
 def _forms(text: str) -> set[bytes]:
