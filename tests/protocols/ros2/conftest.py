@@ -64,7 +64,8 @@ class Peer:
 
     def publish(self, topic: str, type: str, message: Any) -> None:
         data = message if isinstance(message, bytes) else bytes(STORE.serialize_cdr(message, type))
-        self.session.put(self.key(topic, type), data)
+        # By default Zenoh drops what a busy machine does not take at once: pieces of a long message.
+        self.session.put(self.key(topic, type), data, congestion_control=zenoh.CongestionControl.BLOCK)
 
     def graph(self) -> list[list[str]]:
         """Return the known tokens, each cut at its slashes."""
