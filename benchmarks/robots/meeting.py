@@ -3,15 +3,17 @@
 Seeds are scenarios: even ones in the office (without the people that walk), odd ones in a building with a corridor for
 one robot, narrow doors and a room with one door. Each robot has two goals; the time is compared with that of the same
 drives alone. 200 scenarios take hours, so results are kept in a file: the next run goes on with the seeds that are
-missing in it, and the figures are of all that it has.
+missing in it, and the figures are of all that it has of the same sources (--mixed: of any).
 
-    scripts/bench meeting [--scenarios 20] [--first 0] [--workers 2] [--minutes 60] [--keep FILE] [--without-alone]
+    scripts/bench meeting [--scenarios 20] [--first 0] [--workers 2] [--minutes 60] [--keep FILE] [--mixed]
+                          [--without-alone]
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import hashlib
 import itertools
 import json
 import multiprocessing
@@ -105,16 +107,39 @@ def report(results: Sequence[Result], claims: Claims, name: str) -> None:
         print(f"{'  of a robot: median, 90 %, worst':36} {median:9.2f} {most:.2f} {single[-1]:.2f} x alone", flush=True)
 
 
+def sources() -> str:
+    """Return a hash of what the figures are of."""
+    root = Path(__file__).parents[2]
+    files = [root / "tests/meeting.py", *sorted((root / "src/roboglot").rglob("*.py"))]
+    files += sorted((root / "src/roboglot").rglob("*.toml"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
+
+
+def known(kept: Path, of: str, *, mixed: bool) -> dict[int, Result]:
+    """Return the results in the file by seed: those of these sources, or of any."""
+    results = dict[int, Result]()
+    others = 0
+    for line in kept.read_text().splitlines() if kept.exists() else ():
+        fields = json.loads(line)
+        if (found := fields.pop("sources", "")) != of:
+            others += 1
+        if found == of or mixed:
+            results[fields["seed"]] = Result(**fields)
+    if others:
+        print(f"{others} results in {kept} are of other sources, and {'counted' if mixed else 'left out'}")
+    return results
+
+
 def main(options: argparse.Namespace) -> None:
     kept: Path = options.keep
-    lines = kept.read_text().splitlines() if kept.exists() else []
-    results = {result.seed: result for result in (Result(**json.loads(line)) for line in lines)}
+    now = sources()
+    results = known(kept, now, mixed=options.mixed)
     missing = [seed for seed in range(options.first, options.first + options.scenarios) if seed not in results]
     until = time.monotonic() + 60.0 * options.minutes
     with kept.open("a") as file:
         for result in run(missing, options.workers, until, compare=not options.without_alone):
             results[result.seed] = result
-            print(json.dumps(asdict(result)), file=file, flush=True)
+            print(json.dumps({"sources": now, **asdict(result)}), file=file, flush=True)
             times = f", {statistics.mean(result.ratios):.2f} x alone" if result.ratios else ""
             troubles = "; ".join(result.touches + result.failures) or "no touch, all at both goals"
             print(f"seed {result.seed}: {troubles}{times}", flush=True)
@@ -135,5 +160,6 @@ if __name__ == "__main__":
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--minutes", type=float, default=60.0, help="no scenario is begun after so many")
     parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "roboglot-meeting.jsonl")
+    parser.add_argument("--mixed", action="store_true", help="count kept results of other sources, too")
     parser.add_argument("--without-alone", action="store_true")
     main(parser.parse_args())
