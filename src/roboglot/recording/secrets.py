@@ -1,4 +1,4 @@
-"""Confidential values of a session, known from its fields: whatever quotes them later is redacted, too.
+"""Confidential values of a session, known from its fields: text that quotes them later is redacted, too.
 
 A robot's refusal names the network that was asked for, and a log the person who was greeted; their words are the
 vendor's, so no field says where the name is.
