@@ -18,6 +18,7 @@ from roboglot.config import AccessConfig
 from roboglot.console.people.sessions import LIFETIME, Sessions
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, ProofKind
+from roboglot.model.components.system.lease import Lease
 from roboglot.operations import Right
 from tests.console.conftest import ADDRESS, Shown
 from tests.console.test_class_sign_in import PASSWORD, paged, signed
@@ -174,6 +175,30 @@ async def test_consoles_class_takes_pupils_after_a_restart(tmp_path: Path, monke
         assert (await signed(shown, name="Anna", code=code))[0] == 401
     async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
         assert (await signed(shown, name="Cem", code=code))[0] == 401
+
+
+async def test_robots_locked_in_a_class_that_is_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They stay locked over a restart, and their teacher can still unlock them."""
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    asking = AccessConfig(on=True, local=False)
+    (tmp_path / "w").mkdir()
+    store = open_store(tmp_path / "w")
+    store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
+    store.close()
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+        _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
+        code = str((await asyncio.to_thread(lesson, shown.url, teacher, do="open", name="7b"))["code"])
+        await signed(shown, name="Anna", code=code)
+        await asyncio.to_thread(lesson, shown.url, teacher, do="lock")
+        assert shown.robot[Lease].taken_by
+    [file] = tmp_path.rglob("lesson.json")  # noqa: ASYNC240 - small
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"until": 1.0}))
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+        teacher = f"roboglot-{shown.url.rpartition(':')[2]}={teacher.partition('=')[2]}"
+        assert shown.robot[Lease].taken_by
+        assert (await signed(shown, name="Cem", code=code))[0] == 401
+        assert await asyncio.to_thread(lesson, shown.url, teacher, do="close") == {}
+        assert not shown.robot[Lease].taken_by
 
 
 def test_setting_the_clock_changes_no_time_left(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,14 +15,14 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.desk import Desk
 from roboglot.console.http import Problem
 from roboglot.console.people.sessions import Session
 from roboglot.console.studio import class_wishes, classroom
 from roboglot.console.studio.class_files import KeptLesson, LessonFile
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, Right
-from roboglot.model.components.system.lease import Lease
+from roboglot.model.components.system.lease import TEACHER, Lease
 from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
 from roboglot.model.robot import Robot
 from roboglot.protocols.lease_desk import LEASE
@@ -30,7 +30,6 @@ from roboglot.values import dataclass
 
 MINUTES_MAX = 600
 NAME_MAX = 30  # characters of a pupil's name
-TEACHER = f"{CLIENT} teacher"  # the holder of a locked robot
 Name = Annotated[str, msgspec.Meta(max_length=class_wishes.NAME_MAX)]
 
 
@@ -145,9 +144,13 @@ class Classes:
         return min(self._desk.robots, key=taken.count)
 
     def _restored(self) -> Lesson | None:
-        """Return the class that was open when the program ended, with its pupils and locked robots."""
+        """Return the class that was open when the program ended, with its pupils and locked robots.
+
+        One that is over is left out, unless its teacher still has to unlock robots.
+        """
         kept = self._file.load() if self._file is not None else None
-        if kept is None or kept.until <= self._now():
+        locked = {name for name, here in self._desk.robots.items() if Lease in here and here[Lease].taken_by == TEACHER}
+        if kept is None or (kept.until <= self._now() and not locked):
             return None
         latest = self._now() + MINUTES_MAX * 60.0  # also where the clock was set back
         lesson = Lesson(kept.code, kept.name, min(kept.until, latest))
@@ -155,9 +158,7 @@ class Classes:
             if robot in self._desk.robots:
                 lesson.seats[identity] = Seat(identity, robot, kept.code, None, studio=False)
                 self._desk.pupils.add(identity)
-        for name, here in self._desk.robots.items():
-            if Lease in here and here[Lease].client == TEACHER:
-                self._desk.locked.add(name)
+        self._desk.locked |= locked
         return lesson
 
     async def _save(self, changed: Lesson) -> None:

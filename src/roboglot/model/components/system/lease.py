@@ -34,6 +34,7 @@ from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 PERSON = "a person"
+TEACHER = "console teacher"  # of a class, whose robots are locked: a role, and no client
 ITSELF = "the robot itself"
 ERRAND = "errand"  # the resource of actions that move the robot by a sequence of other actions
 MOVING = (BASE, LEGS, ARM, GRIPPER, GIMBAL, JACK, ERRAND)  # the resources that control covers, besides those of servos
@@ -130,8 +131,8 @@ class Lease(Component):
 
     @property
     def client(self) -> str:
-        """Name of the controlling client without its door; empty for a whole door, a person, or none."""
-        return "" if self._taken_by == PERSON else self._taken_by.partition(" ")[2]
+        """Name of the controlling client without its door; empty for a whole door, a person, a teacher, or none."""
+        return "" if self._taken_by in (PERSON, TEACHER) else self._taken_by.partition(" ")[2]
 
     def is_of(self, who: str) -> bool:
         """Return whether the client with identity ``who`` has control, at any door."""
