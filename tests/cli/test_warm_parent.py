@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.cli.warm import installation
+from roboglot.__main__ import _start_warm
+from roboglot.cli.warm import command, installation
 from roboglot.cli.warm.installation import socket_path
 from tests.warm_start import COLD
 
@@ -215,7 +216,18 @@ def test_an_idle_parent_ends_and_its_socket_goes(tmp_path: Path) -> None:
     place.close()
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "asks"),
+    [("test x.yaml", True), ("lesson x.toml", True), ("program run x.py --own", True), ("program run x.py", False)],
+)
+def test_commands_with_own_robots_ask_a_parent(monkeypatch: pytest.MonkeyPatch, line: str, asks: bool) -> None:
+    asked: list[tuple[str, list[str]]] = []
+    monkeypatch.setattr(command, "run", lambda kind, words: asked.append((kind, words)))
+    _start_warm(line.split())
+    assert asked == ([(command.COMMAND, line.split())] if asks else [])
+
+
+@pytest.mark.slow  # test_commands_with_own_robots_ask_a_parent, and all of these with a parent that has loaded nothing
 def test_a_program_on_its_own_robot_starts_warm(tmp_path: Path) -> None:
     """The first run is cold and starts a parent; a later one is its child."""
     place, program = Place(tmp_path), tmp_path / "hello.py"
