@@ -339,7 +339,7 @@ async def test_saved_map_is_seen_in_the_grid(served: Served, open_console: OpenC
     assert "hall" in await served.robot[MapLibrary].names()
     await page.click("text=Merge")
     await page.click("form >> text=Merge")
-    await page.wait_for_selector("text=hall is part of the map in use.")
+    await page.wait_for_selector("text=hall was merged into the map in use.")
     await page.click("nav a[href='#/robots']")
     async with asyncio.timeout(PATIENCE / 1000):
         while not await page.evaluate("document.querySelector('.thumbnail')?.naturalWidth > 0"):  # noqa: ASYNC110
