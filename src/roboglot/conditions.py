@@ -39,7 +39,7 @@ class Moment:
 
     @property
     def immediate(self) -> bool:
-        """True for now."""
+        """Return whether the moment is the present one."""
         return self.clock is None and self.amount == 0
 
 

@@ -32,7 +32,7 @@ class Secrets:
         self._count = 0  # of forms
 
     def learn(self, text: str) -> None:
-        """Redact this value from now on, if it tells one person or network from another."""
+        """Redact this value from now on, if it identifies a person or a network."""
         shortest = SHORTEST if text.isascii() else 2
         if not shortest <= len(text) <= LONGEST or text in self._known or text.strip().lower() in self._public:
             return

@@ -271,8 +271,9 @@ class _Service:
         except asyncio.CancelledError:  # the app does not wait for the end
             self._note_end(peer, code, call.began)
             raise
-        if fairness and use:
-            fairness.took(use, fairness.now() - begun)
+        finally:
+            if fairness and use:
+                fairness.took(use, fairness.now() - begun)
         if last is not None:
             await self._say(rpc, _answer(code, last))
 
