@@ -9,6 +9,7 @@ import pytest
 from roboglot.model.components.motion.base import Base
 from roboglot.model.errors import Collided
 from roboglot.model.geometry import Pose, Twist, Vector3
+from roboglot.simulation.world.gliding import Gliding
 from roboglot.simulation.world.meetings import Meetings
 
 from .conftest import Simulate, Simulation
@@ -44,9 +45,16 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
     return lives, calm, touched
 
 
-async def test_what_is_not_looked_for_does_not_happen(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
-    sparing, calm, touched = await lived(simulate("office", robots=("a", "b"), seed=3))
-    monkeypatch.setattr(Meetings, "look", lambda *_: None)
+@pytest.mark.parametrize("compiled", [False, True])
+async def test_what_is_not_looked_for_does_not_happen(
+    simulate: Simulate, monkeypatch: pytest.MonkeyPatch, *, compiled: bool
+) -> None:
+    simulation = simulate("office", robots=("a", "b"), seed=3)
+    if compiled:
+        simulation.world._physics.load_kernels()
+        monkeypatch.setattr(Gliding, "step", lambda *_: False)  # equals MuJoCo's steps up to rounding only
+    sparing, calm, touched = await lived(simulation)
+    monkeypatch.setattr(Meetings, "look", lambda *_, **__: None)
     thorough, always, _ = await lived(simulate("office", robots=("a", "b"), seed=3))
     assert sparing == thorough
     assert calm > 50

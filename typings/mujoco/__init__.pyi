@@ -130,6 +130,7 @@ class MjModel:
     body_rootid: _Ints
     body_subtreemass: _Floats
     bvh_aabb: _Floats
+    dof_M0: _Floats
     dof_damping: _Floats
     geom_aabb: _Floats
     geom_bodyid: _Ints
@@ -140,6 +141,7 @@ class MjModel:
     geom_rbound: _Floats
     geom_size: _Floats
     geom_type: _Ints
+    jnt_range: _Floats
     jnt_stiffness: _Floats
     qpos_spring: _Floats
     def actuator(self, name: str) -> _Named: ...

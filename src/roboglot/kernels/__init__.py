@@ -22,9 +22,8 @@ NAVIGATION = (
     "touring",
     "placing",
     "search",
-    "relocation",
 )
-MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "together", "raster_rooms", "posing")
+MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "together", "gliding", "raster_rooms", "posing")
 
 
 @contextmanager

@@ -26,7 +26,10 @@ HULL_WHEEL_X, HULL_WHEEL_Y, HULL_WHEEL_YAW = 27, 28, 29  # present velocity of t
 HULL_SLACK = 30  # flag: a wheel is dead, or all roll freely
 HULL_SINKING, HULL_BELLY = 31, 32  # speed of the torso in the physics; height of its underside above the floor, m
 HULL_GAZE_PITCH, HULL_GAZE_YAW = 33, 34  # of the gimbal; zero without one
-HULL_WIDTH = 35
+HULL_SERVO = 35  # control of the torso's servo
+HULL_RADIUS = 36
+HULL_FLOOR, HULL_WALLS = 37, 38  # where edges and walls were looked up; distance to the nearest wall from there, m
+HULL_WIDTH = 39
 
 TOGETHER, ALONE = 1.0, 2.0  # values of the first column of each table below; 0: no such part
 USE = 0

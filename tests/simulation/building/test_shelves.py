@@ -10,7 +10,7 @@ from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.motion.base import Base
 from roboglot.model.geometry import Pose, Twist
 from roboglot.simulation.building.blueprint import Solid, SolidKind
-from roboglot.simulation.world.overlap import overlap
+from roboglot.simulation.building.overlap import overlap
 
 places, sizes = st.floats(-1.5, 1.5), st.floats(0.1, 2.0)
 WORLD = """

@@ -15,8 +15,7 @@ from roboglot.autonomy.slam.certainty import SURE_SIGMA, THINGS_SHARE, Look, Sup
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import NEARBY, ScanPoints
 from roboglot.kernels.matching import match
-from roboglot.kernels.placing import PlaceSearch, pyramid, turned_offsets
-from roboglot.kernels.relocation import correlate, likelihood_field
+from roboglot.kernels.placing import PlaceSearch, correlate, likelihood_field, pyramid, turned_offsets
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.values import dataclass

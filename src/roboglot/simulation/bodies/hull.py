@@ -17,11 +17,13 @@ from roboglot.kernels.layouts import (
     HULL_COUNTED,
     HULL_DRIVE_X,
     HULL_DRIVE_YAW,
+    HULL_FLOOR,
     HULL_FREE,
     HULL_HELD,
     HULL_LOOKED_X,
     HULL_TURNED,
     HULL_VX,
+    HULL_WALLS,
     HULL_X,
 )
 from roboglot.model.geometry import LEVEL as STRAIGHT
@@ -130,7 +132,9 @@ class Hull(HullState):
         self.when_touched: list[Duty] = []  # start when the hull is touched
         self.edges, self.walls = Nearness(body.hull.radius), Nearness(body.hull.radius)
         self._looked = -1  # the floor on which they were last looked up; place and reach are in the row
-        self.enter((self._q, self._v, first), (self._torso, self._sinking), body.hull.height - body.hull.torso_height)
+        servo = self.legs.servo if self.legs else -1
+        torso, shape = (self._torso, self._sinking, servo), body.hull
+        self.enter((self._q, self._v, first), torso, shape.height - shape.torso_height, shape.radius)
 
     @property
     def geoms(self) -> list[int]:
@@ -205,6 +209,7 @@ class Hull(HullState):
             self.support.walls(walls.near)
         self._looked, row = floor, self._row
         row[HULL_LOOKED_X], row[HULL_LOOKED_X + 1] = x, y
+        row[HULL_FLOOR], row[HULL_WALLS] = floor, walls.away
         row[HULL_FREE] = min(edges.left(x, y, floor), walls.left(x, y, floor))
 
     @property

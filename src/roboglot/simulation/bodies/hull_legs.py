@@ -16,24 +16,27 @@ TORSO = 0.4  # of the mass; the rest is the chassis
 
 
 class HullLegs:
-    """``torso`` and ``sinking``: indices of the torso's underside in MuJoCo's positions and velocities."""
+    """``torso`` and ``sinking``: indices of the torso's underside in MuJoCo's positions and velocities.
+
+    ``servo``: that of its control.
+    """
 
     def __init__(self, model: MjModel, data: MjData, name: str, body: Body) -> None:
         self._model, self._section = model, body.hull
         self._positions, self._ctrl = data.qpos, data.ctrl  # views of the current values
-        torso, self._servo = model.joint(f"{name} torso"), model.actuator(f"{name} torso").id
+        torso, self.servo = model.joint(f"{name} torso"), model.actuator(f"{name} torso").id
         self.torso, self.sinking = int(torso.qposadr[0]), int(torso.dofadr[0])
-        self._gains = (model.actuator_gainprm[self._servo].copy(), model.actuator_biasprm[self._servo].copy())
+        self._gains = (model.actuator_gainprm[self.servo].copy(), model.actuator_biasprm[self.servo].copy())
         self._sag = body.hull.mass * TORSO * GRAVITY / LEG_GAIN
         self._chassis = model.geom(f"{name} chassis").id
 
     def hold(self, height: float | None, *, weightless: bool = False) -> None:
         """Hold the torso at ``height`` m, or let it sink (None); ``weightless``: in free fall it needs no support."""
         limp = height is None
-        self._model.actuator_gainprm[self._servo] = 0.0 if limp else self._gains[0]
-        self._model.actuator_biasprm[self._servo] = 0.0 if limp else self._gains[1]
+        self._model.actuator_gainprm[self.servo] = 0.0 if limp else self._gains[0]
+        self._model.actuator_biasprm[self.servo] = 0.0 if limp else self._gains[1]
         if height is not None:
-            self._ctrl[self._servo] = height + (0.0 if weightless else self._sag)
+            self._ctrl[self.servo] = height + (0.0 if weightless else self._sag)
 
     def put(self, height: float) -> None:
         """Set the torso's height (m) at once."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from roboglot.kernels.layouts import (
     HULL_A,
     HULL_BEFORE,
@@ -12,12 +14,15 @@ from roboglot.kernels.layouts import (
     HULL_HELD,
     HULL_LEANS,
     HULL_Q,
+    HULL_RADIUS,
+    HULL_SERVO,
     HULL_SINKING,
     HULL_SLACK,
     HULL_TORSO,
     HULL_TURNED,
     HULL_V,
     HULL_VX,
+    HULL_WALLS,
     HULL_WHEEL_X,
     HULL_WIDTH,
     HULL_X,
@@ -44,12 +49,12 @@ class HullState:
         self._hand: float | None = None
         self._overturned = self._free = False
 
-    def enter(self, first: tuple[int, int, int], torso: tuple[int, int], belly: float) -> None:
-        """Enter its places in the physics: first position, velocity and control; torso (-1: no legs); height, m."""
+    def enter(self, first: tuple[int, int, int], torso: tuple[int, int, int], belly: float, radius: float) -> None:
+        """Enter its places in the physics: first position, velocity and control; torso (-1: no legs); sizes, m."""
         row = self._row
         row[HULL_Q], row[HULL_V], row[HULL_A] = first
-        row[HULL_TORSO], row[HULL_SINKING] = torso
-        row[HULL_BELLY] = belly
+        row[HULL_TORSO], row[HULL_SINKING], row[HULL_SERVO] = torso
+        row[HULL_BELLY], row[HULL_RADIUS], row[HULL_WALLS] = belly, radius, -math.inf
 
     @property
     def x(self) -> float:

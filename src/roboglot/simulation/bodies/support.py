@@ -56,6 +56,11 @@ class Nearness:
             return -1.0
         return self._free - abs(x - self._x) - abs(y - self._y)
 
+    @property
+    def away(self) -> float:
+        """Distance from the middle to the building at the last check, m; negative if unknown."""
+        return self._next
+
     def gap(self, x: float, y: float, floor: int) -> float:
         """Return the least free distance (m) around a robot at a place; negative if unknown."""
         if floor != self._floor or self._room is None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from roboglot.kernels.arrays import FloatArray
 from roboglot.simulation.building.blueprint import Rectangle, SolidKind, holes_of, shaft_of, solids_of
 from roboglot.simulation.world.description import WorldDescription
 
@@ -29,6 +30,13 @@ class Walls:
             solids = [s for s in solids_of(floor, world.lift, lift_here=True) if s.kind is not SolidKind.DOCK]
             rows = [(s.pose.x, s.pose.y, math.cos(s.pose.yaw), math.sin(s.pose.yaw), *s.size[:2]) for s in solids]
             self._floors.append(np.array(rows).reshape(-1, 6).T.copy())
+
+    def table(self) -> FloatArray:
+        """Return rows x, y, cosine and sine of yaw, half the width and the depth, floor."""
+        rows = [np.vstack((rows, np.full(rows.shape[1], floor))) for floor, rows in enumerate(self._floors)]
+        table = np.ascontiguousarray(np.hstack(rows).T)
+        table[:, 4:6] /= 2.0
+        return table
 
     def room(self, x: float, y: float, floor: int) -> float:
         """Return the distance to the nearest wall or piece of furniture, m; inf: there is none."""

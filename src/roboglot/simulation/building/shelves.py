@@ -12,9 +12,9 @@ from roboglot.simulation.building.blueprint import (
     shelf_solids,
     solids_of,
 )
+from roboglot.simulation.building.overlap import overlap, reach_of
 from roboglot.simulation.building.props import Props
 from roboglot.simulation.world.description import Shelf, WorldDescription
-from roboglot.simulation.world.overlap import overlap, reach_of
 
 
 class ShelfStand:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.building.props import AWAY, Props
+from roboglot.simulation.world.gliding import Gliding
 
 ROOM = 0.02  # m of safety margin: more than contacts extend beyond the shapes
 PERSON_MAX = 3.0  # m/s
@@ -29,10 +30,15 @@ class Meetings:
     """Switches the search for contacts. Treats everything as round, and all floors as one."""
 
     def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, hulls: Sequence[Hull], props: Props, *, possible: bool
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        hulls: Sequence[Hull],
+        props: Props,
+        gliding: Gliding | None,
     ) -> None:
-        """``possible``: whether this world can be without contacts at all."""
-        self._model, self._data, self._hulls, self._props, self._possible = model, data, hulls, props, possible
+        """``gliding``: None if this world cannot be without contacts at all."""
+        self._model, self._data, self._hulls, self._props, self._gliding = model, data, hulls, props, gliding
         bodies = np.flatnonzero(model.body_mocapid >= 0)
         bodies = bodies[np.argsort(model.body_mocapid[bodies])]
         self._geoms = model.body_geomadr[bodies]
@@ -51,9 +57,12 @@ class Meetings:
         self._switch(off=False)
         self._left, self._others = 0.0, None
 
-    def look(self, seconds: float) -> None:
-        """Decide whether the physics searches for contacts in a step of ``seconds``."""
-        if not self._possible:
+    def look(self, seconds: float, *, touched: bool = False) -> None:
+        """Decide whether the physics searches for contacts in a step of ``seconds``; ``touched``: some hull is."""
+        if self._gliding is None:
+            return
+        if self._gliding.loaded:  # looks at everything in every tick
+            self._switch(off=not touched and self._gliding.clear(seconds))
             return
         revision = sum(self._props.revisions.values())
         if revision != self._revision or (self.off and not all(map(self._as_expected, self._hulls))):

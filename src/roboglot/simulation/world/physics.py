@@ -21,11 +21,13 @@ from roboglot.simulation.bodies.rows import Rows, Seat
 from roboglot.simulation.bodies.sleep import RESTS, Sleep, tiny
 from roboglot.simulation.bodies.support import LIFTED
 from roboglot.simulation.building.blueprint import Solid, SolidKind
+from roboglot.simulation.building.floor_edges import Walls
 from roboglot.simulation.building.props import AWAY, OBSTACLES_MAX, Props
 from roboglot.simulation.building.terrain import Ground
 from roboglot.simulation.building.things import Things
 from roboglot.simulation.people.people import keyed
 from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.gliding import Gliding
 from roboglot.simulation.world.meetings import Meetings
 from roboglot.simulation.world.rays import Rays
 from roboglot.simulation.world.scene import TIMESTEP, VISITORS_MAX, build, visitors
@@ -90,7 +92,10 @@ class Physics:
         }
         self.things = Things(model, self._data, world)
         calm = not (self.ground.uneven or any(floor.things for floor in world.floors))
-        self._meetings = Meetings(model, self._data, list(self.hulls.values()), self.props, possible=calm)
+        self._gliding: Gliding | None = None
+        if calm and self.hulls:
+            self._gliding = Gliding(model, self._data, self._hull_rows, Walls(world), car=world.lift is not None)
+        self._meetings = Meetings(model, self._data, self._all_hulls, self.props, self._gliding)
         self._sleep = Sleep(model, self._data)
 
     def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
@@ -101,11 +106,16 @@ class Physics:
         for hull in self.hulls.values():
             if hull.hand is not None:
                 hull.handle()
-        self._meetings.look(seconds)
-        if meanwhile is None and self._meetings.off and self._sleep.lasts:
-            self.rays.outdate()
-            return
+        self._meetings.look(seconds, touched=bool(self._touched))
         steps = round(seconds / TIMESTEP)
+        if meanwhile is None and self._meetings.off:
+            if self._sleep.lasts:
+                self.rays.outdate()
+                return
+            if self._gliding is not None and self._gliding.step(steps):
+                self.rays.outdate()
+                self._see()
+                return
         if meanwhile is None:
             mujoco.mj_step(self._model, self._data, nstep=steps)
         else:
@@ -113,6 +123,11 @@ class Physics:
                 mujoco.mj_step(self._model, self._data)
                 meanwhile(TIMESTEP)
         self._see()
+
+    def load_kernels(self) -> None:
+        """Move robots that nothing can touch without MuJoCo from now on."""
+        if self._gliding is not None:
+            self._gliding.load_kernels()
 
     def drive(self, seconds: float) -> None:
         """Turn the wheels of all robots as commanded, for the next ``seconds``."""

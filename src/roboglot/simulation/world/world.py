@@ -193,10 +193,11 @@ class World:
     async def _load_kernels(self) -> None:
         """Switch the sensors to the compiled kernels; missing ones are compiled first, in a process of their own."""
         with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors continue without it
-            await compile_beside(("sweep", "rays", "together"))
+            await compile_beside(("sweep", "rays", "together", "gliding"))
             await load(self._environment.sight.load_kernel)
             await load(self._environment.rays.load_kernel)
             await load(self._physics.rows.load_kernels)
+            await load(self._physics.load_kernels)
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""

@@ -1,0 +1,99 @@
+"""Motion of robots while nothing can touch them, without MuJoCo's steps; its results agree with them up to rounding.
+
+Needs the compiled kernels; until they are loaded, MuJoCo moves all robots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from roboglot.kernels import loading
+from roboglot.kernels.arrays import FloatArray
+from roboglot.simulation.bodies.sleep import RESTS
+from roboglot.simulation.bodies.support import GRAVITY
+from roboglot.simulation.building.floor_edges import Walls
+from roboglot.simulation.building.props import AWAY
+from roboglot.values import dataclass
+
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
+
+MARGIN = 0.012  # m around each robot: more than contacts extend beyond the shapes and what speed gains in a tick
+
+
+@dataclass(frozen=True, slots=True)
+class _Kernels:
+    """The compiled functions of ``kernels/gliding.py``."""
+
+    clear: Callable[..., bool]
+    glide: Callable[..., bool]
+
+
+class Gliding:
+    """All robots of a world; its floors are level, and only robots and a lift's car move."""
+
+    def __init__(self, model: MjModel, data: MjData, hulls: FloatArray, walls: Walls, *, car: bool) -> None:
+        """``hulls``: the table of all; ``car``: whether there is a lift."""
+        self._kernels: _Kernels | None = None
+        self._data = data
+        movable = np.flatnonzero(model.body_mocapid >= 0)
+        geoms = model.body_geomadr[movable[np.argsort(model.body_mocapid[movable])]].astype(np.int64)
+        people = model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE
+        shapes = model.geom_size, np.where(people, -1 - geoms, geoms)
+        self._near = hulls, walls.table(), data.mocap_pos, data.mocap_quat, *shapes, AWAY[2] / 2, MARGIN
+        self._motion = (
+            hulls,
+            np.zeros((len(hulls), 7)),
+            data.qpos,
+            data.qvel,
+            data.ctrl,
+            data.qacc,
+            data.actuator_force,
+            model.dof_M0,
+            model.jnt_range,
+            model.qpos_spring,
+            model.jnt_stiffness,
+            model.dof_damping,
+            model.actuator_gainprm,
+            model.actuator_biasprm,
+            model.actuator_forcerange,
+            GRAVITY,
+            float(model.opt.timestep),
+        )
+        self._car: tuple[FloatArray, FloatArray, FloatArray] | None = None  # place, rate and goal
+        if car:
+            joint, servo = model.joint("car"), model.actuator("car").id
+            q, v = joint.qposadr[0], joint.dofadr[0]
+            self._car = data.qpos[q : q + 1], data.qvel[v : v + 1], data.ctrl[servo : servo + 1]  # views
+
+    def load_kernels(self) -> None:
+        """Compute with the compiled kernels from now on."""
+        with loading():
+            from roboglot.kernels import gliding
+
+        self._kernels = _Kernels(gliding.clear, gliding.glide)
+
+    @property
+    def loaded(self) -> bool:
+        """True once the kernels are in use."""
+        return self._kernels is not None
+
+    def clear(self, seconds: float) -> bool:
+        """Return whether no robot can touch anything in a step of ``seconds``, and none has to be watched."""
+        return self._kernels is not None and self._kernels.clear(*self._near, seconds)
+
+    def step(self, steps: int) -> bool:
+        """Move robots that are clear on by so many steps of the physics; return False if this takes MuJoCo."""
+        if self._kernels is None or self._data.nefc or not self._car_stands():
+            return False
+        return self._kernels.glide(*self._motion, steps)
+
+    def _car_stands(self) -> bool:
+        if self._car is None:
+            return True
+        place, rate, goal = (float(number[0]) for number in self._car)
+        return -RESTS <= rate <= RESTS and -RESTS <= place - goal <= RESTS
