@@ -39,6 +39,7 @@ from roboglot.protocols.door import Endpoint
 from roboglot.runtime import Runtime
 from roboglot.simulation.world.world_files import load_world
 from tests.console.conftest import ADDRESS, Shown
+from tests.protocols.held import held, until
 
 
 async def test_a_new_map_is_more_than_the_marker() -> None:
@@ -47,6 +48,19 @@ async def test_a_new_map_is_more_than_the_marker() -> None:
         grid = OccupancyGrid(np.zeros((cells, cells), np.int8), 0.05, Point(0.0, 0.0))
         pixels = np.asarray(Image.open(io.BytesIO(thumbnail(grid, Pose(0.05, 0.05)))))
         assert [bool((pixels == colour).all(axis=2).any()) for colour in (ROBOT, UNKNOWN)] == [marked, True]
+
+
+async def test_request_beyond_its_share_waits_but_to_stop(shown: Shown) -> None:
+    fairness = held(shown.robot)
+    fairness.on = True
+    asking = asyncio.ensure_future(shown.ask("/api/robots"))
+    await until(lambda: len(fairness.waited) > 3)
+    for verb in ("stop", "pause", "cancel"):
+        await shown.ask(f"/api/robots/a/{verb}", {})
+    assert not asking.done()
+    fairness.on = False
+    assert (await asking)[0] == 200
+    assert set(fairness.counted) == set(fairness.waited)
 
 
 async def test_one_robot_is_driven_mapped_and_refused(shown: Shown) -> None:

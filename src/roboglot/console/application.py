@@ -16,7 +16,7 @@ from roboglot.console.desk import Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
 from roboglot.console.live import Page
 from roboglot.console.people.classes import Classes
-from roboglot.console.people.entry import CHALLENGE, admission_of, enter
+from roboglot.console.people.entry import CHALLENGE, address_of, admission_of, enter
 from roboglot.console.people.sessions import Sessions
 from roboglot.console.people.signing import Signing
 from roboglot.console.program_runs import end_all
@@ -30,6 +30,7 @@ from roboglot.model.admission import Right, Unknown
 from roboglot.model.background import load
 from roboglot.model.client_context import client, identity
 from roboglot.protocols.browsers import Browsers, of_rows
+from roboglot.protocols.turns import Turns
 from roboglot.transport.limiter import Limiter
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 P = TypeVar("P", Page, Session)
 QUERY_MAX = 500  # bytes passed on to the log-in page
+STOPS = ("/stop", "/cancel", "/pause", "/emergency_stop")  # verbs of robots
 GOING_AWAY, BAD_DATA, POLICY, TRY_LATER = 1001, 1003, 1008, 1013
 
 
@@ -99,6 +101,11 @@ class Application:
         return self._browsers.refusal(of_rows(scope["headers"], method))
 
     async def _serve_http(self, scope: Scope, receive: Receive, send: Send) -> None:
+        turns = Turns(self._desk.first, address_of(scope))
+        await turns.take(lambda: _stops(scope["path"]))
+        await turns.count(self._answer_http(scope, receive, send))
+
+    async def _answer_http(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             if why := self._refusal(scope, scope["method"]):
                 raise Problem(403, why)
@@ -227,6 +234,10 @@ class Application:
     def _close_pages_of(self, who: str) -> None:
         for listening in [task for task, owner in self._listening.items() if owner == who]:
             listening.cancel()
+
+
+def _stops(path: str) -> bool:
+    return path.startswith("/api/robots/") and path.endswith(STOPS)
 
 
 async def _listen(page: Page | Session, longest: int, receive: Receive) -> None:

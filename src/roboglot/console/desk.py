@@ -66,6 +66,11 @@ class Desk:
         self.views = {name: RobotView(robot, self.stage) for name, robot in self.robots.items()}
 
     @property
+    def first(self) -> Robot:
+        """A robot, for what all robots of a program share."""
+        return next(iter(self.robots.values()))
+
+    @property
     def visible(self) -> dict[str, RobotView]:
         """Views of the robots that the current client may see, by name."""
         return {name: view for name, view in self.views.items() if view.robot.admission.may(Right.SEE)}

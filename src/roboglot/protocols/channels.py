@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import replace
 from typing import Protocol
 
 from roboglot.model.inputs.outside import CAME, GONE, Outside
+from roboglot.model.robot import Robot
 from roboglot.operations import Right
+from roboglot.protocols.turns import Turns
 from roboglot.values import dataclass
 
 Send = Callable[[str], None]
@@ -43,7 +47,7 @@ class Carrier(Protocol):
 class Session(Protocol):
     """One client at one path, from its opening to its end."""
 
-    async def receive(self, message: str | bytes) -> None:
+    def receive(self, message: str | bytes) -> Coroutine[object, None, None]:
         """Handle one message; calls begin in the order of the messages, and run concurrently where they wait."""
 
     def close(self) -> None:
@@ -115,3 +119,33 @@ def noted(channel: Channel, outside: Outside, door: str, path: str) -> Channel:
         return _Noted(session, lambda: outside.note_client(GONE, door, carrier.name))
 
     return replace(channel, open=open_noted)
+
+
+class _Taking:
+    """A session whose messages wait for their turns."""
+
+    def __init__(self, inner: Session, turns: Turns, stops: Callable[[str | bytes], bool]) -> None:
+        self._inner, self._turns, self._stops = inner, turns, stops
+        self._order = asyncio.Lock()
+        self._waiting: deque[str | bytes] = deque()
+        self.close = inner.close
+
+    async def receive(self, message: str | bytes) -> None:
+        """Pass the message on when it is its turn, and no earlier one waits."""
+        self._waiting.append(message)
+        self._turns.look()
+        async with self._order:
+            try:
+                await self._turns.take(lambda: any(map(self._stops, self._waiting)))
+            finally:
+                self._waiting.popleft()
+        await self._turns.count(self._inner.receive(message))
+
+
+def taking_turns(channel: Channel, robot: Robot, stops: Callable[[str | bytes], bool]) -> Channel:
+    """Return the channel with fairness to other clients; ``stops``: whether a message stops the robot."""
+
+    def open_fair(carrier: Carrier) -> Session:
+        return _Taking(channel.open(carrier), Turns(robot, carrier.name), stops)
+
+    return replace(channel, open=open_fair)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import time
 
@@ -13,11 +14,13 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.cyberdog.stops import stops
 from roboglot.protocols.cyberdog.table import extras, implemented, partly
 from roboglot.simulation.world.world import World
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import FileError
 from tests.protocols.cyberdog.phone import ADDRESS, Client, until
+from tests.protocols.held import held
 
 
 @pytest.fixture
@@ -97,6 +100,42 @@ async def test_unreadable_requests_are_answered_in_band(sent, client, messages, 
     with pytest.raises(grpc.aio.AioRpcError) as caught:
         await client.send("heartbeat", sent)
     assert caught.value.code() is grpc.StatusCode.UNIMPLEMENTED
+
+
+async def test_request_beyond_its_share_waits_but_to_stop(client, robot) -> None:
+    fairness = held(robot)
+    fairness.on = True
+    asking = asyncio.ensure_future(client.ask(10001))
+    await until(lambda: len(fairness.waited) > 3)
+    still = {"motion_id": 303, "cmd_type": 1, "vel_des": [0, 0.0, 0]}
+    for code, params in ((1002, still), (1002, {"motion_id": 303, "cmd_type": 2}), (6009, {"type": 5})):
+        await client.raw(code, json.dumps(params))
+    assert not asking.done()
+    waited = len(fairness.waited)
+    moving = asyncio.ensure_future(client.raw(1002, json.dumps(still | {"vel_des": [0.1, 0, 0]})))
+    await until(lambda: len(fairness.waited) > waited + 3)
+    assert not moving.done()
+    fairness.on = False
+    assert "task_status" in await asking
+    await moving
+    assert set(fairness.counted) == set(fairness.waited)
+
+
+@pytest.mark.parametrize(
+    ("code", "params", "expected"),
+    [
+        (1004, {"motion_id": 0}, True),
+        (1004, {"motion_id": 111}, False),
+        (1101, {}, True),
+        (2002, {"type": "task", "id": "1", "target_id": ["t"], "operate": "shutdown"}, True),
+        (2002, {"type": "task", "id": "1", "target_id": ["t"], "operate": "run"}, False),
+        (1002, {"motion_id": 303}, False),
+        (10001, {}, False),
+    ],
+)
+def test_requests_to_stop_are_known(code: int, params: dict[str, object], expected: bool) -> None:
+    assert stops(code, json.dumps(params)) is expected
+    assert not stops(1002, "{")
 
 
 @pytest.mark.parametrize("text", ["[]", "5", "null", '"text"', '{"motion_id":null}'])

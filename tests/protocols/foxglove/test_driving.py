@@ -16,6 +16,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden
 from roboglot.operations import Right
 from tests.protocols.foxglove.conftest import ADDRESS, PORT, Scene, Viewer
+from tests.protocols.held import held
 
 FORWARD = {"linear": {"x": 0.3, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}}
 
@@ -41,6 +42,26 @@ async def test_teleoperation_drives_until_the_dead_mans_time(scene: Scene, topic
     assert 0.3 < x < 0.6  # 1.5 s at 0.3 m/s, then it brakes
     await scene.clock.advance(1.0)
     assert scene.robot[Odometry].reading.pose.x == pytest.approx(x, abs=0.01)
+
+
+async def test_stop_waits_for_no_other_client(scene: Scene) -> None:
+    viewer, fairness = await publisher(scene, "/cmd_vel"), held(scene.robot)
+    await viewer.settled()
+    fairness.on, counted = True, len(fairness.counted)
+    await viewer.publish(FORWARD)
+    await viewer.until(lambda: fairness.waited)
+    assert not scene.robot.actions.running()
+    await viewer.publish(FORWARD | {"linear": {"x": 0, "y": -0.0, "z": 0}})
+    await viewer.until(lambda: len(fairness.counted) >= counted + 2)
+    await scene.clock.advance(1.0)
+    assert scene.robot[Odometry].reading.pose.x == pytest.approx(0.0, abs=0.01)
+    waited = len(fairness.waited)
+    await viewer.publish(FORWARD)
+    await viewer.until(lambda: len(fairness.waited) > waited + 3)
+    fairness.on = False
+    await viewer.settled()
+    await scene.clock.advance(1.0)
+    assert scene.robot[Odometry].reading.pose.x > 0.1
 
 
 async def test_who_goes_away_lets_go(scene: Scene) -> None:

@@ -14,6 +14,8 @@ from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.protocols.robomaster import limits
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.robomaster.stops import stops
+from tests.protocols.held import held
 from tests.protocols.robomaster.text_client import ADDRESS
 
 FLOOD = 50_000
@@ -242,6 +244,42 @@ async def test_flood_waits_for_turns_and_is_answered(connect, robot) -> None:
     await until(lambda: not fairness.waits)
     assert await (await connect()).ask("version;") == "version 00.00.00.70;"
     await greedy.close()
+
+
+async def test_stop_waits_for_no_other_client(connect, robot) -> None:
+    fairness, greedy = held(robot), await connect()
+    assert await greedy.ask("command;") == "ok;"
+    fairness.on = True
+    greedy.send("robot mode ?;")
+    await until(lambda: fairness.waited)
+    greedy.send("version;chassis speed x 0 y 0.0 z -0;")
+    for reply in ("chassis_lead;", "version 00.00.00.70;", "ok;"):  # those before it go with it, in order
+        assert await greedy.reply() == reply
+    asked = len(fairness.waited)
+    greedy.send("chassis speed x 0.1 y 0 z 0;")
+    await until(lambda: len(fairness.waited) > asked)
+    fairness.on = False
+    assert await greedy.reply() == "ok;"
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        ("chassis wheel w1 0 w2 0 w3 0 w4 0 seq 7", True),
+        ("gimbal speed p 0 y 0", True),
+        ("robotic_arm stop", True),
+        ("quit", True),
+        ("chassis speed ?", False),
+        ("chassis speed x", False),
+        ("chassis wheel w1 0 w2 0 w3 0 w4 1", False),
+        ("chassis move x 0", False),
+        ("chassis speed x zero", False),
+        ("version seq x", False),
+        (None, False),
+    ],
+)
+def test_commands_to_stop_are_known(command: str | None, expected: bool) -> None:
+    assert stops(command) is expected
 
 
 async def test_client_that_is_not_read_from_can_leave(client, door, robot, forward) -> None:

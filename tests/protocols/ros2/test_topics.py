@@ -12,6 +12,8 @@ import pytest
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
+from roboglot.protocols.ros2.server import PENDING_MAX
+from tests.protocols.held import held
 from tests.protocols.ros2.conftest import STORE, Opened, Peer, Scene
 
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"
@@ -36,6 +38,7 @@ def pose(x: float, y: float, yaw: float = 0.0) -> Any:
     return made("geometry_msgs/msg/Pose", position=made("geometry_msgs/msg/Point", x=x, y=y, z=0.0), orientation=turn)
 
 
+STILL = made(TWIST, linear=vector(-0.0), angular=vector())
 FORWARD = made(TWIST, linear=vector(0.3), angular=vector())
 
 
@@ -46,6 +49,28 @@ async def published(scene: Scene, topic: str, type: str, message: Any) -> None:
     scene.peer.publish(topic, type, message)
     await scene.peer.until(lambda: len(heard) >= 2)
     leave()
+
+
+async def test_stop_waits_for_no_other_client(opened: Opened) -> None:
+    scene = await opened()
+    fairness, heard = held(scene.robot), list[Any]()
+    leave = scene.robot.tap.listen(heard.append)
+    fairness.on = True
+    for _ in range(3 * PENDING_MAX):  # more than are kept: the oldest go
+        scene.peer.publish("/a/cmd_vel", TWIST, FORWARD)
+    await scene.peer.until(lambda: fairness.waited)
+    scene.peer.publish("/a/cmd_vel", TWIST, STILL)
+    stop = bytes(STORE.serialize_cdr(STILL, TWIST))
+    await scene.peer.until(lambda: any(exchange.payload == stop for exchange in heard))
+    leave()
+    await scene.peer.until(lambda: not scene.robot.actions.running(), 5.0)
+    waited = len(fairness.waited)
+    scene.peer.publish("/a/cmd_vel", TWIST, FORWARD)
+    await scene.peer.until(lambda: len(fairness.waited) > waited + 3)
+    assert not scene.robot.actions.running()
+    fairness.on = False
+    await scene.peer.until(scene.robot.actions.running)
+    assert set(fairness.counted) == {"ros2 a:zenoh"}
 
 
 async def test_topics_come_with_the_robots_values(opened: Opened) -> None:

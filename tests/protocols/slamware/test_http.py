@@ -8,7 +8,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware import parameters
@@ -19,6 +18,7 @@ from roboglot.protocols.slamware.routes import BEYOND, Routes
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.slamware.table import TABLE, implemented
 from roboglot.wire.contracts import contract
+from tests.protocols.held import held, until
 
 ROWS = contract("slamware")
 ACTIONS = "/api/core/motion/v1/actions"
@@ -45,25 +45,18 @@ async def test_missing_things_are_reported_by_name(
         assert row.name in reply.text
 
 
-async def test_client_beyond_its_share_waits(
-    bare: Robot, bare_client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bare.fairness = fairness = Fairness(lambda: 0.0, lambda: 0.0)
-    waits, shares = [0.02, 0.0], list[Use]()
-
-    def wait(share: Use) -> float:
-        shares.append(share)
-        return waits.pop(0)
-
-    monkeypatch.setattr(fairness, "wait", wait)
-    begun = asyncio.get_running_loop().time()
-    assert (await bare_client.get(POIS)).status_code == 200
-    assert asyncio.get_running_loop().time() >= begun + 0.02
-    assert (await bare_client.get(POIS)).status_code == 200
-    assert shares[0] is shares[1]
-    assert shares[0].name.startswith("127.0.0.1:")
-    assert shares[0].used > 0.0
-    assert fairness.of(shares[0].name) is shares[0]
+async def test_client_beyond_its_share_waits_but_to_stop(bare: Robot, bare_client: httpx.AsyncClient) -> None:
+    fairness = held(bare)
+    fairness.on = True
+    asking = asyncio.ensure_future(bare_client.get(POIS))
+    await until(lambda: len(fairness.waited) > 3)
+    assert not asking.done()
+    assert (await bare_client.delete(f"{ACTIONS}/:current")).status_code == 200
+    assert not asking.done()
+    fairness.on = False
+    assert (await asking).status_code == 200
+    assert fairness.waited[0].startswith("127.0.0.1:")
+    assert set(fairness.counted) == set(fairness.waited)
 
 
 def test_literals_win_over_parameters() -> None:

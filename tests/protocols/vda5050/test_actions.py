@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.tap import Direction
+from tests.protocols.held import held
 from tests.protocols.vda5050.conftest import ADDRESS, Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
 
@@ -51,6 +54,34 @@ async def test_a_load_is_picked_reported_and_dropped(yard: Opened) -> None:
     assert states(one)["d"][0] == "FINISHED"
     assert one.control.state["loads"] == []
     assert one.control.errors.count("ACTION_FAILED") == 1
+
+
+async def test_flood_waits_at_the_broker(yard: Opened) -> None:
+    one = await yard()
+    fairness, heard = held(one.robot), list[Any]()
+    leave = one.robot.tap.listen(heard.append)
+    fairness.on = True
+    for number in range(300):
+        one.control.send("instantActions", instant(action("stateRequest", f"s{number}")), wait=False)
+    await one.until(lambda: len(fairness.waited) > 3)
+    fairness.on = False
+    await one.until(lambda: sum(exchange.direction is Direction.REQUEST for exchange in heard) == 300)
+    assert set(fairness.waited) == {"vda5050 a:broker"}
+    leave()
+
+
+async def test_message_to_stop_waits_for_no_other_client(yard: Opened) -> None:
+    one = await yard()
+    fairness = held(one.robot)
+    one.control.send("order", order("far", [(0, 0), (9, 0)]))
+    await one.until(lambda: one.control.state["driving"])
+    fairness.on = True
+    one.control.send("instantActions", instant(action("stateRequest", "s")))
+    await one.until(lambda: bool(fairness.waited))
+    one.control.send("instantActions", instant(action("cancelOrder", "c")))
+    await one.until(lambda: states(one).get("c", ("", ""))[0] == "FINISHED")
+    assert fairness.on
+    assert states(one)["s"][0] == "FINISHED"
 
 
 async def test_a_failed_action_waits_to_be_tried_again(yard: Opened) -> None:

@@ -26,7 +26,7 @@ from tests.protocols.vda5050.orders import action, instant, valid_orders
 
 AMQTT = Path(__file__).parents[3] / "build" / "amqtt" / "bin" / "amqtt"
 ORDERS = int(os.environ.get("ROBOGLOT_ORDERS", "10000"))
-BATCH = 50  # the robot's queue holds 64 messages
+BATCH = 50
 
 
 @pytest.fixture(params=["mosquitto", "amqtt"])

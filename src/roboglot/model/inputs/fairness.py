@@ -4,7 +4,8 @@ In each WINDOW of the machine's time, the requests of all clients together may t
 those that had more than an equal part wait for the next window, and the others go on. So a client that asks as fast as
 it can takes what is free, and slows neither the others nor the robots; one that is alone never waits. Parts are equal
 between hosts, and between all connections: a host gains nothing by having many. No client waits while other programs
-hold the processor: the thread itself must have worked for that part of the window.
+hold the processor: the thread itself must have worked for that part of the window. No one waits to stop a robot: a
+request to stop passes, and so do those before it.
 """
 
 from __future__ import annotations
@@ -20,13 +21,14 @@ ACTIVE_SECONDS = 1.0  # since its last request a client counts as one that wants
 LOG_SECONDS = 10.0  # between two log lines on one client
 HANDSHAKE_GAP = 0.02  # s between the beginnings of two handshakes with TLS, which hold the thread for a third of it
 COST_MAX = 0.02  # s that one request counts: longer ones wait for something
+HURRIED_MAX = 256  # requests of a connection that pass in a window because one of them stops a robot
 CLIENTS_MAX = 4096  # connections counted at the same time; the oldest are dropped first
 
 
 class Use:
     """The use that a connection, or all those of a host, made of a window."""
 
-    __slots__ = ("host", "last", "name", "named", "used", "window")
+    __slots__ = ("host", "hurried", "hurried_in", "last", "name", "named", "used", "window")
 
     def __init__(self, name: str, host: Use | None = None) -> None:
         """``host``: the share of all connections of its host; None: this is one."""
@@ -36,6 +38,7 @@ class Use:
         self.named = -LOG_SECONDS  # time of the last log line
         self.used = 0.0  # s in the window of that number
         self.window = 0
+        self.hurried = self.hurried_in = 0  # requests that passed, and the number of that window
 
 
 class Fairness:
@@ -82,6 +85,16 @@ class Fairness:
                 self._connections,
             )
         return self._end - now
+
+    def hurries(self, use: Use, requests: int = 1) -> bool:
+        """Return whether the next requests of a client that has to wait may pass, as one of them or behind them stops.
+
+        Not without end: a client that sends stops with all it asks for would never wait.
+        """
+        if use.hurried_in != self._window:
+            use.hurried_in, use.hurried = self._window, 0
+        use.hurried += requests
+        return use.hurried <= HURRIED_MAX
 
     def took(self, use: Use, seconds: float) -> None:
         """Count a request that took ``seconds``."""

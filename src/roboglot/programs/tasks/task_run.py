@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from roboglot.model.client_context import ask_for
 from roboglot.model.errors import RobotError
+from roboglot.model.inputs.metering import metered
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.events import (
     Call,
@@ -25,7 +26,6 @@ from roboglot.programs.engine.events import (
 )
 from roboglot.programs.engine.journal import Journal
 from roboglot.programs.engine.run import Run
-from roboglot.programs.engine.share import metered
 from roboglot.programs.engine.usage import usage_of
 from roboglot.programs.errors import NotAllowed
 from roboglot.programs.functions.interrupted import call_cut_off

@@ -51,8 +51,10 @@ from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.requests import add_calls
+from roboglot.protocols.cyberdog.stops import stops
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.door import Endpoint
+from roboglot.protocols.turns import wait_for_turn
 from roboglot.transport.limiter import pay
 from roboglot.transport.wakes import prompt_wakes
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
@@ -254,7 +256,7 @@ class _Service:
         tap, fairness = self._context.robot.tap, self._context.robot.fairness
         use = fairness.of(peer.partition(":")[2]) if fairness else None
         if fairness and use:
-            await pay(fairness.wait(use))
+            await wait_for_turn(fairness, use, lambda: stops(code, request.params))
             begun = fairness.now()
 
         async def reply(value: object) -> None:

@@ -12,13 +12,13 @@ from roboglot.model.background import load
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.browsers import Browsers
-from roboglot.protocols.channels import Carrier, Channel, noted
+from roboglot.protocols.channels import Carrier, Channel, noted, taking_turns
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.foxglove.channels import Source
 from roboglot.protocols.foxglove.config import FoxgloveConfig
 from roboglot.protocols.foxglove.context import Context
 from roboglot.protocols.foxglove.dispatch import answer
-from roboglot.protocols.foxglove.vocabulary import DOOR
+from roboglot.protocols.foxglove.vocabulary import DOOR, stops
 from roboglot.protocols.websocket import WebSocketServer
 from roboglot.transport.tls import Tls
 from roboglot.wire.foxglove.messages import SUBPROTOCOLS, Level
@@ -76,7 +76,8 @@ class FoxgloveDoor:
         self._socket: WebSocketServer | None = None
         if config.enabled:
             browsers = Browsers(f"[{DOOR}]", config.origins, config.hosts)
-            channel = noted(Channel(self._open, Right.SEE, SUBPROTOCOLS, binary=True), robot.outside, DOOR, "/")
+            channel = taking_turns(Channel(self._open, Right.SEE, SUBPROTOCOLS, binary=True), robot, stops)
+            channel = noted(channel, robot.outside, DOOR, "/")
             self._socket = WebSocketServer(
                 {"/": channel}, address, config.port, browsers, robot.admission, tls, door=DOOR
             )

@@ -17,6 +17,7 @@ from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.values import dataclass
+from roboglot.wire.foxglove.messages import PUBLISHED_SIZE, ClientOpcode
 
 DOOR = "foxglove"
 
@@ -88,6 +89,17 @@ class RosTwist(msgspec.Struct):
 def twist(message: RosTwist) -> Twist:
     """Return the velocity."""
     return Twist(message.linear.x, message.linear.y, message.angular.z)
+
+
+def stops(message: str | bytes) -> bool:
+    """Return whether a message is a published velocity of zero."""
+    if isinstance(message, str) or not message or message[0] != ClientOpcode.MESSAGE_DATA:
+        return False
+    try:
+        wish = msgspec.json.decode(message[PUBLISHED_SIZE:], type=RosTwist)
+    except (msgspec.DecodeError, RecursionError):
+        return False
+    return twist(wish) == Twist()
 
 
 def pose(message: RosPose) -> Pose:

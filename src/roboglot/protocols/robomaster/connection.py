@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import cast
 
-from roboglot.model.inputs.fairness import Use
+from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.model.inputs.outside import CAME, GONE
 from roboglot.model.lateness import late
 from roboglot.protocols.robomaster.context import Context, speak_as
@@ -25,6 +25,7 @@ from roboglot.protocols.robomaster.limits import (
     TEXT_SHOWN_MAX,
 )
 from roboglot.protocols.robomaster.liveness import DrivingClient
+from roboglot.protocols.robomaster.stops import stops
 from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 from roboglot.transport.eager import begin
 from roboglot.wire.robomaster.lines import LineSplitter
@@ -93,6 +94,9 @@ class ControlConnection(asyncio.Protocol):
             texts.append(rest)
         self._commands.extend(texts)
         self._throttle()
+        if self._turn and any(map(stops, texts)):
+            self._turn.cancel()
+            self._turn = None
         self._go_on()
 
     def connection_lost(self, _exc: Exception | None) -> None:
@@ -147,12 +151,15 @@ class ControlConnection(asyncio.Protocol):
         fairness, use = self._context.robot.fairness, self._use
         if fairness is None or use is None:
             self._begin()
-        elif seconds := fairness.wait(use):
+        elif (seconds := fairness.wait(use)) and not self._hurries(fairness, use):
             self._turn = asyncio.get_running_loop().call_later(seconds, self._take_turn)
         else:
             begun = fairness.now()
             self._begin()
             fairness.took(use, fairness.now() - begun)
+
+    def _hurries(self, fairness: Fairness, use: Use) -> bool:
+        return any(map(stops, self._commands)) and fairness.hurries(use, BATCH_MAX)
 
     def _take_turn(self) -> None:
         self._turn = None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-import threading
 import time
 import uuid
 from collections.abc import Coroutine, Sequence
@@ -23,8 +22,10 @@ from roboglot.protocols.door import Endpoint
 from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.protocols.ros2.context import Context
 from roboglot.protocols.ros2.dispatch import MESSAGE_MAX, answer
+from roboglot.protocols.ros2.intake import Intake
 from roboglot.protocols.ros2.table import PUBLISHED
 from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
+from roboglot.protocols.turns import Turns
 from roboglot.transport.seldom import Seldom
 from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, attachment, topic_key
 
@@ -37,7 +38,8 @@ if TYPE_CHECKING:
     from roboglot.recording.sampler import Sampler
 
 log = logging.getLogger(__name__)
-PENDING_MAX = 32  # messages queued for handling; beyond this they are dropped and logged
+PENDING_MAX = 32  # messages queued for handling; beyond this the oldest are dropped and logged
+FULL = "robot %s: too many messages of %s come: the oldest are dropped"
 PICTURE_PERIOD = 0.2  # s
 JPEG_QUALITY = 80
 NODE = "roboglot"
@@ -58,12 +60,15 @@ class Ros2Door:
         self._numbers = 0
         self._sequence = 0
         self._gid = uuid.uuid4().bytes
-        self._room = threading.BoundedSemaphore(PENDING_MAX)  # taken in Zenoh's threads
+        self._seldom = Seldom(log)
+        self._heard = Intake(PENDING_MAX, partial(self._seldom.warning, "full", FULL, robot.id))
+        self._turns = Turns(robot, f"{DOOR} {robot.id}:zenoh")
+        self._called = False  # by a thread of Zenoh's, to take what was heard
+        self._answering: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._sampler: Sampler | None = None
         self._battery: Entry | None = None
         self._translator: Ros2Words | None = None
-        self._seldom = Seldom(log)
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
@@ -138,10 +143,11 @@ class Ros2Door:
         if session is not None:
             await asyncio.get_running_loop().run_in_executor(None, session.close)
 
-    def _follow(self, work: Coroutine[None, None, None]) -> None:
+    def _follow(self, work: Coroutine[None, None, None]) -> asyncio.Task[None]:
         task = asyncio.get_running_loop().create_task(work, name=f"ros2 {self._robot.id}")
         self._tasks.add(task)
         task.add_done_callback(self._ended)
+        return task
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
@@ -162,40 +168,43 @@ class Ros2Door:
         loop = asyncio.get_running_loop()
 
         def hear(sample: zenoh.Sample) -> None:  # in a thread of Zenoh's
-            if self._room.acquire(blocking=False):
-                data = sample.payload.to_bytes() if len(sample.payload) <= MESSAGE_MAX else None
-                loop.call_soon_threadsafe(self._take, key, data)
-            else:
-                self._seldom.warning(key, "robot %s: messages of %s are dropped, too many come", self._robot.id, key)
+            data = sample.payload.to_bytes() if len(sample.payload) <= MESSAGE_MAX else None
+            self._heard.put(key, data)
+            if not self._called:
+                self._called = True
+                loop.call_soon_threadsafe(self._take)
 
         key_of_all = topic_key(self._config.domain, topic, type, "*")
         self._tokens.append(self._session.declare_subscriber(key_of_all, hear))
 
     def receive(self, key: str, data: bytes) -> None:
         """Take a message as if it had come from Zenoh, where the door is open."""
-        if self._room.acquire(blocking=False):
-            self._take(key, data)
+        self._heard.put(key, data)
+        self._take()
 
     def _topic(self, name: str) -> str:
         return f"/{self._namespace}/{name}" if self._namespace else f"/{name}"
 
-    def _take(self, key: str, data: bytes | None) -> None:
-        """Answer a message; None stands for one that is too long."""
-        if self._session is None:
-            self._room.release()
-            return
-        self._follow(self._answer(key, data))
+    def _take(self) -> None:
+        """Answer what was heard."""
+        self._called = False
+        self._turns.look()
+        if self._session is not None and (self._answering is None or self._answering.done()):
+            self._answering = self._follow(self._answer_all())
+
+    async def _answer_all(self) -> None:
+        ask_for(DOOR)
+        while self._heard:
+            await self._turns.take(self._heard.stops)
+            await self._turns.count(self._answer(*self._heard.pop()))
 
     async def _answer(self, key: str, data: bytes | None) -> None:
+        """Answer a message; None stands for one that is too long."""
         from roboglot.recording.ros2.translation import read_cdr
 
-        try:
-            ask_for(DOOR)
-            level, why = await answer(Context(self._robot, self._config, self._report), key, data, read_cdr)
-            if why:
-                self._say(level, why)
-        finally:
-            self._room.release()
+        level, why = await answer(Context(self._robot, self._config, self._report), key, data, read_cdr)
+        if why:
+            self._say(level, why)
 
     def _report(self, action: Action) -> None:
         async def wait() -> None:
@@ -218,11 +227,9 @@ class Ros2Door:
             if self._battery is not None and number % STATE_BEATS == 0:
                 self._show(self._battery._replace(at=self._now()))
             if Gimbal in self._robot:
-                self._publish(self._words.joints(self._now(), self._joints()), "joint_states")
-
-    def _joints(self) -> dict[str, float]:
-        attitude = self._robot[Gimbal].attitude
-        return {"gimbal_pitch": attitude.pitch, "gimbal_yaw": attitude.yaw}
+                attitude = self._robot[Gimbal].attitude
+                joints = {"gimbal_pitch": attitude.pitch, "gimbal_yaw": attitude.yaw}
+                self._publish(self._words.joints(self._now(), joints), "joint_states")
 
     async def _film(self) -> None:
         from roboglot.media.stills import jpeg

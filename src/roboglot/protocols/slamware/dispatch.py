@@ -63,7 +63,7 @@ from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.parameters import Parameters
 from roboglot.protocols.slamware.routes import BEYOND, Match, Routes
 from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text
-from roboglot.transport.limiter import pay
+from roboglot.protocols.turns import wait_for_turn
 from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
@@ -83,6 +83,7 @@ PREFLIGHT: Headers = [
     (b"access-control-allow-private-network", b"true"),
     (b"access-control-max-age", b"86400"),
 ]
+STOPS = ("/api/core/motion/v1/actions/", "/api/delivery/v1/tasks")  # what to DELETE to stop the robot
 FRAMES = (b"content-security-policy", b"frame-ancestors 'self'")  # against clickjacking by other pages
 
 
@@ -106,7 +107,7 @@ class Application:
         address = f"{peer[0]}:{peer[1]}"
         ask_for(client, address)
         if fairness := self._context.robot.fairness:
-            await pay(fairness.wait(fairness.of(address)))
+            await wait_for_turn(fairness, fairness.of(address), lambda: _stops(scope))
         begun = perf_counter()
         shared: Headers = []
         why = ""
@@ -317,3 +318,7 @@ def _only_plain(scope: Scope) -> bool:
     """Return whether the client accepts text/plain and nothing else."""
     accepted = b",".join(value for name, value in scope["headers"] if name == b"accept")
     return {entry.partition(b";")[0].strip().lower() for entry in accepted.split(b",")} == {b"text/plain"}
+
+
+def _stops(scope: Scope) -> bool:
+    return bool(scope["method"] == "DELETE" and scope["path"].startswith(STOPS))

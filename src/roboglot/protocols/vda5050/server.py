@@ -17,11 +17,13 @@ from roboglot.model.client_context import ask_for
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
+from roboglot.protocols.turns import Turns
 from roboglot.protocols.vda5050 import vocabulary
 from roboglot.protocols.vda5050.config import Vda5050Config
 from roboglot.protocols.vda5050.context import Context
 from roboglot.protocols.vda5050.dispatch import answer
 from roboglot.protocols.vda5050.error_book import Error
+from roboglot.protocols.vda5050.intake import Intake, stops
 from roboglot.transport.seldom import Seldom
 from roboglot.wire.vda5050.versions import VERSIONS
 
@@ -29,7 +31,6 @@ log = logging.getLogger(__name__)
 RETRY = 2.0  # s between two attempts to connect
 LOOK_PERIOD = 0.2  # s of robot time between two checks for changes of the state
 STATE_PERIOD = 30.0  # s after which the state is sent even if unchanged
-QUEUE_MAX = 64  # messages waiting to be read; beyond this they are dropped and logged
 LINK_SECONDS = 5.0  # for an answer from the broker
 KEEPALIVE = 15  # s after which the broker reports that the robot is gone
 CLOSING = 1.0  # s to disconnect from the broker
@@ -55,6 +56,7 @@ class Vda5050Door:
         self._headers: dict[str, int] = {}
         self._task: asyncio.Task[None] | None = None
         self._client: Any = None
+        self._turns = Turns(robot, f"{self.name} {robot.id}:broker")
         self._seldom = Seldom(log)
         self._sent: object = None  # the last state sent, rounded, and when (robot time)
         self._sent_at = 0.0
@@ -130,7 +132,7 @@ class Vda5050Door:
             keepalive=KEEPALIVE,
             timeout=LINK_SECONDS,
             tls_context=tls,
-            max_queued_incoming_messages=QUEUE_MAX,
+            queue_type=Intake,
         ) as client:
             self._client = client
             await self._introduce(f"{host}:{port}")
@@ -147,11 +149,13 @@ class Vda5050Door:
             )
             self._sent = None
             self._rests = False
-            await _until_one_ends(self._listen(client), self._report(), self._visualize())
+            await _until_one_ends(self._listen(Intake.of(client, self._turns.look)), self._report(), self._visualize())
 
-    async def _listen(self, client: Any) -> None:
-        async for message in client.messages:
-            await answer(self._context, str(message.topic).rpartition("/")[2], message.payload)
+    async def _listen(self, intake: Intake) -> None:
+        async for message in self._client.messages:
+            await self._turns.take(lambda: any(map(stops, (message, *intake.waiting))))  # noqa: B023 - used at once
+            name = str(message.topic).rpartition("/")[2]
+            await self._turns.count(answer(self._context, name, message.payload))
 
     async def _introduce(self, address: str) -> None:
         """Act for the fleet control behind this broker from here on."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from roboglot.programs.tasks.reports import TaskReport
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.browsers import Browsers
-from roboglot.protocols.channels import Channel, Room, Send, noted, texts
+from roboglot.protocols.channels import Channel, Room, Send, noted, taking_turns, texts
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.dispatch import Dispatch
@@ -24,7 +24,7 @@ from roboglot.protocols.websocket import WebSocketServer
 from roboglot.transport.tls import Tls
 from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import feedback
-from roboglot.wire.visual.requests import FrameSubject
+from roboglot.wire.visual.requests import FrameSubject, stops
 
 log = logging.getLogger(__name__)
 
@@ -127,8 +127,9 @@ class VisualDoor:
             "/programs": texts(follow_frames, lambda text, _: self._dispatch.receive(text)),
             **self._side_paths.channels(),
         }
-        outside = self._service.robot.outside
-        return {path: noted(channel, outside, self.name, path) for path, channel in found.items()}
+        robot = self._service.robot
+        fair = {path: taking_turns(channel, robot, lambda text: stops(str(text))) for path, channel in found.items()}
+        return {path: noted(channel, robot.outside, self.name, path) for path, channel in fair.items()}
 
     def _end_programs_of(self, who: str) -> None:
         """End the programs of a client that lost rights, as they might depend on them."""

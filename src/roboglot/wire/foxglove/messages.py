@@ -21,6 +21,7 @@ REQUEST_ID_MAX = 256  # bytes of the id of a playback request
 _DATA = struct.Struct("<BIQ")
 _TIME = struct.Struct("<BQ")
 _PUBLISHED = struct.Struct("<BI")
+PUBLISHED_SIZE = _PUBLISHED.size  # bytes before what a client publishes
 _CALL = struct.Struct("<BIII")
 _PLAYBACK = struct.Struct("<BBfBQI")
 _STATE = struct.Struct("<BBQf?I")
@@ -109,7 +110,7 @@ def _read_bytes(data: bytes) -> Request:
         match opcode:
             case ClientOpcode.MESSAGE_DATA:
                 _, channel = _PUBLISHED.unpack_from(data)
-                return Request("messageData", {"channel": channel, "data": data[_PUBLISHED.size :]})
+                return Request("messageData", {"channel": channel, "data": data[PUBLISHED_SIZE:]})
             case ClientOpcode.SERVICE_CALL_REQUEST:
                 return _read_call(data)
             case ClientOpcode.PLAYBACK_CONTROL_REQUEST:

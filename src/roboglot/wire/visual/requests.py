@@ -76,6 +76,15 @@ class BadFrame(ValueError):
         self.target = _text_of(targets[0]) if isinstance(targets, list) and targets else ""
 
 
+def stops(text: str) -> bool:
+    """Return whether a frame suspends or ends tasks."""
+    try:
+        request = parse_request(text)
+    except BadFrame:
+        return False
+    return request.operate in ("suspend", "shutdown")
+
+
 def parse_request(text: str) -> Request:
     """Return a checked frame. Raises BadFrame with the code of the first bad field."""
     fields = _decode(text)
