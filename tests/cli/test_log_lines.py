@@ -107,8 +107,8 @@ async def test_what_happens_in_world_belongs_to_a_robot() -> None:
 
     for name, simulated in fleet.world._population.simulated.items():
         control, sense = (Job(partial(hear, place=f"{part} of {name}")) for part in ("control", "senses"))
-        simulated._controls = Schedule([*simulated._controls._jobs, control], TICK)
-        simulated._senses = Schedule([*simulated._senses._jobs, sense], TICK)
+        simulated.controls = Schedule([*simulated.controls._jobs, control], TICK)
+        simulated.senses = Schedule([*simulated.senses._jobs, sense], TICK)
     await fleet.start(wait=True)
     await clock.advance(0.3)
     await fleet.close()

@@ -107,3 +107,27 @@ def blur(exact: FloatArray, noise: SingleArray, sigma: float, low: float, high: 
         else:
             ranges[ray] = told if told <= farthest else np.float32(np.inf)
     return ranges
+
+
+@kernel(
+    "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float32[:,::1],"
+    " float64, float64, float64, float64)"
+)
+def turns(
+    edges: FloatArray,
+    circles: FloatArray,
+    directions: FloatArray,
+    eyes: FloatArray,
+    readings: SingleArray,
+    reach: float,
+    sigma: float,
+    low: float,
+    high: float,
+) -> None:
+    """Turn the noise in each row of ``readings`` into what ``sweep`` and ``blur`` return for a row of ``eyes``.
+
+    Those are x, y and yaw.
+    """
+    for i in range(eyes.shape[0]):
+        exact = sweep(edges, circles, directions, eyes[i, 0], eyes[i, 1], eyes[i, 2], reach)
+        readings[i] = blur(exact, readings[i], sigma, low, high)

@@ -16,7 +16,9 @@ P = TypeVar("P")
 
 
 class SimulatedRobot:
-    """The simulated parts of one robot, run by the world in every tick: ``control``, physics, ``sense``.
+    """The simulated parts of one robot, run by the world in ticks in which some are due: control, physics, sensing.
+
+    ``controls`` and ``senses``: their schedules; ``before``: tick of the world before the robot's first one.
 
     Parts with a longer period begin ``turn`` ticks later, within their period: otherwise the scans of many robots would
     all come in one tick, and delay their clients.
@@ -24,6 +26,7 @@ class SimulatedRobot:
 
     def __init__(self, fitting: Fitting, turn: int = 0) -> None:
         self._fitting = fitting
+        self.before: int | None = None
         self._context = context_of(fitting.robot.id)
         fitted: list[tuple[Part[object], object]] = []
         for part in parts():
@@ -40,16 +43,17 @@ class SimulatedRobot:
         alone = (part for part, _ in fitted if part.control and part.control_together is None)
         controlled = ordered(alone, lambda part: part.control_after)
         tick = fitting.tick
-        self._controls = Schedule([_job(part, made[part.name], part.control) for part in controlled], tick)
+        self.controls = Schedule([_job(part, made[part.name], part.control) for part in controlled], tick)
         sensed = [
             _periodic(part, component, turn) for part, component in fitted if part.sense and part.together is None
         ]
-        self._senses = Schedule(sensed, tick)
+        self.senses = Schedule(sensed, tick)
         self._together = {
             part.name: (component, MethodType(part.sense, component))
             for part, component in fitted
             if part.together is not None and part.sense is not None
         }
+        self._ahead = {part.name: component for part, component in fitted if part.ahead is not None}
         self._control_together = {
             part.name: (component, MethodType(part.control, component))
             for part, component in fitted
@@ -62,15 +66,15 @@ class SimulatedRobot:
         """Return the part of this class, if the body has one."""
         return self._fitting.find(kind)
 
-    def control(self) -> None:
-        """Run the parts' control, before the physics of a tick."""
-        if self._controls.begin():
-            self._context.run(self._controls.run)
+    def control(self, tick: int) -> None:
+        """Run the parts' control that is due, before the physics of a tick."""
+        self.controls.begin(tick - (self.before or 0))
+        self._context.run(self.controls.run)
 
-    def sense(self, stamp: float) -> None:
-        """Run the sensing of the parts that are not sensed together, after the physics of a tick."""
-        if self._senses.begin():
-            self._context.run(self._senses.run_at, stamp)
+    def sense(self, tick: int, stamp: float) -> None:
+        """Run the sensing that is due of the parts that are not sensed together, after the physics of a tick."""
+        self.senses.begin(tick - (self.before or 0))
+        self._context.run(self.senses.run_at, stamp)
 
     def together(self, name: str) -> tuple[object, Sense] | None:
         """Return its part of this name with its sensing, for one function of all robots; None: it has none."""
@@ -79,6 +83,10 @@ class SimulatedRobot:
     def control_together(self, name: str) -> tuple[object, Control] | None:
         """Return the same with its control."""
         return self._control_together.get(name)
+
+    def ahead(self, name: str) -> object | None:
+        """Return its part of this name, if the kind is computed in advance."""
+        return self._ahead.get(name)
 
     def displaced(self) -> None:
         """Notify the parts that the robot was lifted and put elsewhere."""

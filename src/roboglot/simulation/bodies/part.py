@@ -75,6 +75,8 @@ class Part(Generic[P]):
         every tick, before all other parts sense; it gets all rows, and the parts with their own ``sense``. It changes
         nothing but these parts.
     control_together: the same for ``control``, before that of all other parts.
+    ahead: makes of all robots' parts of this kind one function that computes in advance, after all that is sensed
+        together in a tick, what each part's own ``sense`` takes up in its turn.
     duty: answers whether the part has something to do; without one ``control`` and ``sense`` are always called.
     displaced: called when the robot was lifted and put elsewhere. ``detach``: called when the world ends.
     """
@@ -90,6 +92,7 @@ class Part(Generic[P]):
     sense: Callable[[P, float, float], None] | None = None
     together: Callable[[Rows, Sequence[tuple[P, Sense]]], Sense] | None = None
     control_together: Callable[[Rows, Sequence[tuple[P, Control]]], Control] | None = None
+    ahead: Callable[[Rows, Sequence[P]], Sense] | None = None
     every: int | Callable[[P], int] = 1
     first: int = 1
     duty: Callable[[P], Duty] | None = None

@@ -2,11 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
+from heapq import heappop, heappush
 
 from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.part import parts
 from roboglot.simulation.bodies.rows import Control, Rows, Sense
+from roboglot.simulation.bodies.schedule import Schedule
+
+LAST = 1 << 60  # after all
+
+
+class Agenda:
+    """Numbers of the schedules that have something due in a tick, in their order; the others are not looked at.
+
+    ``before``: by schedule, the tick of the world before its first one.
+    """
+
+    def __init__(self, schedules: Sequence[Schedule], before: Sequence[int], tick: int) -> None:
+        """``tick``: the last one."""
+        self._schedules, self._before, self._tick = schedules, before, tick
+        self._booked = [0] * len(schedules)  # the next tick of each in which something is due
+        self._due: dict[int, list[int]] = {}  # by tick; entries that differ from ``_booked`` are out of date
+        self._left: list[int] = []  # heap of the present tick
+        self._at = LAST  # the one whose turn it is
+        for number, schedule in enumerate(schedules):
+            schedule.changed = partial(self._change, number)
+            self._book(number, tick)
+
+    def begin(self, tick: int) -> Iterator[int]:
+        """Yield those that are due in ``tick``, also those that become due before their turn."""
+        for number in self._left:  # the last tick was broken off
+            self._book(number, self._tick)
+        self._tick, self._left = tick, sorted(self._due.pop(tick, ()))
+        while self._left:
+            number = heappop(self._left)
+            if self._booked[number] == tick:
+                self._at, self._booked[number] = number, 0
+                try:
+                    yield number
+                finally:
+                    self._book(number, tick)
+        self._at = LAST
+
+    def _change(self, number: int) -> None:
+        """Note that a duty of a schedule began or ended."""
+        if number != self._at:
+            self._book(number, self._tick - (number > self._at))
+
+    def _book(self, number: int, tick: int) -> None:
+        """Book a schedule's next tick after this one."""
+        later = self._schedules[number].next_after(tick - self._before[number])
+        if later and (later := later + self._before[number]) != self._booked[number]:
+            if later == self._tick:
+                heappush(self._left, number)
+            else:
+                self._due.setdefault(later, []).append(number)
+        self._booked[number] = later
 
 
 class Rounds:
@@ -17,22 +70,26 @@ class Rounds:
         self._robots: tuple[SimulatedRobot, ...] = ()
         self._controls: list[Control] = []
         self._senses: list[Sense] = []
+        self._ticks = 0
+        self._controlled = self._sensed = Agenda((), (), 0)
 
     def control(self, robots: tuple[SimulatedRobot, ...]) -> None:
         """Run all control of a tick, before its physics."""
         if robots != self._robots:
             self._gather(robots)
+        self._ticks = tick = self._ticks + 1
         for control in self._controls:
             control(self._tick)
-        for robot in robots:
-            robot.control()
+        for number in self._controlled.begin(tick):
+            robots[number].control(tick)
 
     def sense(self, robots: tuple[SimulatedRobot, ...], stamp: float) -> Iterator[None]:
         """Run all sensing of a tick, after its physics; yield where other work may come between."""
         for sense in self._senses:
             sense(stamp, self._tick)
-        for robot in robots:  # one robot at a time: its data stay in the cache
-            robot.sense(stamp)
+        tick = self._ticks
+        for number in self._sensed.begin(tick):  # one robot at a time: its data stay in the cache
+            robots[number].sense(tick, stamp)
             yield
 
     def _gather(self, robots: tuple[SimulatedRobot, ...]) -> None:
@@ -40,6 +97,7 @@ class Rounds:
         self._robots = robots
         self._controls.clear()
         self._senses.clear()
+        ahead: list[Sense] = []
         for part in parts():
             if part.control_together is not None:
                 moved = [its for robot in robots if (its := robot.control_together(part.name)) is not None]
@@ -47,3 +105,13 @@ class Rounds:
             if part.together is not None:
                 found = [one for robot in robots if (one := robot.together(part.name)) is not None]
                 self._senses.append(part.together(self._rows, found))
+            if part.ahead is not None:
+                early = [it for robot in robots if (it := robot.ahead(part.name)) is not None]
+                ahead += [part.ahead(self._rows, early)] if early else []
+        self._senses += ahead
+        for robot in robots:
+            if robot.before is None:
+                robot.before = self._ticks
+        before = [robot.before or 0 for robot in robots]
+        self._controlled = Agenda([robot.controls for robot in robots], before, self._ticks)
+        self._sensed = Agenda([robot.senses for robot in robots], before, self._ticks)

@@ -58,7 +58,9 @@ class Schedule:
     They share their entries, to need little memory: the data of a hundred robots must fit the caches.
     """
 
-    __slots__ = ("_at", "_entries", "_jobs", "_length", "_next", "_pass", "_rounds", "_running", "_seconds", "_start")
+    __slots__ = (
+        "_at", "_entries", "_jobs", "_length", "_pass", "_rounds", "_running", "_seconds", "_start", "changed"
+    )  # fmt: skip
 
     def __init__(self, jobs: Sequence[Job], tick: float) -> None:
         self._seconds = tick
@@ -67,25 +69,38 @@ class Schedule:
         self._start = max((job.first for job in self._jobs), default=1)  # from then on the order is periodic
         self._length = self._start + math.lcm(*(job.every for job in self._jobs))
         self._rounds: list[list[Entry]] = [self._round(tick) for tick in range(1, self._length + 1)]
-        self._next = self._at = 0
+        self._at = 0
         self._running: list[Entry] = []
+        self.changed: Callable[[], None] | None = None  # called after a duty's change
         self._pass: Iterator[Entry] = iter(self._running)
         for rank, job in enumerate(self._jobs):
             if job.duty is not None:
                 job.duty.changed = _Change(self, rank)
 
-    def begin(self) -> bool:
-        """Begin the next tick; return whether something is due in it."""
-        self._at = at = self._next
-        self._next = at + 1 if at + 1 < self._length else self._start
+    def begin(self, tick: int) -> None:
+        """Begin a tick, counted from 1; those before it in which nothing is due may be left out."""
+        self._at = at = self._place(tick)
         self._running = running = self._rounds[at]
         self._pass = iter(running)
-        return bool(running)
 
-    def due(self) -> Iterator[Entry]:
-        """Begin the next tick and return its calls: rank, function, s since its last call."""
-        self.begin()
+    def due(self, tick: int) -> Iterator[Entry]:
+        """Begin a tick and return its calls: rank, function, s since its last call."""
+        self.begin(tick)
         return self._pass
+
+    def next_after(self, tick: int) -> int:
+        """Return the first tick after this one in which something is due; 0: there is none."""
+        rounds, place = self._rounds, self._place(tick + 1)
+        for later in range(tick + 1, tick + 1 + self._length):
+            if rounds[place]:
+                return later
+            place = place + 1 if place + 1 < self._length else self._start
+        return 0
+
+    def _place(self, tick: int) -> int:
+        """Return the place of a tick's list."""
+        at, start = tick - 1, self._start
+        return at if at < self._length else start + (at - start) % (self._length - start)
 
     def run(self) -> None:
         """Run the tick that was begun: call each due function with the s since its last call."""
@@ -107,6 +122,8 @@ class Schedule:
             self._rounds[index] = [*entries[:place], *([entry] if on else ()), *entries[place + (not on) :]]
             if on and index == self._at:
                 self._join(entry)
+        if self.changed is not None:
+            self.changed()
 
     def _join(self, entry: Entry) -> None:
         """Add an entry to the present tick, unless its turn has passed."""

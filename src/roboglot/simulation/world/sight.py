@@ -60,6 +60,7 @@ class Sight:
         self._dark: dict[tuple[int, float, float], tuple[Rows, Rows]] = {}  # by floor, height and share
         self._moving: dict[tuple[int, float], Rows] = {}  # objects around the robot that move, by floor and height
         self._cast: Callable[..., Distances] = _sweep
+        self._turns: Callable[..., None] | None = None
         self.blur: Callable[..., NDArray[np.float32]] = blur
         self._edges: dict[tuple[int, float], tuple[int, Rows]] = {}  # by floor and height, with the props' revision
 
@@ -71,7 +72,7 @@ class Sight:
         with loading():
             from roboglot.kernels import sweep as compiled
 
-        self._cast, self.blur = compiled.sweep, compiled.blur
+        self._cast, self.blur, self._turns = compiled.sweep, compiled.blur, compiled.turns
 
     def moved(self) -> None:
         """Forget where people and robots were."""
@@ -82,7 +83,26 @@ class Sight:
 
         ``bearing``: direction of the middle ray, rad in base_link.
         """
-        floor = hull.floor
+        edges, circles = self._around(hull.floor, height)
+        return self._cast(edges, circles, _ways(rays), hull.x, hull.y, hull.turned + bearing, reach)
+
+    def turns(
+        self, floor: int, height: float, eyes: Rows, readings: NDArray[np.float32], limits: tuple[float, ...]
+    ) -> None:
+        """Turn the noise in ``readings`` (n, rays) into blurred distances around ``eyes`` (n x 3: x, y, yaw).
+
+        ``limits``: reach, and what ``blur`` takes. Needs ``many`` to be true.
+        """
+        assert self._turns is not None
+        edges, circles = self._around(floor, height)
+        self._turns(edges, circles, _ways(readings.shape[1]), eyes, readings, *limits)
+
+    def many(self, floor: int, *, gloss: bool) -> bool:
+        """Return whether ``turns`` can be used on a floor; ``gloss``: whether glass and mirrors count."""
+        return self._turns is not None and not (gloss and self._glossy[floor])
+
+    def _around(self, floor: int, height: float) -> tuple[Rows, Rows]:
+        """Return the edges and circles that rays can meet at ``height``."""
         key = floor, round(height, 3)
         circles, kept = self._moving.get(key), self._edges.get(key)
         if circles is None:
@@ -92,7 +112,7 @@ class Sight:
         edges, terrains = kept[1], self._terrain[floor]
         if terrains and (slopes := [solid for terrain in terrains for solid in _slopes_at(terrain, height)]):
             edges = np.concatenate((edges, _edges_at(slopes, height)))
-        return self._cast(edges, circles, _ways(rays), hull.x, hull.y, hull.turned + bearing, reach)
+        return edges, circles
 
     def dark(self, hull: Hull, height: float, rays: int, reach: float, share: float) -> Distances:
         """Return the distances as ``turn`` to the black pieces of still furniture only: ``share`` of all pieces."""
