@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import socket
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +22,24 @@ from roboglot.testing.addresses import free_addresses
 
 ADDRESS = free_addresses(1)
 PORTS = (1448, 40923, 50052)
+LATER = (  # what a start need not load: clients come later, files may be old, doors closed
+    "PIL av cryptography numba rich uvicorn yaml websockets roboglot.access.guard roboglot.console.application"
+    " roboglot.console.studio.lessons roboglot.protocols.foxglove.dispatch roboglot.protocols.ros2.server"
+    " roboglot.protocols.vda5050.server roboglot.recording.recorder"
+)
+OPENED = f"""
+import asyncio, sys
+import roboglot.cli.up
+from roboglot.config import load_config
+from roboglot.runtime import Runtime
+
+async def start():
+    built = Runtime(load_config(None, {{"data": sys.argv[1], "world": "empty"}}))
+    print(sorted(set({LATER.split()}) & sys.modules.keys()))
+    await built.close()
+
+asyncio.run(start())
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -78,3 +98,9 @@ async def test_a_robot_that_restarts_takes_its_doors_along(tmp_path: Path) -> No
     await until(lambda: all(map(answers, PORTS)))
     await started.close()
     assert not any(map(answers, PORTS))
+
+
+def test_a_start_loads_nothing_for_later(tmp_path: Path) -> None:
+    run = [sys.executable, "-c", OPENED, str(tmp_path / "data")]
+    ended = subprocess.run(run, capture_output=True, text=True, check=True)
+    assert ended.stdout == "[]\n"

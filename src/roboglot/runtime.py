@@ -15,9 +15,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roboglot.access.guard import Guard
-from roboglot.access.store import FILE
-from roboglot.access.tunnel.gateway import Gateway, Ports
 from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded
@@ -25,8 +22,7 @@ from roboglot.console.desk import Desk
 from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.recordings import Recordings
 from roboglot.console.server import Console
-from roboglot.console.studio.lessons import FOLDER
-from roboglot.console.studio.programs import ClassHome, Programs, Studio
+from roboglot.console.studio.programs import FOLDER, ClassHome, Programs, Studio
 from roboglot.fleet import build_fleet, origin_of
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
@@ -54,6 +50,8 @@ from roboglot.storage.transactions import Transactions
 from roboglot.transport.tls import Tls, server_context
 
 if TYPE_CHECKING:
+    from roboglot.access.guard import Guard
+    from roboglot.access.tunnel.gateway import Gateway
     from roboglot.recording.recorder import Recorder
 
 log = logging.getLogger(__name__)
@@ -188,6 +186,9 @@ class Runtime:
 
     def _build_guard(self) -> Guard:
         """Return the guard of all doors; its list is stored with the robots' data. Raises OSError, ValueError."""
+        from roboglot.access.guard import Guard
+        from roboglot.access.store import FILE
+
         database = self.config.database
         if database and self._registry is not None and self.config.registry in ("", database):
             self._shared = self._registry
@@ -245,7 +246,9 @@ class Runtime:
 
     def _build_gateway(self, guard: Guard) -> Gateway:
         """Return the one port of all robots for `roboglot connect`, with the certificate of the CyberDog doors."""
-        from roboglot.protocols.cyberdog.certificates import SERVER_CERT, SERVER_KEY, ensure_certificates
+        from roboglot.access.tunnel.gateway import Gateway, Ports
+        from roboglot.protocols.cyberdog.certificates import ensure_certificates
+        from roboglot.protocols.cyberdog.pem_files import SERVER_CERT, SERVER_KEY
         from roboglot.protocols.cyberdog.server import FOLDER
 
         config, (host, _, port) = self.config, self.config.access.gateway.rpartition(":")

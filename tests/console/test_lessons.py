@@ -15,8 +15,9 @@ import typer
 
 from roboglot.cli.lesson import command
 from roboglot.console.studio.checks import Check, Work, failure
-from roboglot.console.studio.lessons import FOLDER, Grade, Lesson, grade, load, read
+from roboglot.console.studio.lessons import Grade, Lesson, grade, load, read
 from roboglot.console.studio.mistakes import explain
+from roboglot.console.studio.programs import FOLDER
 from roboglot.programs.functions.table import call
 from roboglot.programs.rehearsing import Played, Scene, Spot
 from roboglot.rehearsal import Rehearsals

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 
-from rich.console import Console
-from rich.markup import escape
+import typer
 
 from roboglot.config import Config
 from roboglot.protocols import DOORS
@@ -16,14 +16,16 @@ def warn_if_open(config: Config) -> None:
     """Warn in red, on standard error, of open doors; not for robots on loopback or with access control."""
     if config.access.on:
         return
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
     for robot in config.opened:
         everywhere = robot.address in ("0.0.0.0", "::")
         where = "every network of this machine" if everywhere else f"the network of {robot.address}"
-        console.print(
-            f"[bold red]INSECURE[/][red]: robot {robot.name} is open to everyone on {where}: anyone there may drive it,"
-            f" see and hear through it, run programs on it and change its maps and settings ({_open_doors(config)})[/]"
+        danger = typer.style("INSECURE", fg="red", bold=True)
+        why = typer.style(
+            f": robot {robot.name} is open to everyone on {where}: anyone there may drive it, see and hear through it,"
+            f" run programs on it and change its maps and settings ({_open_doors(config)})",
+            fg="red",
         )
+        _print(danger + why, to_errors=True)
 
 
 def _open_doors(config: Config) -> str:
@@ -35,21 +37,34 @@ def _open_doors(config: Config) -> str:
 
 def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: str = "") -> None:
     """Print every door's address with a line that tries it, and the console's ``page``; lines are not wrapped."""
-    console = Console(highlight=False, soft_wrap=True)
     pace = "lockstep: type seconds" if config.lockstep else f"x{config.speed:g}"
-    console.print(f"[bold]roboglot[/]  world {config.world} · clock {pace} · data {escape(str(config.data))}")
+    _print(f"{_bold('roboglot')}  world {config.world} · clock {pace} · data {config.data}")
     for robot in config.robots:
-        console.print(f"\nrobot [bold]{robot.name}[/] ({robot.body}) on {robot.address}")
+        _print(f"\nrobot {_bold(robot.name)} ({robot.body}) on {robot.address}")
         for endpoint in endpoints[robot.name]:
-            console.print(f"  [cyan]{endpoint.label:22}[/] {endpoint.address}")
+            _print(f"  {typer.style(f'{endpoint.label:22}', fg='cyan')} {endpoint.address}")
             if endpoint.try_line:
-                console.print(f"    [dim]{escape(endpoint.try_line)}[/]")
+                _print(f"    {_dim(endpoint.try_line)}")
     if page:
-        console.print(f"\n[bold]console[/]  [link={page}]{page}[/]  [dim]see and drive every robot in a browser[/]")
+        _print(f"\n{_bold('console')}  {page}  {_dim('see and drive every robot in a browser')}")
     if config.access.on and config.access.gateway:
-        from roboglot.protocols.cyberdog.certificates import SERVER_CERT, fingerprint
+        from roboglot.protocols.cyberdog.pem_files import SERVER_CERT
         from roboglot.protocols.cyberdog.server import FOLDER
+        from roboglot.protocols.cyberdog.signing import fingerprint
 
         shown = fingerprint(config.data / FOLDER / "tls" / SERVER_CERT)
-        console.print(f"\n[bold]gateway[/]  {config.access.gateway}  [dim]for `roboglot connect`; SHA-256 {shown}[/]")
-    console.print()
+        _print(f"\n{_bold('gateway')}  {config.access.gateway}  {_dim(f'for `roboglot connect`; SHA-256 {shown}')}")
+    _print("")
+
+
+def _bold(text: str) -> str:
+    return typer.style(text, bold=True)
+
+
+def _dim(text: str) -> str:
+    return typer.style(text, dim=True)
+
+
+def _print(text: str, *, to_errors: bool = False) -> None:
+    """Print a line, with its styles only on a terminal whose user has not set NO_COLOR."""
+    typer.echo(text, err=to_errors, color=False if os.environ.get("NO_COLOR") else None)

@@ -52,6 +52,24 @@ class Door(Protocol):
         """Addresses that the door listens at, after ``start``."""
 
 
+@dataclass(frozen=True, slots=True)
+class ClosedDoor:
+    """Door that the configuration keeps closed; its server is not loaded."""
+
+    name: str
+
+    async def start(self) -> None:
+        """Listen nowhere."""
+
+    async def close(self) -> None:
+        """Do nothing."""
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]:
+        """None."""
+        return ()
+
+
 class CloudLink(Protocol):
     """Connection to a cloud that stores programs."""
 

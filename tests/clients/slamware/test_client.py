@@ -96,7 +96,8 @@ async def test_a_refusal_carries_status_and_words(client: SlamwareClient) -> Non
 
 async def test_many_questions_share_few_connections(door: SlamwareDoor, client: SlamwareClient) -> None:
     await asyncio.gather(*(client.get_power_status() for _ in range(50)))
-    assert len(door._state.connections) <= 6
+    assert door._connections is not None
+    assert len(door._connections.open) <= 6
 
 
 @pytest.fixture

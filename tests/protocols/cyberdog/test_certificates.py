@@ -12,7 +12,7 @@ import pytest
 from cryptography import x509
 from cryptography.x509.oid import NameOID
 
-from roboglot.protocols.cyberdog import certificates
+from roboglot.protocols.cyberdog import certificates, signing
 from roboglot.protocols.cyberdog.certificates import (
     BadCertificates,
     CertificateStore,
@@ -69,15 +69,15 @@ def test_export_gives_a_client_what_it_needs(tmp_path: Path) -> None:
 
 def test_two_robots_starting_together_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another robot's certificates appear while one makes its own."""
-    real, mine = certificates._write, []
+    real, mine = signing.write, []
 
     def interrupted(path: Path, data: bytes, *, private: bool = False) -> None:
         if not mine:
             mine.append(path)
-            certificates._make(tmp_path / "tls")
+            signing.make(tmp_path / "tls")
         real(path, data, private=private)
 
-    monkeypatch.setattr(certificates, "_write", interrupted)
+    monkeypatch.setattr(signing, "write", interrupted)
     taken = ensure_certificates(tmp_path)
     assert taken == ensure_certificates(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["tls"]

@@ -101,8 +101,9 @@ def _encryption(config: Config) -> str:
 
 def _fingerprints(config: Config) -> Iterator[Finding]:
     """Yield the fingerprints of the certificates that clients are shown, to be compared at their first use."""
-    from roboglot.protocols.cyberdog.certificates import SERVER_CERT, fingerprint
+    from roboglot.protocols.cyberdog.pem_files import SERVER_CERT
     from roboglot.protocols.cyberdog.server import FOLDER
+    from roboglot.protocols.cyberdog.signing import fingerprint
 
     folder = config.data / FOLDER
     own = Path(config.access.tls.certificate) if config.access.tls.certificate else folder / "site" / "site-cert.pem"

@@ -21,7 +21,6 @@ from roboglot.programs.rehearsing import Act, Played, Scene
 
 log = logging.getLogger(__name__)
 
-FOLDER = Path(__file__).parent / "missions"  # examples/lessons is a link to this folder
 LESSONS_MAX, FILE_MAX = 200, 64 * 1024
 STARS_MAX = 3
 

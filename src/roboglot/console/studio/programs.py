@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from roboglot.console.studio.lessons import FOLDER, Lesson, load
 from roboglot.model.robot import Robot
 from roboglot.programs.rehearsing import Rehearse, SceneOf
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.values import dataclass
 from roboglot.wire.visual.relay import FrameRelay
+
+if TYPE_CHECKING:
+    from roboglot.console.studio.lessons import Lesson
+
+FOLDER = Path(__file__).parent / "missions"  # examples/lessons is a link to this folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,4 +52,6 @@ class Studio:
 
     def lessons(self) -> dict[str, Lesson]:
         """Return all missions by name."""
+        from roboglot.console.studio.lessons import load
+
         return load(self.folders)

@@ -1,37 +1,23 @@
 """The private CA of this door and the two certificates it signs, made once in the data folder. Knows no channel.
 
-Real robots carry RSA-4096 keys; making three of those takes two to five seconds, a P-256 key takes none, and every
-TLS library that gRPC clients are built on accepts it. The CA's own key is thrown away when both certificates are
-signed: no further ones can be made.
+Loads ``signing``, and with it cryptography's library, when something must be made, or is wrong.
 """
 
 from __future__ import annotations
 
 import logging
-import os
-import shutil
-import tempfile
+import ssl
 from collections.abc import Collection, Sequence
-from datetime import UTC, datetime, timedelta
-from ipaddress import ip_address
+from datetime import UTC, datetime
 from pathlib import Path
 
-from cryptography import x509
-from cryptography.exceptions import UnsupportedAlgorithm
-from cryptography.hazmat.primitives import hashes
-from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat, load_pem_private_key
-from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
-
+from roboglot.protocols.cyberdog.pem_files import CA_CERT, SERVER_CERT, SERVER_KEY, write
 from roboglot.values import dataclass
-from roboglot.wire.cyberdog.channel import APP_NAME, ROBOT_NAME
 
 log = logging.getLogger(__name__)
-VALID_FOR = timedelta(days=3650)
-SLOW_CLOCKS = timedelta(days=1)  # a client whose clock is behind still accepts a fresh certificate
-CA_CERT, SERVER_CERT, SERVER_KEY = "ca-cert.pem", "server-cert.pem", "server-key.pem"
-CA_KEY, APPS, APPS_CA = "ca-key.pem", "apps", "roboglot apps"
+APPS = "apps"
 CLIENT_FILES = (CA_CERT, "client-cert.pem", "client-key.pem")
+ROUNDS = 4  # of a handshake's messages, at most
 
 
 class BadCertificates(OSError):
@@ -58,16 +44,15 @@ def ensure_certificates(folder: Path) -> Certificates:
     """
     tls = folder / "tls"
     if not tls.exists():
-        _make(tls)
+        from roboglot.protocols.cyberdog.signing import make
+
+        make(tls)
     try:
         ca, certificate, key = ((tls / name).read_bytes() for name in (CA_CERT, SERVER_CERT, SERVER_KEY))
-        x509.load_pem_x509_certificates(ca)
-        signed = x509.load_pem_x509_certificate(certificate)
-        if load_pem_private_key(key, password=None).public_key() != signed.public_key():
-            raise ValueError(f"{SERVER_KEY} is not the key of {SERVER_CERT}")
-    except (OSError, TypeError, ValueError, UnsupportedAlgorithm) as error:  # TypeError: the key has a password
+        expires = _proven(tls) or _checked(ca, certificate, key)
+    except (OSError, ValueError) as error:
         raise BadCertificates(f"the certificates in {tls} are broken ({error}); remove it to have new ones") from error
-    if (expires := signed.not_valid_after_utc) < datetime.now(UTC):
+    if expires < datetime.now(UTC):
         raise BadCertificates(f"the certificates in {tls} expired on {expires:%Y-%m-%d}; remove it to have new ones")
     apps = folder / APPS / CA_CERT
     return Certificates(ca, certificate, key, ca + (apps.read_bytes() if apps.exists() else b""))
@@ -111,7 +96,7 @@ def export_client(folder: Path, out: Path) -> Sequence[Path]:
     ensure_certificates(folder)
     out.mkdir(parents=True, exist_ok=True)
     for name in CLIENT_FILES:
-        _write(out / name, (folder / "tls" / name).read_bytes(), private=name.endswith("-key.pem"))
+        write(out / name, (folder / "tls" / name).read_bytes(), private=name.endswith("-key.pem"))
     return [out / name for name in CLIENT_FILES]
 
 
@@ -120,13 +105,13 @@ def export_app(folder: Path, name: str, out: Path) -> Sequence[Path]:
 
     It is signed by a CA for apps, which is made at the first and, unlike the robot's own, kept to sign more.
     """
+    from roboglot.protocols.cyberdog.signing import sign_app
+
     ensure_certificates(folder)
-    issuer_key = _apps_ca(folder / APPS)
-    own = ec.generate_private_key(ec.SECP256R1())
+    certificate, key = sign_app(name, folder / APPS)
     out.mkdir(parents=True, exist_ok=True, mode=0o700)
-    certificate = _certificate(name, own, APPS_CA, issuer_key, APP_NAME).public_bytes(Encoding.PEM)
-    for file, data in zip(CLIENT_FILES, ((folder / "tls" / CA_CERT).read_bytes(), certificate, _pem(own)), strict=True):
-        _write(out / file, data, private=file.endswith("-key.pem"))
+    for file, data in zip(CLIENT_FILES, ((folder / "tls" / CA_CERT).read_bytes(), certificate, key), strict=True):
+        write(out / file, data, private=file.endswith("-key.pem"))
     return [out / file for file in CLIENT_FILES]
 
 
@@ -135,126 +120,53 @@ def ensure_site(folder: Path, names: Collection[str]) -> tuple[Path, Path]:
 
     The CA for apps signs it, so clients that trust ``folder``/apps/ca-cert.pem believe later ones, too.
     """
+    from roboglot.protocols.cyberdog.signing import serves, sign_site
+
     pair = folder / "site" / "site-cert.pem", folder / "site" / "site-key.pem"
-    if all(path.exists() for path in pair) and _serves(pair[0], names):
+    if all(path.exists() for path in pair) and serves(pair[0], names):
         return pair
     ensure_certificates(folder)
     pair[0].parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    own = ec.generate_private_key(ec.SECP256R1())
-    hosts = tuple(sorted(names))
-    signed = _certificate("roboglot", own, APPS_CA, _apps_ca(folder / APPS), *hosts, server_only=True)
-    _write(pair[1], _pem(own), private=True)
-    _write(pair[0], signed.public_bytes(Encoding.PEM))
+    certificate, key = sign_site(names, folder / APPS)
+    write(pair[1], key, private=True)
+    write(pair[0], certificate)
     return pair
 
 
-def fingerprint(certificate: Path) -> str:
-    """SHA-256 of a PEM certificate, as `roboglot connect` and openssl show it. Raises OSError, ValueError."""
-    return x509.load_pem_x509_certificate(certificate.read_bytes()).fingerprint(hashes.SHA256()).hex()
+def _proven(tls: Path) -> datetime | None:
+    """Return the end of the server certificate's time after a handshake with it in memory; None if that fails.
 
-
-def _serves(path: Path, names: Collection[str]) -> bool:
-    """Return whether a certificate of ours is for all these names and still good for a month."""
+    A handshake shows the same as a look at the files, in a sixth of the time that cryptography's library loads.
+    """
     try:
-        certificate = x509.load_pem_x509_certificate(path.read_bytes())
-        listed = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-    except (ValueError, x509.ExtensionNotFound):
+        server, client = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        server.load_cert_chain(tls / SERVER_CERT, tls / SERVER_KEY, password=lambda: b"")
+        client.check_hostname = False  # the certificate is in question, not its name
+        client.load_verify_locations(tls / CA_CERT)
+        to_server, to_client = ssl.MemoryBIO(), ssl.MemoryBIO()
+        caller = client.wrap_bio(to_client, to_server)
+        answerer = server.wrap_bio(to_server, to_client, server_side=True)
+        for _ in range(ROUNDS):
+            proven = _is_through(caller)
+            if _is_through(answerer) and proven:
+                until = (caller.getpeercert() or {})["notAfter"]
+                return datetime.fromtimestamp(ssl.cert_time_to_seconds(str(until)), UTC)
+    except (OSError, ValueError, LookupError):  # OSError: an SSLError, too
+        return None
+    return None
+
+
+def _is_through(end: ssl.SSLObject) -> bool:
+    """Return whether one end has finished its part of a handshake. Raises SSLError."""
+    try:
+        end.do_handshake()
+    except ssl.SSLWantReadError:
         return False
-    fresh = certificate.not_valid_after_utc > datetime.now(UTC) + timedelta(days=30)
-    return fresh and {_general_name(name) for name in names} <= set(listed)
+    return True
 
 
-def _apps_ca(apps: Path) -> ec.EllipticCurvePrivateKey:
-    """Return the key that signs apps' certificates; made on first use."""
-    if not (apps / CA_KEY).exists():
-        apps.mkdir(parents=True, exist_ok=True, mode=0o700)
-        issuer = ec.generate_private_key(ec.SECP256R1())
-        signed = _certificate(APPS_CA, issuer, APPS_CA, issuer)
-        _write(apps / CA_KEY, _pem(issuer), private=True)
-        _write(apps / CA_CERT, signed.public_bytes(Encoding.PEM))
-    issuer_key = load_pem_private_key((apps / CA_KEY).read_bytes(), password=None)
-    if not isinstance(issuer_key, ec.EllipticCurvePrivateKey):
-        raise BadCertificates(f"{apps / CA_KEY} is no key of ours; remove {apps} to have new ones")
-    return issuer_key
+def _checked(ca: bytes, certificate: bytes, key: bytes) -> datetime:
+    """Return the end of the certificate's time after a look at every byte. Raises ValueError in plain words."""
+    from roboglot.protocols.cyberdog.signing import expiry
 
-
-def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
-    return key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-
-
-def _make(tls: Path) -> None:
-    """Make a CA and both pairs in a folder that is renamed into place once complete."""
-    tls.parent.mkdir(parents=True, exist_ok=True)
-    ca_key = ec.generate_private_key(ec.SECP256R1())
-    ca = _certificate("roboglot cyberdog CA", ca_key, "roboglot cyberdog CA", ca_key)
-    draft = Path(tempfile.mkdtemp(prefix=".tls-", dir=tls.parent))
-    try:
-        _write(draft / CA_CERT, ca.public_bytes(Encoding.PEM))
-        for role, name in (("server", ROBOT_NAME), ("client", APP_NAME)):
-            key = ec.generate_private_key(ec.SECP256R1())
-            signed = _certificate(name, key, "roboglot cyberdog CA", ca_key)
-            pem = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-            _write(draft / f"{role}-cert.pem", signed.public_bytes(Encoding.PEM))
-            _write(draft / f"{role}-key.pem", pem, private=True)
-        draft.rename(tls)
-    except OSError:
-        shutil.rmtree(draft, ignore_errors=True)
-        if not tls.exists():  # another robot was faster: its certificates serve as well
-            raise
-
-
-def _certificate(
-    name: str,
-    key: ec.EllipticCurvePrivateKey,
-    issuer: str,
-    issuer_key: ec.EllipticCurvePrivateKey,
-    *hosts: str,
-    server_only: bool = False,
-) -> x509.Certificate:
-    """``name``'s certificate for ``hosts`` (its name, if none), signed by ``issuer``; its own if they are the same."""
-    now = datetime.now(UTC)
-    is_ca = name == issuer
-    builder = (
-        x509.CertificateBuilder()
-        .subject_name(_name(name))
-        .issuer_name(_name(issuer))
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - SLOW_CLOCKS)
-        .not_valid_after(now + VALID_FOR)
-        .add_extension(x509.BasicConstraints(ca=is_ca, path_length=0 if is_ca else None), critical=True)
-    )
-    if not is_ca:
-        # Libraries that ignore the common name look here; both ends are server and client.
-        uses = [ExtendedKeyUsageOID.SERVER_AUTH, *(() if server_only else (ExtendedKeyUsageOID.CLIENT_AUTH,))]
-        names = x509.SubjectAlternativeName([_general_name(host) for host in hosts or (name,)])
-        builder = builder.add_extension(names, critical=False)
-        builder = builder.add_extension(x509.ExtendedKeyUsage(uses), critical=False)
-    return builder.sign(issuer_key, hashes.SHA256())
-
-
-def _general_name(host: str) -> x509.GeneralName:
-    try:
-        return x509.IPAddress(ip_address(host))
-    except ValueError:
-        return x509.DNSName(host)
-
-
-def _name(common: str) -> x509.Name:
-    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common)])
-
-
-def _write(path: Path, data: bytes, *, private: bool = False) -> None:
-    """Write a file atomically; if ``private``, it is never readable by others."""
-    descriptor, draft = tempfile.mkstemp(dir=path.parent)  # made with mode 0600
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        if not private:
-            Path(draft).chmod(0o644)
-        Path(draft).replace(path)
-    except OSError:
-        Path(draft).unlink(missing_ok=True)
-        raise
+    return expiry(ca, certificate, key)

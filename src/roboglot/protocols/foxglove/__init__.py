@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from roboglot.operations import OperationTable
-from roboglot.protocols.door import Contract, Door, DoorType, Implementation, PortSetting, Site
+from roboglot.protocols.door import ClosedDoor, Contract, Door, DoorType, Implementation, PortSetting, Site
 from roboglot.protocols.foxglove.config import FoxgloveConfig
 from roboglot.wire.contracts import contract
 
 
 def _open(config: FoxgloveConfig, site: Site) -> Door:
+    if not config.enabled:
+        return ClosedDoor("foxglove")
     from roboglot.protocols.foxglove.server import FoxgloveDoor
 
     return FoxgloveDoor(site.robot, site.address, config, site.tls)

@@ -3,64 +3,29 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Sequence
 from importlib import import_module
+from typing import TYPE_CHECKING
 
-from roboglot.extras import explained
 from roboglot.model.background import load
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.channels import Carrier, Channel, noted, taking_turns
 from roboglot.protocols.door import Endpoint
-from roboglot.protocols.foxglove.channels import Source
 from roboglot.protocols.foxglove.config import FoxgloveConfig
-from roboglot.protocols.foxglove.context import Context
-from roboglot.protocols.foxglove.dispatch import answer
 from roboglot.protocols.foxglove.vocabulary import DOOR, stops
 from roboglot.protocols.websocket import WebSocketServer
 from roboglot.transport.tls import Tls
-from roboglot.wire.foxglove.messages import SUBPROTOCOLS, Level
+from roboglot.wire.foxglove.messages import SUBPROTOCOLS
 
-log = logging.getLogger(__name__)
+if TYPE_CHECKING:
+    from roboglot.protocols.foxglove.channels import Source
+    from roboglot.protocols.foxglove.session import Session
+
 CLIENTS_MAX = 16
 # They need the libraries of an extra, loaded for the first client; their ``open_source`` takes the robot.
 LIVE, RECORDED = "roboglot.protocols.foxglove.topics", "roboglot.protocols.foxglove.player"
-
-
-class Session:
-    """Messages of one client, in order."""
-
-    def __init__(self, door: FoxgloveDoor, carrier: Carrier) -> None:
-        self._door = door
-        self.context = Context(door.robot, carrier, door.config)
-        self._joining = asyncio.get_running_loop().create_task(self._join(), name="foxglove client")
-        self._turn = asyncio.Lock()
-
-    async def receive(self, message: str | bytes) -> None:
-        """Handle one message."""
-        async with self._turn:
-            await answer(self.context, message)
-
-    def close(self) -> None:
-        """Handle the client's departure."""
-        self._joining.cancel()
-        self._door.forget(self)
-        self.context.close()
-
-    async def _join(self) -> None:
-        """Advertise all topics to the client; their modules are loaded in a thread the first time."""
-        try:
-            with self._door.robot.clock.holding():  # lockstep time does not count how long a library loads
-                topics = self.context.topics = await self._door.topics()
-                topics.join(self.context)
-        except ImportError as error:
-            self.context.status(Level.ERROR, explained(error, "the robot's topics") or str(error))
-        except (OSError, ValueError) as error:
-            self.context.status(Level.ERROR, f"the recording cannot be read: {error}")
-        finally:
-            self.context.joined.set()
 
 
 class FoxgloveDoor:
@@ -113,13 +78,12 @@ class FoxgloveDoor:
                 self._topics = source
         return self._topics
 
-    def forget(self, session: Session) -> None:
-        """Remove a client."""
-        self._sessions.discard(session)
-
     def _open(self, carrier: Carrier) -> Session:
         if len(self._sessions) >= CLIENTS_MAX:
             raise RuntimeError(f"more than {CLIENTS_MAX} clients")
-        session = Session(self, carrier)
+        from roboglot.protocols.foxglove.context import Context
+        from roboglot.protocols.foxglove.session import Session
+
+        session = Session(Context(self.robot, carrier, self.config), self.topics, self._sessions.discard)
         self._sessions.add(session)
         return session

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from roboglot.operations import OperationTable
-from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
+from roboglot.protocols.door import (
+    ClosedDoor,
+    Contract,
+    Door,
+    DoorType,
+    Implementation,
+    Option,
+    PortKind,
+    PortSetting,
+    Site,
+)
 from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.wire.contracts import contract
 
 
 def _open(config: Ros2Config, site: Site) -> Door:
+    if not config.enabled:
+        return ClosedDoor("ros2")
     from roboglot.protocols.ros2.server import Ros2Door
 
     return Ros2Door(site.robot, site.address, config)

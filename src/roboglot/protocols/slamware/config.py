@@ -5,6 +5,8 @@ from __future__ import annotations
 from roboglot.config import Port
 from roboglot.values import dataclass
 
+CONNECTIONS_MAX = 2048
+
 
 @dataclass(frozen=True, slots=True)
 class SlamwareConfig:

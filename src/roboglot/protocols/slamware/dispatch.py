@@ -57,8 +57,7 @@ from roboglot.protocols.slamware.chapters.system import (  # noqa: F401
     system,
 )
 from roboglot.protocols.slamware.context import Context
-from roboglot.protocols.slamware.errors import HttpError, bad_request, from_robot, reason_phrase
-from roboglot.protocols.slamware.http_connection import REASON
+from roboglot.protocols.slamware.errors import REASON, HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.parameters import Parameters
 from roboglot.protocols.slamware.routes import BEYOND, Match, Routes

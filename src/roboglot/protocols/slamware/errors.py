@@ -20,6 +20,7 @@ from roboglot.model.errors import (
 )
 from roboglot.values import dataclass
 
+REASON = b"reason-phrase"  # an internal header between the dispatch and a connection, which never reaches the wire
 REASON_MAX = 160  # characters of a reason phrase
 
 

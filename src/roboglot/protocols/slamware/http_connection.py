@@ -1,19 +1,24 @@
 """One HTTP connection: uvicorn's httptools protocol with the vendor's reason phrases and hard limits.
 
-Knows neither the robot nor the API. Its times are the machine's, not the robot's: they guard sockets.
+Loaded, with uvicorn, for a door's first client. Knows neither the robot nor the API. Its times are the machine's, not
+the robot's: they guard sockets.
 """
 
 from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import cast
 
 import httptools
+from uvicorn.config import Config
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from uvicorn.server import ServerState
 
-CONNECTIONS_MAX = 2048
+from roboglot.protocols.slamware.config import CONNECTIONS_MAX
+from roboglot.protocols.slamware.errors import REASON
+
 HEAD_MAX = 32 * 1024  # bytes of a request's line and headers
 PIECE = 1 << 20  # bytes of a body
 JOINED_MAX = 1 << 16  # bytes of a body that is sent with its head
@@ -21,7 +26,6 @@ REQUEST_SECONDS_MAX = 10.0  # for a request (or a piece of its body) to arrive, 
 WRITE_SECONDS_MAX = 30.0  # for a client that does not read its answer
 KEEP_ALIVE_SECONDS = 75
 
-REASON = b"reason-phrase"  # an internal header for this file, which never reaches the wire
 _REASON_LINE = b"\r\n" + REASON + b": "
 _STATUS = b"HTTP/1.1 "
 _CONTINUE = _STATUS + b"100 "
@@ -238,3 +242,36 @@ class HttpConnection(HttpToolsProtocol):
             self._patience = self.loop.call_at(self._deadline, self._out_of_patience)
         else:
             self.transport.abort()
+
+
+class HttpConnections:
+    """All connections to one application, and their requests under way."""
+
+    def __init__(self, application: Callable[..., object]) -> None:
+        self._config = Config(
+            application,
+            http=HttpConnection,
+            ws="none",
+            lifespan="off",
+            interface="asgi3",
+            log_config=None,
+            access_log=False,
+            proxy_headers=False,
+            timeout_keep_alive=KEEP_ALIVE_SECONDS,
+        )
+        self._config.load()
+        self._state = ServerState()
+
+    def add(self) -> HttpConnection:
+        """Return the protocol of a new connection."""
+        return HttpConnection(self._config, self._state, {}, asyncio.get_running_loop())
+
+    @property
+    def open(self) -> list[HttpConnection]:
+        """Connections that are open."""
+        return [connection for connection in self._state.connections if isinstance(connection, HttpConnection)]
+
+    @property
+    def tasks(self) -> set[asyncio.Task[None]]:
+        """Requests under way."""
+        return self._state.tasks

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
-
-from uvicorn.config import Config
-from uvicorn.server import ServerState
+from typing import TYPE_CHECKING
 
 from roboglot.model.components.mapping.storeys import Storeys
 from roboglot.model.components.system.firmware import Module
@@ -29,12 +27,14 @@ from roboglot.protocols.slamware.chapters.slam.map_keeper import MapKeeper
 from roboglot.protocols.slamware.chapters.statistics.lifetime_totals import Totals
 from roboglot.protocols.slamware.chapters.system.devices import restore_masks
 from roboglot.protocols.slamware.chapters.system.laser import Laser
-from roboglot.protocols.slamware.config import SlamwareConfig
+from roboglot.protocols.slamware.config import CONNECTIONS_MAX, SlamwareConfig
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.dispatch import Application
-from roboglot.protocols.slamware.http_connection import CONNECTIONS_MAX, KEEP_ALIVE_SECONDS, HttpConnection
 from roboglot.transport.tls import Tls
 from roboglot.wire.slamware.chapters.platform import GeneralEvent
+
+if TYPE_CHECKING:
+    from roboglot.protocols.slamware.http_connection import HttpConnection, HttpConnections
 
 GOODBYE_SECONDS = 0.3  # for answers in progress when the door closes
 
@@ -69,7 +69,7 @@ class SlamwareDoor:
         self._application = Application(self._context, self._browsers)
         self._gate = Gate(robot.admission, tls)
         self._scheme = "https" if tls else "http"
-        self._state = ServerState()
+        self._connections: HttpConnections | None = None  # made, with its libraries, for the first client
         self._server: asyncio.Server | None = None
         self._endings: list[Callable[[], None]] = []
         self._opening: asyncio.Task[None] | None = None
@@ -102,33 +102,23 @@ class SlamwareDoor:
         ]
 
     async def _listen(self) -> None:
-        config = Config(
-            self._application,
-            http=HttpConnection,
-            ws="none",
-            lifespan="off",
-            interface="asgi3",
-            log_config=None,
-            access_log=False,
-            proxy_headers=False,
-            timeout_keep_alive=KEEP_ALIVE_SECONDS,
-        )
-        config.load()
-        loop = asyncio.get_running_loop()
-
-        def connection() -> asyncio.Protocol:
-            return HttpConnection(config, self._state, {}, loop)
-
         name, most = "slamware REST", CONNECTIONS_MAX
-        self._server = await self._gate.listen(connection, name, self._address, self.port, None, most)
+        self._server = await self._gate.listen(self._connection, name, self._address, self.port, None, most)
         self.port = self._server.sockets[0].getsockname()[1]
+
+    def _connection(self) -> HttpConnection:
+        if self._connections is None:
+            from roboglot.protocols.slamware.http_connection import HttpConnections
+
+            self._connections = HttpConnections(self._application)
+        return self._connections.add()
 
     def _fall_silent(self) -> None:
         """The robot goes down: stop listening, and cut clients off once they have their answers."""
         if self._server is not None:
             self._server.close()
             self._server = None
-        for connection in list(self._state.connections):
+        for connection in self._connections.open if self._connections else ():
             connection.shutdown()
 
     def _reopen(self) -> None:
@@ -162,15 +152,20 @@ class SlamwareDoor:
             self._robot[Storeys].maps = None
         self._close_parts()
         await self._context.totals.close()
-        if self._state.tasks:
-            await asyncio.wait(self._state.tasks, timeout=GOODBYE_SECONDS)
-        self._application.closing = True
-        for connection in list(self._state.connections):
-            connection.transport.abort()
-        for task in list(self._state.tasks):
-            task.cancel()
+        if self._connections is not None:
+            await self._cut_off(self._connections)
         if server is not None:
             await server.wait_closed()
+
+    async def _cut_off(self, connections: HttpConnections) -> None:
+        """Wait a little for answers under way, then end what is left."""
+        if connections.tasks:
+            await asyncio.wait(connections.tasks, timeout=GOODBYE_SECONDS)
+        self._application.closing = True
+        for connection in connections.open:
+            connection.transport.abort()
+        for task in list(connections.tasks):
+            task.cancel()
 
     def _close_parts(self) -> None:
         context = self._context

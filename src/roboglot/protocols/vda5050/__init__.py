@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from roboglot.operations import OperationTable
-from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
+from roboglot.protocols.door import (
+    ClosedDoor,
+    Contract,
+    Door,
+    DoorType,
+    Implementation,
+    Option,
+    PortKind,
+    PortSetting,
+    Site,
+)
 from roboglot.protocols.vda5050.config import Vda5050Config
 from roboglot.wire.contracts import contract
 
 
 def _open(config: Vda5050Config, site: Site) -> Door:
+    if not config.broker:
+        return ClosedDoor("vda5050")
     from roboglot.protocols.vda5050.server import Vda5050Door
 
     return Vda5050Door(site.robot, config)

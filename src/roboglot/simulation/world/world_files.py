@@ -10,10 +10,8 @@ from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
-import yaml
 from msgspec import Meta, Struct
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
 
 from roboglot.misfits import misfit
 from roboglot.model.geometry import Point
@@ -106,6 +104,8 @@ def read_ros_grid(path: Path) -> OccupancyGrid:
 
 
 def _read(path: Path) -> RosMap:
+    import yaml
+
     try:
         if path.stat().st_size > FILE_BYTES_MAX:
             raise BadFile(f"{path}: larger than {FILE_BYTES_MAX} bytes")
@@ -127,6 +127,8 @@ def _read(path: Path) -> RosMap:
 
 def _pixels(path: Path) -> NDArray[np.float64]:
     """Return the image's brightness 0..255, row 0 at the map's lowest y. Raises BadFile."""
+    from PIL import Image, UnidentifiedImageError
+
     try:
         with Image.open(path) as image:
             if image.width * image.height > CELLS_MAX:
