@@ -8,9 +8,10 @@ checked against their annotations. Knows no robot, no socket and no vendor.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Awaitable, Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from enum import StrEnum
 from functools import cached_property
+from types import CoroutineType
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -19,7 +20,7 @@ from roboglot.misfits import KINDS, misfit
 from roboglot.values import dataclass
 
 K = TypeVar("K", bound=Hashable)
-Handler = TypeVar("Handler", bound=Callable[..., Awaitable[object]])
+Handler = TypeVar("Handler", bound=Callable[..., object])
 
 
 class Right(StrEnum):
@@ -59,7 +60,7 @@ class Schema:
 
 @dataclass(frozen=True, slots=True)
 class Operation(Generic[K]):
-    """One handler under its wire name.
+    """One handler under its wire name: a coroutine function if it may wait, else a plain one, which answers at once.
 
     ``partial``: the missing part in plain words; empty if the operation is
     complete. The coverage page counts only complete ones. ``right``: the right that a client needs; None, which a test
@@ -67,7 +68,7 @@ class Operation(Generic[K]):
     """
 
     key: K
-    handler: Callable[..., Awaitable[Any]]
+    handler: Callable[..., Any]
     schema: Schema
     partial: str
     right: Right | None
@@ -110,9 +111,9 @@ class Operation(Generic[K]):
 
     async def call(self, context: object, values: Mapping[str, object]) -> Any:
         """Parse ``values`` and run the handler with ``context`` first."""
-        if not self.parameters.__struct_fields__:
-            return await self.handler(context)
-        return await self.handler(context, **self.parse(values))
+        parsed = self.parse(values) if self.parameters.__struct_fields__ else {}
+        answer = self.handler(context, **parsed)
+        return await answer if isinstance(answer, CoroutineType) else answer
 
 
 class OperationTable(Generic[K]):

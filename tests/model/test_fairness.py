@@ -6,7 +6,16 @@ import logging
 
 import pytest
 
-from roboglot.model.inputs.fairness import CLIENTS_MAX, COST_MAX, HANDSHAKE_GAP, LOG_SECONDS, PART, WINDOW, Fairness
+from roboglot.model.inputs.fairness import (
+    CLIENTS_MAX,
+    COST_MAX,
+    HANDSHAKE_GAP,
+    LENT,
+    LOG_SECONDS,
+    PART,
+    WINDOW,
+    Fairness,
+)
 
 GREEDY, MODEST = "10.0.0.7:4001", "10.0.0.8:4002"
 
@@ -113,3 +122,24 @@ def test_memory_is_bounded(machine: Machine) -> None:
         machine.ask(f"10.{number >> 8}.0.{number & 255}:1", 0.0)
     assert len(machine.fairness._uses) <= CLIENTS_MAX
     assert len(machine.fairness._hosts) <= CLIENTS_MAX
+
+
+def test_lent_requests_are_counted_afterwards(machine: Machine) -> None:
+    use = machine.fairness.of(GREEDY)
+    machine.fairness.wait(use)
+    machine.fairness.lend(use, 0.0001)
+    use.left -= 10
+    machine.fairness.lend(use, 0.0002)  # this one, and ten that took no longer than the one before
+    assert use.used == pytest.approx(0.0001 + 0.0002 + 10 * 0.0001)
+    assert use.left == LENT
+
+
+def test_window_takes_back_what_it_lent(machine: Machine) -> None:
+    use = machine.fairness.of(MODEST)
+    machine.fairness.wait(use)
+    machine.fairness.lend(use, 0.0001)
+    use.left -= 3
+    machine.time += WINDOW
+    machine.ask(GREEDY, 0.001)
+    assert (use.left, use.owed) == (0, 3)
+    assert use.last == pytest.approx(machine.time - 0.001), "it asked in that window"

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine, Generator
-from contextvars import copy_context
+from contextvars import Context, copy_context
 from types import TracebackType
 
 
-def begin(work: Coroutine[object, object, None], name: str) -> asyncio.Task[None] | None:
+def begin(
+    work: Coroutine[object, object, None], name: str, context: Context | None = None
+) -> asyncio.Task[None] | None:
     """Run ``work`` until its first wait; return the task that continues it, None if it has ended.
 
-    Raises errors of ``work`` before that wait. ``work`` has its own context, as in a task.
+    Raises errors of ``work`` before that wait. ``work`` has its own context, as in a task: ``context`` or a copy.
     """
-    context = copy_context()
+    context = context or copy_context()
     try:
         awaited = context.run(work.send, None)
     except StopIteration:

@@ -1,6 +1,8 @@
 """The forms of answers, pushes and the broadcast in the default profile."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from roboglot.wire.robomaster.replies import FW60, FW70, PROFILES, SPEC, Profile, Reply
 
@@ -45,3 +47,8 @@ def test_builds_of_robots_word_things_their_way() -> None:
     assert FW60.event("armor event hit 1 0") == b"armor event hit 1 0 ;"
     assert FW70.broadcast("192.168.1.102") == b"robot ip 192.168.1.102"
     assert FW70.game((0, 6, 1, 0, 0, 255, 1, 87)) == b"game msg push [0, 6, 1, 0, 0, 255, 1, 87];"
+
+
+@given(st.floats())
+def test_number_is_rounded_and_never_minus_nothing(number: float) -> None:
+    assert SPEC.values((number, 1)) == f"{round(number, 3) + 0.0:.3f} 1;".encode()

@@ -6,6 +6,9 @@ it can takes what is free, and slows neither the others nor the robots; one that
 between hosts, and between all connections: a host gains nothing by having many. No client waits while other programs
 hold the processor: the thread itself must have worked for that part of the window. No one waits to stop a robot: a
 request to stop passes, and so do those before it.
+
+Requests that are answered by little more than a plain call would be slowed by looking at the time. Of these a client is
+lent some, which are counted afterwards: as long as the last that was timed took.
 """
 
 from __future__ import annotations
@@ -22,13 +25,28 @@ LOG_SECONDS = 10.0  # between two log lines on one client
 HANDSHAKE_GAP = 0.02  # s between the beginnings of two handshakes with TLS, which hold the thread for a third of it
 COST_MAX = 0.02  # s that one request counts: longer ones wait for something
 HURRIED_MAX = 256  # requests of a connection that pass in a window because one of them stops a robot
+LENT = 32  # requests before the next one that is timed
+UNCOUNTED = 1 << 62
 CLIENTS_MAX = 4096  # connections counted at the same time; the oldest are dropped first
 
 
 class Use:
     """The use that a connection, or all those of a host, made of a window."""
 
-    __slots__ = ("host", "hurried", "hurried_in", "last", "name", "named", "used", "window")
+    __slots__ = (
+        "host",
+        "hurried",
+        "hurried_in",
+        "last",
+        "left",
+        "lent",
+        "name",
+        "named",
+        "owed",
+        "typical",
+        "used",
+        "window",
+    )
 
     def __init__(self, name: str, host: Use | None = None) -> None:
         """``host``: the share of all connections of its host; None: this is one."""
@@ -39,6 +57,14 @@ class Use:
         self.used = 0.0  # s in the window of that number
         self.window = 0
         self.hurried = self.hurried_in = 0  # requests that passed, and the number of that window
+        self.left = self.lent = UNCOUNTED  # requests that it may still make, of those lent; without Fairness, all
+        self.owed = 0  # requests made and not counted
+        self.typical = COST_MAX  # s: the last that was timed
+
+    def settle(self) -> None:
+        """Take back what is lent."""
+        self.owed += self.lent - self.left
+        self.lent = self.left = 0
 
 
 class Fairness:
@@ -51,6 +77,7 @@ class Fairness:
         self.now, self._worked = now, worked
         self._uses: dict[str, Use] = {}  # by "host:port"
         self._hosts: dict[str, Use] = {}
+        self._lent: set[Use] = set()
         self._window, self._end, self._total = 0, 0.0, 0.0
         self._began = 0.0  # processor time at the beginning of the window
         self._handshake = 0.0  # time at which the next one may begin
@@ -65,6 +92,7 @@ class Fairness:
             name = peer.rpartition(":")[0]
             host = self._hosts.setdefault(name, Use(name))
             use = self._uses[peer] = Use(peer, host)
+            use.settle()
         return use
 
     def wait(self, use: Use) -> float:
@@ -75,6 +103,8 @@ class Fairness:
             self._window += 1
             self._end, self._total, self._connections = now + WINDOW, 0.0, 0
             self._began = self._worked()
+            if self._lent:
+                self._take_back(now)
         if self._total < LIMIT or not self._is_over(use, now) or self._worked() - self._began < LIMIT:
             return 0.0
         if now - use.host.named >= LOG_SECONDS:
@@ -108,6 +138,23 @@ class Fairness:
         use.used += seconds
         host.used += seconds
         self._total += seconds
+
+    def lend(self, use: Use, seconds: float) -> None:
+        """Count a request that took ``seconds``, and those lent before; lend the next ones."""
+        use.settle()
+        owed, use.owed = use.owed, 0
+        self.took(use, seconds + owed * min(seconds, use.typical))  # what other programs held up is not typical
+        use.typical = seconds
+        use.left = use.lent = LENT
+        self._lent.add(use)
+
+    def _take_back(self, now: float) -> None:
+        """Let each client be timed at its next request, and note who has asked since the last time."""
+        for use in self._lent:
+            if use.left < use.lent:
+                use.last = use.host.last = now
+            use.settle()
+        self._lent.clear()
 
     def wait_to_dial(self) -> float:
         """Return the seconds until one more handshake may begin: those of many robots do not come at once."""

@@ -5,15 +5,19 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextvars import Context as Variables
+from contextvars import copy_context
 from functools import cache
+from types import MappingProxyType
 from typing import cast
 
 from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.model.inputs.outside import CAME, GONE
 from roboglot.model.lateness import late
+from roboglot.protocols.robomaster.answers import Answer, Repeated
 from roboglot.protocols.robomaster.context import Context, speak_as
-from roboglot.protocols.robomaster.dispatch import DOOR, Answer, answer
+from roboglot.protocols.robomaster.dispatch import DOOR, answer, at_once
 from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life
 from roboglot.protocols.robomaster.limits import (
     BATCH_MAX,
@@ -21,6 +25,7 @@ from roboglot.protocols.robomaster.limits import (
     CONTROL_CONNECTIONS_MAX,
     EXPLANATIONS_MAX,
     LEFT_PERIOD,
+    LINES_MAX,
     OUTPUT_MAX,
     TEXT_SHOWN_MAX,
 )
@@ -28,19 +33,25 @@ from roboglot.protocols.robomaster.liveness import DrivingClient
 from roboglot.protocols.robomaster.stops import stops
 from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 from roboglot.transport.eager import begin
-from roboglot.wire.robomaster.lines import LineSplitter
+from roboglot.wire.robomaster.lines import END, LineSplitter
 
 log = logging.getLogger(__name__)
+NOTHING: Mapping[bytes, Repeated] = MappingProxyType({})
 
 
 class ControlConnection(asyncio.Protocol):
-    """A hang-up is detected even during a long command, and while reading is paused."""
+    """A hang-up is detected even during a long command, and while reading is paused.
+
+    A line that was said before in this session, and needs no more than a plain call, is answered while it is received;
+    everything else is split, queued and answered in its turn.
+    """
 
     transport: asyncio.Transport
     host: str
     driver: DrivingClient
     _name: str  # host and port of the client
-    _use: Use | None  # of the program's time
+    _use: Use  # of the program's time
+    _variables: Variables  # in which its commands run
     _shown: str  # in the log: its identity if known, and its host
 
     def __init__(
@@ -66,6 +77,7 @@ class ControlConnection(asyncio.Protocol):
         self._writable = asyncio.Event()
         self._writable.set()
         self._explained = 0
+        self._said = NOTHING  # what may be answered at once: nothing before it has joined, and while something waits
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
@@ -80,7 +92,9 @@ class ControlConnection(asyncio.Protocol):
             return
         self.driver = DrivingClient(self._name, self.host, transport.get_extra_info("socket"))
         fairness = self._context.robot.fairness
-        self._use = fairness.of(self._name) if fairness else None
+        self._use = fairness.of(self._name) if fairness else Use(self._name)
+        self._variables = copy_context()
+        self._variables.run(speak_as, self._name, who or "")
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)
@@ -89,6 +103,24 @@ class ControlConnection(asyncio.Protocol):
         log.info("robomaster: %s connected", self._shown)
 
     def data_received(self, data: bytes) -> None:
+        use = self._use
+        if (
+            use.left
+            and (repeated := self._said.get(data)) is not None
+            and (reply := self._variables.run(repeated)) is not None
+        ):
+            use.left -= 1
+            if type(reply) is bytes:
+                self.transport.write(reply)
+            else:
+                self._say(data[:-1].decode(errors="replace").strip(), cast(Answer, reply))
+        else:
+            self._read(data)
+
+    def _read(self, data: bytes) -> None:
+        """Queue the lines in ``data``, and answer what can be answered now."""
+        whole = self._greeting.known and not self._splitter.pending and data.find(END) == len(data) - 1
+        self._said = NOTHING
         texts = list(self._splitter.feed(turn_away_strangers(self._greeting, self.transport, data)))
         if self._lenient and self._splitter.pending and (rest := self._splitter.flush()) != "":
             texts.append(rest)
@@ -98,12 +130,23 @@ class ControlConnection(asyncio.Protocol):
             self._turn.cancel()
             self._turn = None
         self._go_on()
+        if whole and texts and texts[0]:
+            self._learn(data, texts[0])
+
+    def _learn(self, data: bytes, text: str) -> None:
+        """Keep what answers this line, for when it is said again."""
+        said = self._context.said
+        if data not in said and (repeated := at_once(self._context, text)) is not None:
+            if len(said) >= LINES_MAX:
+                said.clear()
+            said[data] = repeated
 
     def connection_lost(self, _exc: Exception | None) -> None:
         if self not in self._connections:
             return
         self._connections.discard(self)
         self._context.robot.outside.note_client(GONE, DOOR, self._name)
+        self._said = NOTHING
         self._commands.clear()
         if self._resting:
             self._resting.cancel()
@@ -117,6 +160,7 @@ class ControlConnection(asyncio.Protocol):
 
     def pause_writing(self) -> None:
         self._writable.clear()
+        self._said = NOTHING
 
     def resume_writing(self) -> None:
         self._writable.set()
@@ -149,14 +193,14 @@ class ControlConnection(asyncio.Protocol):
         if not self._commands or self._worker is not None or self._turn or self.transport.is_closing():
             return
         fairness, use = self._context.robot.fairness, self._use
-        if fairness is None or use is None:
+        if fairness is None:
             self._begin()
         elif (seconds := fairness.wait(use)) and not self._hurries(fairness, use):
             self._turn = asyncio.get_running_loop().call_later(seconds, self._take_turn)
         else:
             begun = fairness.now()
             self._begin()
-            fairness.took(use, fairness.now() - begun)
+            fairness.lend(use, fairness.now() - begun)
 
     def _hurries(self, fairness: Fairness, use: Use) -> bool:
         return any(map(stops, self._commands)) and fairness.hurries(use, BATCH_MAX)
@@ -166,7 +210,7 @@ class ControlConnection(asyncio.Protocol):
         self._go_on()
 
     def _begin(self) -> None:
-        self._worker = begin(self._work(), f"robomaster {self.host}")
+        self._worker = begin(self._work(), f"robomaster {self.host}", self._variables.copy())
         if self._worker is not None:
             self._worker.add_done_callback(self._go_on)
         elif self._commands:
@@ -174,7 +218,8 @@ class ControlConnection(asyncio.Protocol):
 
     async def _work(self) -> None:
         """Answer queued commands, a bounded number at a time, so that other clients get their turn."""
-        speak_as(self._name, self._context.robot.admission.known(self._name) or "")
+        if self._context.robot.admission.asks:  # it may have proved more since
+            speak_as(self._name, self._context.robot.admission.known(self._name) or "")
         for _ in range(BATCH_MAX):
             if not self._commands:
                 return
@@ -187,6 +232,11 @@ class ControlConnection(asyncio.Protocol):
         result = await answer(self._context, text)
         self._join()
         await late(self._context.robot)
+        self._say(text, result)
+        if not self._commands and not self._splitter.pending and self._writable.is_set():
+            self._said = self._context.said
+
+    def _say(self, text: str | None, result: Answer) -> None:
         self.transport.write(result.reply + self._line_end)
         if result.explain:
             explained = cache(lambda: self._refusal(text, result))

@@ -21,6 +21,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.geometry import ORIGIN
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster import readings
+from roboglot.protocols.robomaster.answers import Repeated
 from roboglot.protocols.robomaster.ports.media_port import MediaPort
 from roboglot.protocols.robomaster.pushes import Pushes
 from roboglot.wire.robomaster.replies import Profile
@@ -79,6 +80,7 @@ class Context:
         self._parts: dict[type[ChapterState], Any] = {}
         self._undo: dict[str, Callable[[], object]] = {}
         self._members: dict[Hashable, str] = {}
+        self.said: dict[bytes, Repeated] = {}  # by what a member sent; emptied when SDK mode is entered or left
         self._numbers = itertools.count(1)
         self._name = ""  # each session has its own: the first part of the source of its actions
 
@@ -102,6 +104,7 @@ class Context:
         """Enter SDK mode with everything at its default. Raises Unconnected for a lost real robot."""
         self.set_mode(FollowMode.CHASSIS_LEAD)
         self.active = True
+        self._forget_lines()
         self._name = f"robomaster#{next(self._numbers)}"
         if self.profile.as_robots and Odometry in self.robot:
             self.origin = self.robot[Odometry].reading.pose
@@ -114,6 +117,7 @@ class Context:
         for action in stopping:
             action.cancel(reason, hard=hard)
         self.active = False
+        self._forget_lines()
         self.pushes.reset()
         for part in self._parts.values():
             part.reset()
@@ -147,6 +151,11 @@ class Context:
     def at_end(self, what: str, undo: Callable[[], object]) -> None:
         """Call ``undo`` once at the end of the session, no matter how often ``what`` is changed."""
         self._undo[what] = undo
+
+    def _forget_lines(self) -> None:
+        """Drop the answers of the last session; its members, who may hold them, join the next one first."""
+        self.said.clear()
+        self.said = {}
 
     def join(self, member: Hashable, host: str) -> None:
         """Add ``member`` from ``host``: it keeps the session alive and gets the pushes."""

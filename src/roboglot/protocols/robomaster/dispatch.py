@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 from functools import lru_cache, partial
+from inspect import iscoroutinefunction
+from types import CoroutineType
 
+from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.stand_in import StandIn
-from roboglot.operations import BadParameters, Right
+from roboglot.operations import BadParameters, Operation, Right
+from roboglot.protocols.robomaster.answers import Answer, Repeated, Result, Why
 from roboglot.protocols.robomaster.chapters import (  # noqa: F401
     ai,
     arm,
@@ -37,28 +42,12 @@ from roboglot.protocols.robomaster.table import TABLE
 from roboglot.values import dataclass
 from roboglot.wire.robomaster.commands import Command, Malformed, Value, parse
 from roboglot.wire.robomaster.lines import LINE_MAX
-from roboglot.wire.robomaster.replies import Number, Reply
+from roboglot.wire.robomaster.replies import Profile, Reply
 
 log = logging.getLogger(__name__)
 
 DOOR = "robomaster"
 KEPT_MAX = 128  # command lines whose meaning is kept
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """Bytes for the client and, of a refusal, the reason in plain words for the log.
-
-    ``explain`` is called only when a listener needs it: the search for the intended command is slow.
-    """
-
-    reply: bytes
-    explain: Callable[[], str] | None = None
-
-    @property
-    def why(self) -> str:
-        """Reason of a refusal; empty on success."""
-        return self.explain() if self.explain else ""
 
 
 @dataclass(slots=True)
@@ -67,6 +56,19 @@ class _Asked:
 
     key: str = ""
     began: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Meaning:
+    """Meaning of a line: its number, the command's key ("": there is none), and its values or the refusal of them.
+
+    The values are read only, as they are kept.
+    """
+
+    seq: int | None
+    key: str = ""
+    values: Mapping[str, object] = field(default_factory=dict)
+    refusal: tuple[Reply, Why] | None = None
 
 
 class _Refusal(Exception):
@@ -97,32 +99,81 @@ async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer
     try:
         if text is None:
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
-        seq = _parsed(text).seq
-        key, _ = _meant(text, context.active)
-        operation = TABLE[key]
-        asked.key = key
-        if context.robot.tap.watched:
-            asked.began = context.robot.tap.request(DOOR, key, text)
-        if context.robot.admission.asks:
-            context.robot.admission.check(DOOR, key, operation.right)
-        values = _checked(text, context.active, context.profile.as_robots)
-        result: str | Sequence[Number | str] | None = await operation.handler(context, **values)
+        meant = _meant(text, context.active, context.profile.as_robots)
+        seq = meant.seq
+        if meant.key:
+            _enter(context, meant.key, text, asked)
+        if meant.refusal is not None:
+            raise _Refusal(*meant.refusal)
+        result = TABLE[meant.key].handler(context, **meant.values)
+        if isinstance(result, CoroutineType):
+            result = await result
     except (Malformed, _Refusal) as refusal:
         if refusal.reply is Reply.PARSE_ERROR and not context.active:
             return Answer(context.profile.result(Reply.NOT_IN_SDK_MODE, seq), lambda: "send `command;` first")
         return Answer(context.profile.result(refusal.reply, seq), refusal.why)
     except RobotError as error:
-        return Answer(context.profile.result(reply_to(error), seq), partial(str, error))
+        return _refused(context.profile, error, seq)
     except Exception as error:
         log.exception("robomaster: %r broke", text)
-        return Answer(context.profile.result(Reply.FAIL, seq), partial("internal error: {}".format, error))
-    match result:
-        case None:
-            return Answer(context.profile.result(Reply.OK, seq))
-        case str():  # a Reply, or free text
-            return Answer(context.profile.result(result, seq))
-        case _:
-            return Answer(context.profile.values(result, seq))
+        return _refused(context.profile, error, seq)
+    return Answer(_worded(context.profile, result, seq))
+
+
+def _enter(context: Context, key: str, text: str, asked: _Asked) -> None:
+    """Note a command for followers, and check the client's right. Raises Forbidden."""
+    asked.key = key
+    if context.robot.tap.watched:
+        asked.began = context.robot.tap.request(DOOR, key, text)
+    if context.robot.admission.asks:
+        context.robot.admission.check(DOOR, key, TABLE[key].right)
+
+
+def _refused(profile: Profile, error: Exception, seq: int | None) -> Answer:
+    """Word an error of a handler."""
+    if isinstance(error, RobotError):
+        return Answer(profile.result(reply_to(error), seq), partial(str, error))
+    return Answer(profile.result(Reply.FAIL, seq), partial("internal error: {}".format, error))
+
+
+def _worded(profile: Profile, result: Result, seq: int | None) -> bytes:
+    """Word a handler's result."""
+    if result is None:
+        return profile.result(Reply.OK, seq)
+    return profile.result(result, seq) if isinstance(result, str) else profile.values(result, seq)
+
+
+def at_once(context: Context, text: str) -> Repeated | None:
+    """Return what answers a line whenever it is said again in this session; None if that takes more than a plain call.
+
+    It returns None where it has done nothing, as the line has to go through ``answer`` just now.
+    """
+    asked = context.robot
+    if not context.active or asked.admission.asks or asked.stand_in is not None:
+        return None
+    try:
+        meant = _meant(text, context.active, context.profile.as_robots)
+    except Malformed:
+        return None
+    if meant.refusal is not None or iscoroutinefunction(TABLE[meant.key].handler):
+        return None
+    handler = partial(TABLE[meant.key].handler, context, **meant.values)
+    tap, profile, seq = asked.tap, context.profile, meant.seq
+    network = asked[Network] if Network in asked else None  # noqa: SIM401 - one that comes later is real and on time
+
+    def reply() -> bytes | Answer | None:
+        if tap.watched or (network is not None and network.delay):
+            return None
+        try:
+            result = handler()
+        except RobotError as error:
+            return _refused(profile, error, seq)
+        except Exception as error:
+            log.exception("robomaster: %r broke", text)
+            return _refused(profile, error, seq)
+        return _worded(profile, result, seq)
+
+    return reply
 
 
 async def _stood_in(context: Context, stand_in: StandIn, text: str | None, asked: _Asked) -> Answer:
@@ -158,34 +209,28 @@ async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, t
 
 
 @lru_cache(KEPT_MAX)
-def _parsed(text: str) -> Command:
-    """Parse a line. Clients repeat few lines again and again, so results are cached."""
-    return parse(text)
-
-
-@lru_cache(KEPT_MAX)
-def _meant(text: str, active: bool) -> tuple[str, Sequence[str]]:
-    """Return the key of the command, in SDK mode or outside of it, and the words of its parameters."""
-    command = _parsed(text)
+def _meant(text: str, active: bool, as_robots: bool) -> _Meaning:
+    """Return the meaning of a line. Clients repeat few lines, so meanings are kept. Raises Malformed."""
+    command = parse(text)
     for key, words in command.keys:
-        if not active and key not in OUTSIDE_SDK_MODE:
-            continue
-        if key in TABLE:
-            return key, words
-    raise _Refusal(Reply.PARSE_ERROR, partial(_unknown, command))
+        operation = TABLE.get(key)
+        if operation is not None and (active or key in OUTSIDE_SDK_MODE):
+            try:
+                return _Meaning(command.seq, key, _checked(operation, words, as_robots))
+            except _Refusal as refusal:
+                return _Meaning(command.seq, key, refusal=(refusal.reply, refusal.why))
+    return _Meaning(command.seq, refusal=(Reply.PARSE_ERROR, partial(_unknown, command)))
 
 
-@lru_cache(KEPT_MAX)
-def _checked(text: str, active: bool, as_robots: bool) -> Mapping[str, object]:
-    """Return the handler's parameters; read only, as they are cached."""
-    key, words = _meant(text, active)
-    shape = shape_of(TABLE[key], as_robots)
-    values = _values(key, shape, words)
+def _checked(operation: Operation[str], words: Sequence[str], as_robots: bool) -> Mapping[str, object]:
+    """Return the handler's parameters."""
+    shape = shape_of(operation, as_robots)
+    values = _values(operation.key, shape, words)
     try:
         return shape.check(values)
     except BadParameters as error:
         why = str(error)
-        raise _Refusal(Reply.FAIL, lambda: nearest_values(key, shape, values) or why) from None
+        raise _Refusal(Reply.FAIL, lambda: nearest_values(operation.key, shape, values) or why) from None
 
 
 def _unknown(command: Command) -> str:

@@ -6,6 +6,7 @@ EVENT_BACKLOG_MAX = 64 * 1024  # unread bytes of events per reader
 MEDIA_CONNECTIONS_MAX = 16  # per stream
 MEDIA_BACKLOG_MAX = 256 * 1024  # bytes of a stream queued for a slow viewer before packets are dropped
 COMMANDS_MAX = 1024  # unanswered commands of one connection; beyond this, reading pauses until half are answered
+LINES_MAX = 128  # lines of a session whose answers are known
 LEFT_PERIOD = 0.1  # s between two checks whether a client whose reading is paused has hung up
 OUTPUT_MAX = 64 * 1024  # unread bytes of replies per client; beyond this its next commands wait
 BATCH_MAX = 64  # consecutive commands of one connection before others are served

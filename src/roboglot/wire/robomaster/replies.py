@@ -74,11 +74,12 @@ class Profile:
         return _joined(f"robot ip {address}", None, self.broadcast_end)
 
     def _numbers(self, values: Sequence[Number | str]) -> str:
-        return " ".join(self._fixed(value) if isinstance(value, float) else str(value) for value in values)
+        return " ".join([self._fixed(value) if isinstance(value, float) else str(value) for value in values])
 
     def _fixed(self, number: float) -> str:
         """Return a number with the profile's decimals, and never ``-0.000``."""
-        return f"{round(number, self.decimals) + 0.0:.{self.decimals}f}"
+        text = f"{number:.{self.decimals}f}"
+        return text[1:] if text[0] == "-" and not float(text) else text
 
 
 def _joined(text: str, seq: int | None, end: str) -> bytes:

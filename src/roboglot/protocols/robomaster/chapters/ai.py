@@ -140,7 +140,7 @@ def _detector(vision: Vision, name: str) -> Detector[object]:
 
 
 @TABLE.on("AI attribute", right=Right.SEE, needs=(Vision,))
-async def set_attribute(
+def set_attribute(
     context: Context,
     *,
     line_color: LineColour | None = None,
@@ -156,7 +156,7 @@ async def set_attribute(
 
 
 @TABLE.on("AI push", right=Right.SEE)
-async def push(
+def push(
     context: Context,
     *,
     person: OnOff | None = None,

@@ -69,13 +69,13 @@ async def recenter(context: Context, *, wait_for_complete: bool = False) -> None
 
 
 @TABLE.on("robotic_arm stop", right=Right.DRIVE, needs=(Arm,))
-async def stop(context: Context) -> None:
+def stop(context: Context) -> None:
     """Stop and hold the position (3.2.13.4)."""
     context.robot[Arm].stop()
 
 
 @TABLE.on("robotic_arm position ?", right=Right.SEE, needs=(Arm,))
-async def get_position(context: Context) -> tuple[float | int, ...]:
+def get_position(context: Context) -> tuple[float | int, ...]:
     """Return x y of the end point (3.2.13.5); real robots: whole mm."""
     unit, origin = _scale(context)
     now = context.robot[Arm].position

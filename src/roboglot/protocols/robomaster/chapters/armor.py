@@ -13,7 +13,7 @@ SENSITIVITY = 5  # the default, restored when the session ends
 
 
 @TABLE.on("armor sensitivity", right=Right.DRIVE, needs=(Armor,))
-async def set_sensitivity(context: Context, value: Sensitivity) -> None:
+def set_sensitivity(context: Context, value: Sensitivity) -> None:
     """Set the sensitivity: 1 hard hits only, 10 every touch (3.2.6.1)."""
     armor = context.robot[Armor]
     armor.set_sensitivity(value)
@@ -21,12 +21,12 @@ async def set_sensitivity(context: Context, value: Sensitivity) -> None:
 
 
 @TABLE.on("armor sensitivity ?", right=Right.SEE, needs=(Armor,))
-async def get_sensitivity(context: Context) -> tuple[int, ...]:
+def get_sensitivity(context: Context) -> tuple[int, ...]:
     """Return the sensitivity (3.2.6.2)."""
     return (context.robot[Armor].sensitivity,)
 
 
 @TABLE.on("armor event", right=Right.SEE, needs=(Armor,))
-async def switch_events(context: Context, *, hit: OnOff) -> None:
+def switch_events(context: Context, *, hit: OnOff) -> None:
     """Switch reports of hits on the event port (3.2.6.3)."""
     context.part(EventSwitches).armor(hit == "on")

@@ -10,7 +10,7 @@ from roboglot.protocols.robomaster.table import TABLE
 
 
 @TABLE.on("blaster bead", right=Right.DRIVE, needs=(Blaster,))
-async def set_beads(context: Context, num: Beads) -> None:
+def set_beads(context: Context, num: Beads) -> None:
     """Set the number of beads that a shot fires (3.2.5.1); 1 again when the session ends."""
     blaster = context.robot[Blaster]
     blaster.set_beads(num)
@@ -18,13 +18,13 @@ async def set_beads(context: Context, num: Beads) -> None:
 
 
 @TABLE.on("blaster bead ?", right=Right.SEE, needs=(Blaster,))
-async def get_beads(context: Context) -> tuple[int, ...]:
+def get_beads(context: Context) -> tuple[int, ...]:
     """Return the number of beads that a shot fires (3.2.5.3)."""
     return (context.robot[Blaster].beads,)
 
 
 @TABLE.on("blaster fire", right=Right.DRIVE, needs=(Blaster,))
-async def fire(context: Context) -> None:
+def fire(context: Context) -> None:
     """Fire a shot, bead by bead; `fail` with an empty magazine or during a shot (3.2.5.2)."""
     blaster = context.robot[Blaster]
     blaster.fire()

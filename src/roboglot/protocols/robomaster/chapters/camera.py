@@ -11,7 +11,7 @@ from roboglot.protocols.robomaster.vocabulary import EXPOSURES
 
 
 @TABLE.on("camera exposure", right=Right.DRIVE, needs=(Camera,))
-async def expose(context: Context, ev_level: Exposure) -> None:
+def expose(context: Context, ev_level: Exposure) -> None:
     """Set the picture's exposure (3.2.16.1); default again when the session ends."""
     camera = context.robot[Camera]
     camera.set_exposure(EXPOSURES[ev_level])
@@ -19,26 +19,26 @@ async def expose(context: Context, ev_level: Exposure) -> None:
 
 
 @TABLE.on("stream on", right=Right.SEE)
-async def stream_on(context: Context) -> None:
+def stream_on(context: Context) -> None:
     """Start H.264 to all clients of the video port (3.2.17.1); no effect if started."""
     context.outlets.video.switch(True)
     context.at_end("stream", lambda: context.outlets.video.switch(False))
 
 
 @TABLE.on("stream off", right=Right.SEE)
-async def stream_off(context: Context) -> None:
+def stream_off(context: Context) -> None:
     """Stop the video; connections stay open (3.2.17.2)."""
     context.outlets.video.switch(False)
 
 
 @TABLE.on("audio on", right=Right.SEE)
-async def audio_on(context: Context) -> None:
+def audio_on(context: Context) -> None:
     """Start Opus to all clients of the audio port (3.2.18.1); no effect if started."""
     context.outlets.audio.switch(True)
     context.at_end("audio", lambda: context.outlets.audio.switch(False))
 
 
 @TABLE.on("audio off", right=Right.SEE)
-async def audio_off(context: Context) -> None:
+def audio_off(context: Context) -> None:
     """Stop the audio; connections stay open (3.2.18.2)."""
     context.outlets.audio.switch(False)

@@ -40,7 +40,7 @@ def _drive(context: Context, command: Twist | WheelSpeeds) -> None:
 
 
 @TABLE.on("chassis speed", right=Right.DRIVE, needs=(Driving,))
-async def set_speed(context: Context, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
+def set_speed(context: Context, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: SpeedZ = 0.0) -> None:
     """Drive at x, y m/s and z degrees/s until the next command; a missing axis is 0 (3.2.3.1).
 
     In gimbal_lead z is ignored: the chassis follows the gimbal.
@@ -49,7 +49,7 @@ async def set_speed(context: Context, *, x: SpeedXY = 0.0, y: SpeedXY = 0.0, z: 
 
 
 @TABLE.on("chassis wheel", right=Right.DRIVE, needs=(Driving,))
-async def set_wheels(
+def set_wheels(
     context: Context, *, w1: WheelSpeed = 0.0, w2: WheelSpeed = 0.0, w3: WheelSpeed = 0.0, w4: WheelSpeed = 0.0
 ) -> None:
     """Turn the wheels (front right, front left, rear right, rear left) at these rpm (3.2.3.2).
@@ -86,37 +86,37 @@ async def move(
 
 
 @TABLE.on("chassis stop", right=Right.DRIVE, needs=(Driving,))
-async def stop(context: Context) -> None:
+def stop(context: Context) -> None:
     """Stop; in no manual, but real robots and their users know it."""
     _drive(context, STILL)
 
 
 @TABLE.on("chassis speed ?", right=Right.SEE, needs=(Base, Odometry))
-async def get_speed(context: Context) -> tuple[float | int, ...]:
+def get_speed(context: Context) -> tuple[float | int, ...]:
     """Return x y m/s, z degrees/s and four wheels in rpm (3.2.3.4)."""
     return readings.speed(context)
 
 
 @TABLE.on("chassis position ?", right=Right.SEE, needs=(Odometry,))
-async def get_position(context: Context) -> tuple[float, ...]:
+def get_position(context: Context) -> tuple[float, ...]:
     """Return x y m and z degrees since power-on (3.2.3.5)."""
     return readings.position(context)
 
 
 @TABLE.on("chassis attitude ?", right=Right.SEE, needs=(Imu,))
-async def get_attitude(context: Context) -> tuple[float, ...]:
+def get_attitude(context: Context) -> tuple[float, ...]:
     """Return pitch roll yaw in degrees (3.2.3.6)."""
     return readings.attitude(context.robot)
 
 
 @TABLE.on("chassis status ?", right=Right.SEE, needs=(MotionStatus,))
-async def get_status(context: Context) -> tuple[int, ...]:
+def get_status(context: Context) -> tuple[int, ...]:
     """Return eleven flags of 0 or 1 (3.2.3.7)."""
     return readings.status(context.robot)
 
 
 @TABLE.on("chassis push", right=Right.SEE)
-async def push(
+def push(
     context: Context,
     *,
     position: Switch | None = None,

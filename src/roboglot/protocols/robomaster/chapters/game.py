@@ -60,12 +60,12 @@ class GamePushes:
 
 
 @TABLE.on("game_msg on", right=Right.SEE)
-async def game_on(context: Context) -> None:
+def game_on(context: Context) -> None:
     """Push keys and mouse (3.2.20.1)."""
     context.part(GamePushes).switch(True)
 
 
 @TABLE.on("game_msg off", right=Right.SEE)
-async def game_off(context: Context) -> None:
+def game_off(context: Context) -> None:
     """Stop pushing keys and mouse (3.2.20.2)."""
     context.part(GamePushes).switch(False)

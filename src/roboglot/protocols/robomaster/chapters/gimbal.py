@@ -30,7 +30,7 @@ THERE = math.radians(0.5)
 
 
 @TABLE.on("gimbal speed", right=Right.DRIVE, needs=(Gimbal,))
-async def set_speed(context: Context, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
+def set_speed(context: Context, *, p: GimbalSpeed = 0.0, y: GimbalSpeed = 0.0) -> None:
     """Turn at p and y degrees/s until the next command (3.2.4.1); in chassis_lead y has no effect, as robots say."""
     idle_yaw = context.mode is FollowMode.CHASSIS_LEAD
     gimbal = context.robot[Gimbal]
@@ -100,13 +100,13 @@ async def recenter(context: Context, *, wait_for_complete: bool = True) -> None:
 
 
 @TABLE.on("gimbal stop", right=Right.DRIVE, needs=(Gimbal,))
-async def stop(context: Context) -> None:
+def stop(context: Context) -> None:
     """Stop and hold the angles; in no manual, but real robots know it."""
     context.robot[Gimbal].set_speed(0.0, 0.0, source=context.source)
 
 
 @TABLE.on("gimbal suspend", right=Right.DRIVE, needs=(Gimbal,))
-async def suspend(context: Context) -> None:
+def suspend(context: Context) -> None:
     """Release the motors; until ``gimbal resume`` (or the session's end) it takes no commands (3.2.4.4)."""
     gimbal = context.robot[Gimbal]
     gimbal.suspend()
@@ -114,19 +114,19 @@ async def suspend(context: Context) -> None:
 
 
 @TABLE.on("gimbal resume", right=Right.DRIVE, needs=(Gimbal,))
-async def resume(context: Context) -> None:
+def resume(context: Context) -> None:
     """Power the motors again (3.2.4.5)."""
     context.robot[Gimbal].resume()
 
 
 @TABLE.on("gimbal attitude ?", right=Right.SEE, needs=(Gimbal,))
-async def get_attitude(context: Context) -> tuple[float, ...]:
+def get_attitude(context: Context) -> tuple[float, ...]:
     """Return pitch yaw, in the frame of ``gimbal moveto`` (3.2.4.7)."""
     return readings.gimbal_attitude(context.robot)
 
 
 @TABLE.on("gimbal push", right=Right.SEE, needs=(Gimbal,))
-async def push(
+def push(
     context: Context, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
 ) -> None:
     """Switch pushes of the attitude, at afreq Hz (3.2.4.8); rates without the attribute's switch are refused."""

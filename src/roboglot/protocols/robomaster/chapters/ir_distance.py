@@ -13,7 +13,7 @@ from roboglot.protocols.robomaster.table import TABLE
 
 
 @TABLE.on("ir_distance_sensor measure", right=Right.SEE, needs=(RangeSensors,))
-async def measure(context: Context, switch: OnOff) -> None:
+def measure(context: Context, switch: OnOff) -> None:
     """Switch all sensors (3.2.11.1); off at the end of the session."""
     sensors = context.robot[RangeSensors]
     sensors.measure(switch == "on")
@@ -21,7 +21,7 @@ async def measure(context: Context, switch: OnOff) -> None:
 
 
 @TABLE.on("ir_distance_sensor distance ?", right=Right.SEE, needs=(RangeSensors,))
-async def get_distance(context: Context, id: RangeSensorId) -> tuple[float, ...]:
+def get_distance(context: Context, id: RangeSensorId) -> tuple[float, ...]:
     """Return the distance at sensor id (front, left, rear, right), mm (3.2.11.2); real robots: cm.
 
     0 while switched off; the end of the sensor's range if nothing is within it.

@@ -12,7 +12,7 @@ from roboglot.protocols.robomaster.vocabulary import EFFECTS, ZONES
 
 
 @TABLE.on("led control", right=Right.DRIVE, needs=(Light,))
-async def control(
+def control(
     context: Context,
     *,
     comp: str,

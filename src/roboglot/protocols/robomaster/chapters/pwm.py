@@ -26,14 +26,14 @@ def _restore(context: Context) -> None:
 
 
 @TABLE.on("pwm value", right=Right.DRIVE, needs=(PwmPorts,))
-async def set_value(context: Context, port: PortMask, data: Percent) -> None:
+def set_value(context: Context, port: PortMask, data: Percent) -> None:
     """Set the duty of the masked outputs, percent: ``pwm value 1 50``, or by name as on real robots (3.2.8.1)."""
     for number in _ports(context, port):
         context.robot[PwmPorts].set_duty(number, data / 100)
 
 
 @TABLE.on("pwm freq", right=Right.DRIVE, needs=(PwmPorts,))
-async def set_frequency(context: Context, port: PortMask, data: Hertz) -> None:
+def set_frequency(context: Context, port: PortMask, data: Hertz) -> None:
     """Set the frequency of the masked outputs, Hz (3.2.8.2)."""
     for number in _ports(context, port):
         context.robot[PwmPorts].set_frequency(number, float(data))

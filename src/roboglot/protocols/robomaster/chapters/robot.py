@@ -11,7 +11,7 @@ from roboglot.protocols.robomaster.table import TABLE
 
 
 @TABLE.on("robot mode", right=Right.DRIVE)
-async def set_mode(context: Context, mode: FollowMode) -> None:
+def set_mode(context: Context, mode: FollowMode) -> None:
     """Set the coupling of gimbal and chassis in yaw (3.2.2.1).
 
     Without a gimbal the chassis turns by itself in chassis_lead and in free.
@@ -20,13 +20,13 @@ async def set_mode(context: Context, mode: FollowMode) -> None:
 
 
 @TABLE.on("robot mode ?", right=Right.SEE)
-async def get_mode(context: Context) -> tuple[str, ...]:
+def get_mode(context: Context) -> tuple[str, ...]:
     """Return the motion mode (3.2.2.2)."""
     return (context.mode,)
 
 
 @TABLE.on("robot battery ?", right=Right.SEE, needs=(Battery,))
-async def battery(context: Context) -> tuple[int, ...]:
+def battery(context: Context) -> tuple[int, ...]:
     """Return the charge in whole percent, 1 to 100 (3.2.2.3)."""
     require_heard(context.robot)
     return (min(100, max(1, round(context.robot[Battery].state.percentage * 100))),)

@@ -12,7 +12,7 @@ OUTSIDE_SDK_MODE = frozenset({"command", "quit", "version", "version ?"})  # all
 
 
 @TABLE.on("command", right=Right.SEE)
-async def command(context: Context) -> Reply | None:
+def command(context: Context) -> Reply | None:
     """Enter SDK mode (3.2.1.1)."""
     if context.active:
         return Reply.ALREADY_IN_SDK_MODE
@@ -33,6 +33,6 @@ async def quit_(context: Context) -> Reply | None:
 
 
 @TABLE.on("version", "version ?", right=Right.SEE)
-async def version(context: Context) -> str:
+def version(context: Context) -> str:
     """Return the version of the text SDK: ``version 00.00.00.70``."""
     return f"version {context.profile.version}"

@@ -27,18 +27,18 @@ async def recenter(context: Context, *, id: ServoId, wait_for_complete: bool = F
 
 
 @TABLE.on("servo speed", right=Right.DRIVE, needs=(Servos,))
-async def set_speed(context: Context, *, id: ServoId, speed: ServoSpeed) -> None:
+def set_speed(context: Context, *, id: ServoId, speed: ServoSpeed) -> None:
     """Keep turning a servo at degrees/s until it is stopped (3.2.12.2)."""
     context.robot[Servos].set_speed(id, math.radians(speed), source=context.source)
 
 
 @TABLE.on("servo stop", right=Right.DRIVE, needs=(Servos,))
-async def stop(context: Context, id: ServoId | None = None) -> None:
+def stop(context: Context, id: ServoId | None = None) -> None:
     """Stop all servos, or the one named (3.2.12.3)."""
     context.robot[Servos].stop(id)
 
 
 @TABLE.on("servo angle ?", right=Right.SEE, needs=(Servos,))
-async def get_angle(context: Context, *, id: ServoId) -> tuple[float, ...]:
+def get_angle(context: Context, *, id: ServoId) -> tuple[float, ...]:
     """Return the angle of a servo, degrees in [-180, 180] (3.2.12.4)."""
     return (round(math.degrees(context.robot[Servos].angle(id)), 1) + 0.0,)

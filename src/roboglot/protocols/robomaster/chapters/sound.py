@@ -11,6 +11,6 @@ from roboglot.protocols.robomaster.table import TABLE
 
 
 @TABLE.on("sound event", right=Right.SEE, needs=(Hearing,))
-async def switch_events(context: Context, *, applause: OnOff) -> None:
+def switch_events(context: Context, *, applause: OnOff) -> None:
     """Switch reports of applause on the event port (3.2.7.1)."""
     context.part(EventSwitches).applause(applause == "on")

@@ -1,0 +1,31 @@
+"""Answers of this door: a handler's results, and the bytes and reasons that they are worded as."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from roboglot.values import dataclass
+from roboglot.wire.robomaster.replies import Number
+
+Why = Callable[[], str]
+Result = str | Sequence[Number | str] | None  # of a handler: a Reply or free text, values, or nothing to say
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Bytes for the client and, of a refusal, the reason in plain words for the log.
+
+    ``explain`` is called only when a listener needs it: the search for the intended command is slow.
+    """
+
+    reply: bytes
+    explain: Why | None = None
+
+    @property
+    def why(self) -> str:
+        """Reason of a refusal; empty on success."""
+        return self.explain() if self.explain else ""
+
+
+Repeated = Callable[[], bytes | Answer | None]
+"""Answer to a line that was said before: bytes, a refusal, or None: nothing was done, and it has to be read anew."""
