@@ -27,12 +27,17 @@ Rss:                   4 kB
 Private_Dirty:         0 kB
 Anonymous:             0 kB
 VmFlags: rd wr mr mw me
-7f30-7f40 r-xp 00001000 08:01 8 /x/libother.so
+7f30-7f40 r-xp 00001000 08:01 8 /x/some.so/a_file
 Rss:                  12 kB
 Private_Dirty:         0 kB
 Anonymous:             0 kB
 VmFlags: rd ex mr mw me
-7f40-7f50 r-xp 00009000 08:01 7 /x/libllvmlite.so
+7f40-7f50 r-xp 00009000 08:01 7 /x/libother.so.2
+Rss:                   4 kB
+Private_Dirty:         0 kB
+Anonymous:             0 kB
+VmFlags: rd ex mr mw me
+7f50-7f60 r-xp 00009000 08:01 7 /x/libllvmlite.so
 Rss:                   0 kB
 Private_Dirty:         0 kB
 Anonymous:             0 kB
@@ -41,7 +46,7 @@ VmFlags: rd ex mr mw me
 
 
 def test_only_unwritten_cells_are_given_back() -> None:
-    assert list(_unwritten(MAPS)) == [(0x7F00, 0x7F10, 40 * 1024)]
+    assert list(_unwritten(MAPS)) == [(0x7F00, 0x7F10, 40 * 1024), (0x7F40, 0x7F50, 4 * 1024)]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="pages are counted by Linux")

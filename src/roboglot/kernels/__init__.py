@@ -28,7 +28,7 @@ MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "together",
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Context for imports of kernels: returns the memory that only loading needs (80 MB) to the system afterwards.
+    """Context for imports of kernels: returns the memory that only loading needs (100 MB) to the system afterwards.
 
     Costs nothing if everything was there already.
     """

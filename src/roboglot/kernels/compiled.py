@@ -16,6 +16,9 @@ from numba import njit, types
 from numba.extending import typeof_impl
 from numba.np.numpy_support import from_dtype, map_layout
 
+from roboglot.kernels import lean
+
+lean.use()
 F = TypeVar("F", bound=Callable[..., object])
 CHECKED = "python"  # error model of kernels that raise ZeroDivisionError
 

@@ -1,7 +1,8 @@
-"""Return of memory used for loading compiled kernels to the system: LLVM's pages, and free memory of the C library.
+"""Return of memory that only a start needs to the system: pages of libraries, and free memory of the C library.
 
-LLVM links the kernels when they are loaded, and is not needed for running them. Its pages are those of a file and never
-written to: a page that is needed again is read anew. Linux only; does nothing elsewhere.
+LLVM links the kernels when they are loaded, and is not needed for running them; much of other libraries only sets them
+up. Their pages are those of files and never written to: one that is needed again is read anew, from the system's cache,
+in some microseconds. Linux only; does nothing elsewhere.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-LIBRARY = "libllvmlite.so"
+LIBRARY = ".so"  # in the names of such files
 MAPS = Path("/proc/self/smaps")
 
 
 def rest() -> int:
-    """Return memory to the system; returns the bytes of LLVM's pages. May be called while another thread loads."""
+    """Return memory to the system; returns the bytes of libraries' pages. May be called while another thread loads."""
     if sys.platform != "linux" or not MAPS.exists():
         return 0
     libc = ctypes.CDLL(None, use_errno=True)
@@ -31,7 +32,7 @@ def rest() -> int:
 
 
 def _unwritten(maps: str) -> Iterator[tuple[int, int, int]]:
-    """Return start, end and resident bytes of the library's mappings that are read-only and were never written."""
+    """Return start, end and resident bytes of libraries' mappings that are read-only and were never written."""
     region: tuple[int, int] | None = None
     facts: dict[str, int] = {}
     for line in maps.splitlines():
@@ -44,6 +45,6 @@ def _unwritten(maps: str) -> Iterator[tuple[int, int, int]]:
             region = None
         elif not line.split()[0].endswith(":"):  # other lines contain no size in kilobytes
             span, rights, *_ = line.split()
-            ours = line.endswith(LIBRARY) and "w" not in rights
+            ours = LIBRARY in line.rpartition("/")[2] and "w" not in rights
             low, _, high = span.partition("-")
             region, facts = (int(low, 16), int(high, 16)) if ours else None, {}
