@@ -285,9 +285,10 @@ class RobotAdmission(Admission):
         """See ``Admission.offered``."""
         return self._offers.get(port)
 
-    def on_gained(self, listener: Callable[[str], None]) -> None:
+    def on_gained(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with each identity that gains a right."""
         self._gains.append(listener)
+        return lambda: self._gains.remove(listener) if listener in self._gains else None
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with each identity that loses a right."""

@@ -62,13 +62,20 @@ class Application:
         self._api = Api(desk, self._classes)
         self._codes = Limiter(JOIN_TRIES / 60.0, JOIN_BURST, time.monotonic)
         self._signing = Signing(desk, self._login, self._classes)
-        for robot in desk.robots.values():
-            robot.admission.on_lost(self._close_pages_of)
-            robot.admission.on_gained(self._renew_pages_of)
+        self._leaving = [
+            leave
+            for robot in desk.robots.values()
+            for leave in (
+                robot.admission.on_lost(self._close_pages_of),
+                robot.admission.on_gained(self._renew_pages_of),
+            )
+        ]
         self._metrics: Metrics | None = None  # from the first scrape onwards
 
     async def close(self) -> None:
         """Close the pages' video calls, the link to the classroom and the metrics."""
+        for leave in self._leaving:
+            leave()
         if isinstance(self._classroom, LinkedRoom):
             await self._classroom.end()
         if self._metrics is not None:

@@ -98,8 +98,9 @@ class Admission:
         """Return what was offered last for ``port``."""
         return None
 
-    def on_gained(self, listener: Callable[[str], None]) -> None:
-        """Call ``listener`` with each identity that gains a right."""
+    def on_gained(self, listener: Callable[[str], None]) -> Callable[[], None]:
+        """Call ``listener`` with each identity that gains a right; returns a function that ends this."""
+        return lambda: None
 
     def on_lost(self, listener: Callable[[str], None]) -> Callable[[], None]:
         """Call ``listener`` with each identity that loses a right; returns a function that ends this."""

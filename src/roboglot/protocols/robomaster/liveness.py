@@ -17,11 +17,11 @@ import struct
 from collections.abc import Callable, Iterable
 from ipaddress import IPv4Address
 
+from roboglot.protocols.robomaster.keepalive import unanswered
 from roboglot.protocols.robomaster.limits import VIGIL_MISSES_MAX, VIGIL_PERIOD
 
 log = logging.getLogger(__name__)
 
-_TCP_INFO = struct.Struct("=3xB20xI28xI")  # of struct tcp_info: probes, unacked, ms since the last acknowledgement
 _ECHO = struct.pack("!BBHHH", 8, 0, 0, 0, 0) + b"roboglot"  # the kernel fills in checksum and identifier
 _REPLY_MAX = 64  # bytes
 REPLIES_MAX = 64  # echoes read at a time
@@ -89,9 +89,7 @@ class DrivingClient:
         """
         assert self._connection
         try:
-            probes, unacknowledged, silent = _TCP_INFO.unpack(
-                self._connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
-            )
+            probes, unacknowledged, silent = unanswered(self._connection)
             if probes:  # let the kernel repeat it at once: a single one may get lost
                 self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 1)
         except OSError:
