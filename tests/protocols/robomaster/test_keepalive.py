@@ -46,7 +46,7 @@ class Line:
 
 @pytest.fixture
 async def looks(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """What is to be done in a second."""
+    """Calls planned for later."""
     planned: list[Any] = []
     monkeypatch.setattr(
         asyncio.get_running_loop(), "call_later", lambda after, call, *values: planned.append((after, call, values))
@@ -64,7 +64,7 @@ async def looks(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         (Line(probes=4, silent=60_000), True),
     ],
 )
-async def test_dead_peers_are_told_from_those_that_do_not_read(line: Line, dead: bool, looks: list[Any]) -> None:
+async def test_dead_peers_are_no_peers_that_do_not_read(line: Line, dead: bool, looks: list[Any]) -> None:
     probe_for_life(cast(asyncio.Transport, line))
     [(after, look, values)] = looks
     assert after == LOOK_PERIOD
