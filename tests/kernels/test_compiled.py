@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from roboglot.kernels.arrays import FloatArray
-from roboglot.kernels.lean import LeanLibrary
+from roboglot.kernels.compiled import LeanLibrary
 from roboglot.kernels.linear import invert
 
 
