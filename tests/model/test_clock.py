@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Iterator
-from contextvars import Context
+from contextvars import Context, ContextVar
 from functools import partial
 
 import pytest
@@ -87,6 +87,56 @@ async def test_every_skips_what_it_missed() -> None:
     await clock.advance(1.0)
     task.cancel()
     assert beats == [0.1, 0.4, 0.7, 1.0]
+
+
+async def test_steps_come_in_time_in_their_context() -> None:
+    clock, word, seen = LockstepClock(), ContextVar("word", default=""), list[tuple[float, str]]()
+
+    def step() -> float | None:
+        seen.append((clock.time(), word.get()))
+        return 0.25 * len(seen) if len(seen) < 4 else None
+
+    async def work() -> None:
+        word.set("mine")
+        await clock.keep_calling(step)
+        seen.append((clock.time(), "end"))
+
+    task = asyncio.ensure_future(work())
+    await clock.advance(5.0)
+    await task
+    assert seen == [(0.0, "mine"), (0.25, "mine"), (0.75, "mine"), (1.5, "mine"), (1.5, "end")]
+
+
+@pytest.mark.parametrize("clock", [LockstepClock(), RealClock()])
+async def test_no_step_after_an_error_or_a_cancellation(clock: LockstepClock | RealClock) -> None:
+    calls, failing = 0, False
+
+    def step() -> float | None:
+        nonlocal calls
+        calls += 1
+        if failing and calls > 1:
+            raise ValueError("no further")
+        return 0.001
+
+    async def pass_time() -> None:
+        await (clock.advance(0.01) if isinstance(clock, LockstepClock) else clock.sleep(0.01))
+
+    task = asyncio.ensure_future(clock.keep_calling(step))
+    await pass_time()
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    before = calls
+    await pass_time()
+    assert calls == before > 1
+    calls, failing = 0, True
+    task = asyncio.ensure_future(clock.keep_calling(step))
+    await asyncio.sleep(0)
+    while not task.done():
+        await pass_time()
+    with pytest.raises(ValueError, match="no further"):
+        await task
+    assert calls == 2
 
 
 async def test_wait_for_gives_up_in_robot_time() -> None:

@@ -26,6 +26,39 @@ async def test_drives_where_it_should(simulate):
     assert sim.pose.yaw == pytest.approx(math.pi / 2, abs=1e-6)
 
 
+async def test_repeated_command_costs_nothing_once_robot_moves_so(simulate):
+    sim = simulate(start=Pose(5, 5))
+    base = sim.robot[Base]
+    sim.world.start()
+    base.set_velocity(Twist(yaw=1.0))
+    await sim.clock.advance(1.0)
+    assert not base.duty.on
+    base.set_velocity(Twist(yaw=1.0))
+    assert not base.duty.on
+    for changed in (Twist(yaw=0.5), STILL):
+        base.set_velocity(changed)
+        assert base.duty.on
+        await sim.clock.advance(1.0)
+        assert base.velocity == changed
+        assert not base.duty.on
+
+
+async def test_repeated_command_drives_on_after_a_cut(simulate):
+    sim = simulate(start=Pose(5, 5))
+    base = sim.robot[Base]
+    sim.world.start()
+    ahead = Twist(0.3, 0.0, 0.0)
+    base.set_velocity(ahead)
+    await sim.clock.advance(0.5)
+    for stop in (base.cut, base.brake_hard, lambda: base.carry(ahead)):
+        stop()
+        base.set_velocity(ahead)
+        await sim.clock.advance(0.5)
+        assert base.velocity == ahead
+    base.hindrances.touching = ((1.0, 0.0),)
+    assert base.collides  # legs that carry a body would not
+
+
 async def test_turns_on_the_spot(simulate):
     sim = simulate(start=Pose(5, 5))
     sim.world.start()

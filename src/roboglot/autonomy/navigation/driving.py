@@ -179,14 +179,21 @@ class OdometryDriving(Driving):
     async def _keep(self, action: Action, command: _Command) -> None:
         """Repeat ``command``, which later calls of ``drive`` change, until its end. Raises Blocked."""
         clock = self._robot.clock
-        while (left := command.until - clock.time()) > 1e-9:
-            if action.paused:
-                await self._hold_at_most(action, left)
-                continue
+
+        def step() -> float | None:
+            left = command.until - clock.time()
+            if left <= 1e-9 or action.paused:
+                return None
             self._apply(command.velocity)
             if (hindrance := self._robot[Base].hindrance(command.velocity)) is not None:
                 raise hindrance
-            await clock.sleep(min(PERIOD, left))
+            return min(PERIOD, left)
+
+        while (left := command.until - clock.time()) > 1e-9:
+            if action.paused:
+                await self._hold_at_most(action, left)
+            else:
+                await clock.keep_calling(step)
         if self._command is command:
             self._action = None  # the robot brakes from now on: later commands start afresh
 

@@ -49,14 +49,20 @@ class InertialDisplacement:
 
     async def _watch(self) -> None:
         with contextlib.suppress(asyncio.CancelledError):
-            while True:
-                # At half the period of the readings, so that each is seen once.
-                clock = self._robot.clock
-                await clock.sleep(max(PERIOD / 2, self._imu.reading.stamp + MISSED - clock.time()))
-                shoved = self._check()
-                if shoved is not None:
-                    log.warning("robot %s was displaced by about %.2f m", self._robot.id, shoved)
-                    self._robot.events.publish(RobotDisplaced(stamp=self._robot.clock.time(), distance=shoved))
+            await self._robot.clock.sleep(self._pause())
+            await self._robot.clock.keep_calling(self._look)
+
+    def _look(self) -> float:
+        """Take the newest reading; return the seconds until the next look."""
+        shoved = self._check()
+        if shoved is not None:
+            log.warning("robot %s was displaced by about %.2f m", self._robot.id, shoved)
+            self._robot.events.publish(RobotDisplaced(stamp=self._robot.clock.time(), distance=shoved))
+        return self._pause()
+
+    def _pause(self) -> float:
+        """At half the period of the readings, so that each is seen once."""
+        return max(PERIOD / 2, self._imu.reading.stamp + MISSED - self._robot.clock.time())
 
     def _check(self) -> float | None:
         """Take the newest reading; return the distance of a shove (m) once it no longer grows, else None."""

@@ -57,7 +57,11 @@ class SimulatedBase(Base):
         if not self.wheels.mecanum:
             twist = Twist(twist.x, 0.0, twist.yaw)
         self.check_free(twist)
-        self._target, self._carried = self._walkable(twist.clamped(self.limits.twist)), False
+        wanted = self._walkable(twist.clamped(self.limits.twist))
+        if self._twist is self._target and wanted == self._target and not self._carried:
+            self._haste = self._haste if wanted == STILL else 1.0
+            return  # it moves so: drivers repeat a command at every tick
+        self._target, self._carried = wanted, False
         self._take_time()
 
     def brake_hard(self) -> None:
