@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from roboglot.kernels.layouts import COEFFICIENTS, FIRST
-from roboglot.kernels.raster import draw
+from roboglot.kernels.raster import CORNERS_MAX, fill, project
 
 WIDTH, HEIGHT = 320, 200
 FOCAL = WIDTH / 2 / math.tan(math.radians(35))
@@ -20,17 +20,26 @@ def wall(x, y0, y1, z0, z1):
     return [(x, y1, z0), (x, y0, z0), (x, y0, z1), (x, y1, z1)]
 
 
-def picture(*quads, eye=(0.0, 0.0, 0.0), visible=None, planes_max=50):
+def picture(*quads, eye=(0.0, 0.0, 0.0), visible=None, planes_max=50, band=HEIGHT):
     corners = np.array(quads, dtype=np.float64).reshape(-1, 4, 3)
     mappings = np.zeros((len(corners), 3, 3))
     mappings[:, 0] = corners[:, 0]
     mappings[:, 1], mappings[:, 2] = (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)
-    depth, seen = np.zeros((HEIGHT, WIDTH), np.float32), np.zeros((HEIGHT, WIDTH), np.uint16)
-    planes, sources = np.zeros((FIRST + planes_max, COEFFICIENTS)), np.zeros(FIRST + planes_max, np.int32)
+    numbers = FIRST + planes_max
+    planes, sources = np.zeros((numbers, COEFFICIENTS)), np.zeros(numbers, np.int32)
+    outlines, spans = np.zeros((numbers, CORNERS_MAX, 2)), np.zeros((numbers, 3), np.int32)
     rooms = np.arange(len(corners), dtype=np.int32)
     visible = np.ones(len(corners), np.uint8) if visible is None else np.array(visible, np.uint8)
     lens = np.array((FOCAL, WIDTH / 2, HEIGHT / 2))
-    drawn = draw(corners, mappings, rooms, visible, AHEAD_X, np.array(eye), lens, planes, sources, depth, seen, FIRST)
+    drawn = project(
+        corners, mappings, rooms, visible, AHEAD_X, np.array(eye), lens, planes, sources, outlines, spans, FIRST
+    )
+    depth, seen = np.empty((HEIGHT, WIDTH), np.float32), np.empty((HEIGHT, WIDTH), np.uint16)
+    for top in range(0, HEIGHT, band):
+        rows = min(band, HEIGHT - top)
+        some, numbered = np.full((band, WIDTH), 9.0, np.float32), np.full((band, WIDTH), 9, np.uint16)
+        fill(outlines, spans, planes, FIRST + drawn, top, rows, np.empty((band, 2)), some, numbered)
+        depth[top : top + rows], seen[top : top + rows] = some[:rows], numbered[:rows]
     return seen, depth, planes, sources, drawn
 
 
@@ -120,6 +129,17 @@ def test_too_many_polygons_are_left_out():
     seen, _, _, _, drawn = picture(*quads, planes_max=5)
     assert drawn == 5
     assert seen.max() < FIRST + 5
+
+
+def test_bands_make_the_same_picture_as_the_whole():
+    random = np.random.default_rng(4)
+    for _ in range(5):
+        quads = random.normal(0, 3, (30, 4, 3))
+        whole = picture(*quads)
+        for band in (8, 48, 64):  # the last one is cut off
+            parts = picture(*quads, band=band)
+            np.testing.assert_array_equal(parts[0], whole[0])
+            np.testing.assert_array_equal(parts[1], whole[1])
 
 
 def test_random_quads_break_nothing():

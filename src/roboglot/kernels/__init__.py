@@ -23,7 +23,7 @@ NAVIGATION = (
     "placing",
     "search",
 )
-MODULES = (*NAVIGATION, "raster_shading", "raster", "sweep", "rays", "together", "gliding", "raster_rooms", "posing")
+MODULES = (*NAVIGATION, "raster", "raster_shading", "sweep", "rays", "together", "gliding", "posing")
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Rasterizer: culls, clips and projects quads and fills a depth buffer with their numbers, without colours.
+"""Rasterizer: finds visible rooms, projects quads, fills a depth buffer with their numbers, without colours.
 
 Camera frame: x right, y down, z forward. A plane seen through a pixel is linear in 1/z, and texture coordinates times
 1/z are too, so a polygon is kept as eleven coefficients: 1/z = p0 x + p1 y + p2, u = (p3 x + p4 y + p5) z + p6, v = (p7
@@ -11,8 +11,11 @@ import numpy as np
 
 from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, SingleArray, Uint16Array
 from roboglot.kernels.compiled import kernel
+from roboglot.kernels.layouts import FIRST
 
 NEAR = 0.03  # m in front of the eye
+ROOMS_MAX = 255  # room 0 is outside
+CORNERS_MAX = 8  # of a quad that is cut off before the eye
 
 
 @kernel()
@@ -63,56 +66,11 @@ def _plane(
     return True
 
 
-@kernel()
-def _fill(
-    polygon: FloatArray,
-    count: int,
-    number: int,
-    plane: FloatArray,
-    ends: FloatArray,
-    depth: SingleArray,
-    seen: Uint16Array,
-) -> None:
-    """Write ``number`` wherever the projected polygon (pixels) is the nearest so far."""
-    height, width = depth.shape
-    low, high = polygon[0, 1], polygon[0, 1]
-    for i in range(1, count):
-        low, high = min(low, polygon[i, 1]), max(high, polygon[i, 1])
-    first = int(np.ceil(min(max(low - 0.5, 0.0), float(height))))
-    last = int(np.ceil(min(max(high - 0.5, 0.0), float(height))))
-    for y in range(first, last):
-        ends[y, 0], ends[y, 1] = 1e9, -1e9
-    for i in range(count):
-        j = i + 1 if i + 1 < count else 0
-        x0, y0, x1, y1 = polygon[i, 0], polygon[i, 1], polygon[j, 0], polygon[j, 1]
-        if y0 > y1:
-            x0, y0, x1, y1 = x1, y1, x0, y0
-        top = max(first, int(np.ceil(max(y0 - 0.5, -1.0))))
-        bottom = min(last, int(np.ceil(min(y1 - 0.5, float(height)))))
-        if top >= bottom:
-            continue
-        slope = (x1 - x0) / (y1 - y0)
-        for y in range(top, bottom):
-            x = x0 + (y + 0.5 - y0) * slope
-            ends[y, 0], ends[y, 1] = min(ends[y, 0], x), max(ends[y, 1], x)
-    step = np.float32(plane[0])
-    value = np.uint16(number)
-    for y in range(first, last):
-        left = int(np.ceil(min(max(ends[y, 0] - 0.5, 0.0), float(width))))
-        right = int(np.ceil(min(max(ends[y, 1] - 0.5, 0.0), float(width))))
-        start = np.float32(plane[0] * (left + 0.5) + plane[1] * (y + 0.5) + plane[2])
-        for x in range(left, right):
-            near = start + step * np.float32(x - left)
-            if near > depth[np.uintp(y), np.uintp(x)]:
-                depth[np.uintp(y), np.uintp(x)] = near
-                seen[np.uintp(y), np.uintp(x)] = value
-
-
 @kernel(
     "int64(float64[:,:,::1], float64[:,:,::1], int32[::1], uint8[::1], float64[:,::1], float64[::1], float64[::1],"
-    " float64[:,::1], int32[::1], float32[:,::1], uint16[:,::1], int64)",
+    " float64[:,::1], int32[::1], float64[:,:,::1], int32[:,::1], int64)",
 )
-def draw(
+def project(
     corners: FloatArray,
     mappings: FloatArray,
     rooms: Int32Array,
@@ -122,21 +80,20 @@ def draw(
     lens: FloatArray,
     planes: FloatArray,
     sources: Int32Array,
-    depth: SingleArray,
-    seen: Uint16Array,
+    outlines: FloatArray,
+    spans: Int32Array,
     first: int,
 ) -> int:
-    """Draw quads (n x 4 x 3, world, counter-clockwise from outside) of rooms that are ``visible``; returns how many.
+    """Project quads (n x 4 x 3, world, counter-clockwise from outside) of rooms that are ``visible``; return how many.
 
-    The k-th drawn one is number first + k in ``seen``; its coefficients are ``planes[first + k]``, its index among the
-    quads ``sources[first + k]``. ``mappings``: texture origin and the two axes (1/m) in world. ``lens``: focal length,
-    middle x, middle y in pixels. ``depth`` (1/m) and ``seen`` begin with all 0 and ``first`` with FIRST; more can be
-    drawn into them behind what was drawn before. Quads beyond the length of ``planes`` are left out.
+    The k-th that may be in the picture is polygon first + k: its coefficients are ``planes[first + k]``, its index
+    among the quads ``sources[first + k]``, its corners in pixels ``outlines[first + k]``, and ``spans[first + k]`` are
+    the number of its corners, its first row, and the one behind its last. ``mappings``: texture origin and the two axes
+    (1/m) in world. ``lens``: focal length, middle x, middle y in pixels. Quads beyond ``planes`` are left out.
     """
-    height, width = depth.shape
-    quad, polygon = np.empty((4, 3)), np.empty((8, 3))
-    ends = np.empty((height, 2))
+    quad, polygon = np.empty((4, 3)), np.empty((CORNERS_MAX, 3))
     number, focal, cx, cy = first, lens[0], lens[1], lens[2]
+    width, height = 2.0 * cx, 2.0 * cy
     for index in range(corners.shape[0]):
         if visible[rooms[index]] == 0:
             continue
@@ -159,10 +116,154 @@ def draw(
         if not _plane(quad, mappings[index], rotation, eye, lens, planes[number]):
             continue
         count = _clipped(quad, polygon)
+        low, high = height, 0.0
         for i in range(count):
-            polygon[i, 0] = cx + focal * polygon[i, 0] / polygon[i, 2]
-            polygon[i, 1] = cy + focal * polygon[i, 1] / polygon[i, 2]
+            outlines[number, i, 0] = cx + focal * polygon[i, 0] / polygon[i, 2]
+            y = cy + focal * polygon[i, 1] / polygon[i, 2]
+            outlines[number, i, 1] = y
+            low, high = min(low, y), max(high, y)
+        spans[number, 0] = count
+        spans[number, 1] = int(np.ceil(min(max(low - 0.5, 0.0), height)))
+        spans[number, 2] = int(np.ceil(min(max(high - 0.5, 0.0), height)))
         sources[number] = index
-        _fill(polygon, count, number, planes[number], ends, depth, seen)
         number += 1
     return number - first
+
+
+@kernel(_nrt=False)
+def _fill(
+    outlines: FloatArray,
+    spans: Int32Array,
+    planes: FloatArray,
+    number: int,
+    top: int,
+    rows: int,
+    ends: FloatArray,
+    depth: SingleArray,
+    seen: Uint16Array,
+) -> None:
+    """Write ``number`` wherever that polygon is the nearest so far; row 0 of ``depth`` is ``top`` of the picture."""
+    width = depth.shape[1]
+    first, last = max(spans[number, 1], top), min(spans[number, 2], top + rows)
+    for y in range(first, last):
+        ends[y - top, 0], ends[y - top, 1] = 1e9, -1e9
+    count = spans[number, 0]
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        x0, y0, x1, y1 = outlines[number, i, 0], outlines[number, i, 1], outlines[number, j, 0], outlines[number, j, 1]
+        if y0 > y1:
+            x0, y0, x1, y1 = x1, y1, x0, y0
+        begin = max(first, int(np.ceil(min(max(y0 - 0.5, -1.0), 1e6))))
+        end = min(last, int(np.ceil(min(max(y1 - 0.5, -1.0), 1e6))))
+        if begin >= end:
+            continue
+        slope = (x1 - x0) / (y1 - y0)
+        for y in range(begin, end):
+            x = x0 + (y + 0.5 - y0) * slope
+            ends[y - top, 0], ends[y - top, 1] = min(ends[y - top, 0], x), max(ends[y - top, 1], x)
+    across, down, base = planes[number, 0], planes[number, 1], planes[number, 2]
+    step = np.float32(across)
+    value = np.uint16(number)
+    for y in range(first, last):
+        left = int(np.ceil(min(max(ends[y - top, 0] - 0.5, 0.0), float(width))))
+        right = int(np.ceil(min(max(ends[y - top, 1] - 0.5, 0.0), float(width))))
+        start = np.float32(across * (left + 0.5) + down * (y + 0.5) + base)
+        for x in range(left, right):
+            near = start + step * np.float32(x - left)
+            if near > depth[np.uintp(y - top), np.uintp(x)]:
+                depth[np.uintp(y - top), np.uintp(x)] = near
+                seen[np.uintp(y - top), np.uintp(x)] = value
+
+
+@kernel(
+    "void(float64[:,:,::1], int32[:,::1], float64[:,::1], int64, int64, int64, float64[:,::1], float32[:,::1],"
+    " uint16[:,::1])",
+    _nrt=False,
+)
+def fill(
+    outlines: FloatArray,
+    spans: Int32Array,
+    planes: FloatArray,
+    last: int,
+    top: int,
+    rows: int,
+    ends: FloatArray,
+    depth: SingleArray,
+    seen: Uint16Array,
+) -> None:
+    """Draw the polygons FIRST up to ``last``, without it, into ``rows`` rows of a picture from ``top`` on.
+
+    ``depth`` (1/m) and ``seen`` (numbers of polygons, 0: none) get these rows; ``ends`` (rows, 2) is scratch space. A
+    band of a few rows stays in the processor's cache.
+    """
+    width = depth.shape[1]
+    for y in range(rows):
+        for x in range(width):
+            depth[np.uintp(y), np.uintp(x)] = np.float32(0.0)
+            seen[np.uintp(y), np.uintp(x)] = np.uint16(0)
+    for number in range(FIRST, last):
+        if spans[number, 1] < top + rows and spans[number, 2] > top:
+            _fill(outlines, spans, planes, number, top, rows, ends, depth, seen)
+
+
+@kernel("int64(uint8[:,::1], uint8[:,::1])")
+def label(walls: ByteArray, rooms: ByteArray) -> int:
+    """Number connected cells that are not ``walls`` 1, 2 … in ``rooms``; wall cells get a neighbour's number.
+
+    Rooms beyond ROOMS_MAX share the last number. Returns how many rooms there are.
+    """
+    height, width = walls.shape
+    stack = np.empty((height * width, 2), dtype=np.int32)
+    head, tail, count = 0, 0, 0
+    rooms[:] = 0
+    for first_row in range(height):
+        for first_column in range(width):
+            if walls[first_row, first_column] or rooms[first_row, first_column]:
+                continue
+            count = min(count + 1, ROOMS_MAX)
+            begin = tail
+            stack[tail, 0], stack[tail, 1] = first_row, first_column
+            tail += 1
+            rooms[first_row, first_column] = count
+            head = begin
+            while head < tail:
+                row, column = stack[head, 0], stack[head, 1]
+                head += 1
+                for step in range(4):
+                    r, c = row + (step == 0) - (step == 1), column + (step == 2) - (step == 3)
+                    if 0 <= r < height and 0 <= c < width and not walls[r, c] and not rooms[r, c]:
+                        rooms[r, c] = count
+                        stack[tail, 0], stack[tail, 1] = r, c
+                        tail += 1
+    head = 0  # starting from every free cell, into the walls, breadth first
+    while head < tail:
+        row, column = stack[head, 0], stack[head, 1]
+        head += 1
+        for step in range(4):
+            r, c = row + (step == 0) - (step == 1), column + (step == 2) - (step == 3)
+            if 0 <= r < height and 0 <= c < width and not rooms[r, c]:
+                rooms[r, c] = rooms[row, column]
+                stack[tail, 0], stack[tail, 1] = r, c
+                tail += 1
+    return count
+
+
+@kernel("void(uint8[:,::1], uint8[:,::1], float64, float64, float64, float64, uint8[::1])")
+def look(solid: ByteArray, rooms: ByteArray, x: float, y: float, yaw: float, spread: float, visible: ByteArray) -> None:
+    """Mark in ``visible`` every room whose cells are met within ``spread`` rad around ``yaw`` before a solid cell.
+
+    (x, y) in cells. The first three cells never stop a look: a wall's cell may reach a little beyond the wall.
+    """
+    height, width = solid.shape
+    rays = max(8, int(spread / 0.006))
+    reach = 2 * (height + width)
+    for ray in range(rays + 1):
+        angle = yaw + spread * (ray / rays - 0.5)
+        dx, dy = 0.5 * np.cos(angle), 0.5 * np.sin(angle)
+        for step in range(reach):
+            column, row = int(np.floor(x + dx * step)), int(np.floor(y + dy * step))
+            if column < 0 or row < 0 or column >= width or row >= height:
+                break
+            visible[rooms[row, column]] = 1
+            if step > 6 and solid[row, column]:
+                break

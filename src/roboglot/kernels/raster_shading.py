@@ -1,8 +1,9 @@
 """Colours of a picture with a polygon number for each pixel, written as YUV 4:2:0 (BT.601, limited range).
 
 A texture is a mask that mixes two colours: 256 x 256 texels and its smaller copies behind it, each texel (8 bits) with
-its right, upper and upper right neighbour in one number. Coordinates, light and
-distance are exact at the ends of short strips and linear in between.
+its right, upper and upper right neighbour in one number. Coordinates, light and distance are exact at the ends of short
+strips and linear in between; where a texture changes slowly, every second pixel of a strip is sampled. Pixels are
+painted LANES at a time, over the end of a strip: what lies behind it is painted next. ``_nrt``: see ``raster``.
 """
 
 from __future__ import annotations
@@ -11,24 +12,30 @@ import numpy as np
 
 from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, SingleArray, Uint16Array, Uint32Array
 from roboglot.kernels.compiled import kernel
+from roboglot.kernels.lanes import LANES, paint, paint_twice, sample, tint
 from roboglot.kernels.layouts import FIRST
+from roboglot.kernels.raster import fill
 
-STRIP = 64  # pixels
-BENT = 0.04  # relative change of distance within a textured strip
-BLOCK = 32
+STRIP = 120  # pixels: their samples fill whole lanes; strips begin at multiples, whatever stands before a surface
+LEVEL = 60  # pixels of a strip of the floor or ceiling
+SPARSE = 0.4  # texels between two pixels up to which every second pixel is sampled
+BENT = 2.0  # pixels of a textured strip times the relative change of distance within
+RUN = 32
+BAND = 48  # rows that are drawn at a time: they fit into a processor's cache
+SAMPLES, LINE = 160, 64  # samples along a strip; pixels that may be written behind a row's end
 LEVELS = 8  # 256, 128 ... 2 texels per side
 OFFSETS = np.concatenate(([0], np.cumsum([4 ** (8 - level) for level in range(LEVELS)]))).astype(np.int64)
-ONE = 4294967296.0  # a texture's width as an integer: its fraction fills 32 bits
 U, S = np.uint32, np.int32
+ALL = S(LANES)
+POINT = 65536.0  # 16 bits behind the point
 WHITE = S(235)
-HALF = S((128 << 16) + (1 << 15))
-PAIR = U(0x00FF00FF)
+BLACK, GREY = S(16 << 16), S((128 << 16) + (1 << 15))
 FAR = 80.0  # m
 HAZE = 0.045  # 1/m: how fast light fades with distance
 DARKEST = 0.35
 
 
-@kernel(inline="always")
+@kernel(inline="always", _nrt=False)
 def _at(planes: FloatArray, k: int, x: float, y: float) -> tuple[float, float, float]:
     """Distance ahead and texture coordinates at a pixel."""
     near = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2]
@@ -38,7 +45,7 @@ def _at(planes: FloatArray, k: int, x: float, y: float) -> tuple[float, float, f
     return z, u, v
 
 
-@kernel(inline="always")
+@kernel(inline="always", _nrt=False)
 def _texels(planes: FloatArray, k: int, z: float, u: float, v: float) -> float:
     """Return how many of a texture's 256 texels lie between two pixels there, between sharp and calm."""
     across = abs(planes[k, 3] - (u - planes[k, 6]) * planes[k, 0]) + abs(
@@ -50,7 +57,7 @@ def _texels(planes: FloatArray, k: int, z: float, u: float, v: float) -> float:
     return float(256.0 * z * max(0.5 * max(across, along), min(across, along)))
 
 
-@kernel(inline="always")
+@kernel(inline="always", _nrt=False)
 def _level(texels: float) -> int:
     """Return the copy of the texture that has about one texel per pixel."""
     level = 0
@@ -60,103 +67,78 @@ def _level(texels: float) -> int:
     return level
 
 
-@kernel(inline="always")
+@kernel(inline="always", _nrt=False)
 def _light(paints: SingleArray, k: int, z: float, gain: float) -> float:
     """Brightness of a surface z metres ahead."""
     fade = DARKEST + (1.0 - DARKEST) / (1.0 + HAZE * z)
     return float(gain * paints[k, 6] * (1.0 + paints[k, 7] * (fade - 1.0)))
 
 
-@kernel(inline="always")
-def _paint_flat(
-    luma: ByteArray, row: int, x0: int, x1: int, light: float, light_end: float, paints: SingleArray, k: int
-) -> None:
-    count, line = x1 - x0, luma[np.uintp(row)]
-    value, step = (
-        S(light * paints[k, 0] * 65536.0) + S(16 << 16),
-        S((light_end - light) / count * paints[k, 0] * 65536.0),
-    )
-    for i in range(count):
-        line[np.uintp(x0 + i)] = np.uint8(min(S(S(value + S(S(i) * step)) >> S(16)), WHITE))
-
-
-@kernel(inline="always")
-def _fetch(
-    texels: Uint32Array, places: Uint32Array, count: int, masks: Uint32Array, texture: int, level: int, uv: FloatArray
-) -> None:
-    """The texels of ``count`` pixels. Where they lie is worked out first: without the look-up it is wide arithmetic."""
-    u, v = U(np.int64(uv[0] * ONE)), U(np.int64(uv[1] * ONE))
-    du, dv = U(np.int64(uv[2] * ONE)), U(np.int64(uv[3] * ONE))
-    bits, shift, start = U(8 - level), U(24 + level), U(OFFSETS[level])
-    for i in range(count):
-        column, row = U(U(u + U(U(i) * du)) >> shift), U(U(v + U(U(i) * dv)) >> shift)
-        places[np.uintp(i)] = U(U(start + U(row << bits)) + column)
-    for i in range(count):
-        texels[np.uintp(i)] = masks[np.uintp(texture), np.uintp(places[np.uintp(i)])]
-
-
-@kernel(inline="always")
-def _paint_textured(
-    luma: ByteArray, row: int, x0: int, x1: int, texels: Uint32Array, level: int, uv: FloatArray,
-    light: float, light_end: float, paints: SingleArray, k: int,
+@kernel(inline="always", _nrt=False)
+def _sample(
+    samples: Int32Array, count: int, masks: Uint32Array, texture: int, level: int,
+    u: float, v: float, du: float, dv: float,
 ) -> None:  # fmt: skip
-    """``texels`` were fetched; ``uv``: u and v at x0 and their steps per pixel, in textures.
+    """Write ``count`` samples or a few more, from (u, v) on; ``du``, ``dv``: from one to the next, in textures."""
+    bits = 8 - level
+    size = POINT * (1 << bits)
+    column, columns = U(np.int64(u * size)), U(np.int64(du * size))
+    size *= 1 << bits
+    row, rows = U(np.int64(v * size)), U(np.int64(dv * size))
+    within = U((1 << bits) - 1)
+    above, fraction = U(within << U(bits)), U(255 if level == 0 else 0)  # smaller copies are smooth enough
+    base = texture * masks.shape[1] + OFFSETS[level]
+    for at in range(0, count, LANES):
+        sample(masks, base, column, columns, row, rows, within, above, fraction, samples, at)
+        column, row = U(column + U(U(ALL) * columns)), U(row + U(U(ALL) * rows))
 
-    Numba widens all whole numbers to 64 bits unless every single result is said to have 32; then these, the busiest
-    loops, become wide instructions.
-    """
-    count, line = x1 - x0, luma[np.uintp(row)]
-    base, mix = S(light * paints[k, 0] * 65536.0) + S(16 << 16), S(light * paints[k, 3] * 65536.0)
-    growth = (light_end - light) / count * 65536.0
-    base_step, mix_step = S(growth * paints[k, 0]), S(growth * paints[k, 3])
-    if level > 0:  # far away, where the smaller copies are smooth enough
-        for i in range(count):
-            mask = S(texels[np.uintp(i)] & U(255))
-            value = S(S(S(base + S(S(i) * base_step)) + S(S(mix + S(S(i) * mix_step)) * mask)) >> S(16))
-            line[np.uintp(x0 + i)] = np.uint8(min(value, WHITE))
+
+@kernel(inline="always", _nrt=False)
+def _paint(
+    line: ByteArray, x0: int, x1: int, samples: Int32Array, step: int, light: float, light_end: float,
+    paints: SingleArray, k: int,
+) -> None:  # fmt: skip
+    """Paint the pixels from ``x0`` to ``x1``; ``step``: pixels from one sample to the next, 0 without a texture."""
+    growth = POINT * (light_end - light) / (x1 - x0)
+    base, base_step = S(S(POINT * light * paints[k, 0]) + BLACK), S(growth * paints[k, 0])
+    mix, mix_step = S(POINT * light * paints[k, 3]), S(growth * paints[k, 3])
+    if step == 0:
+        mix, mix_step = S(0), S(0)
+    if step < 2:
+        for i in range(0, x1 - x0, LANES):
+            paint(samples, i, base, base_step, mix, mix_step, WHITE, line, x0 + i)
+            base, mix = S(base + S(ALL * base_step)), S(mix + S(ALL * mix_step))
         return
-    u, v = U(np.int64(uv[0] * ONE)), U(np.int64(uv[1] * ONE))
-    du, dv = U(np.int64(uv[2] * ONE)), U(np.int64(uv[3] * ONE))
-    for i in range(count):  # bilinear
-        four = texels[np.uintp(i)]
-        right, up = U(U(U(u + U(U(i) * du)) >> U(16)) & U(255)), U(U(U(v + U(U(i) * dv)) >> U(16)) & U(255))
-        two = U(U(U(four & PAIR) * U(U(256) - right)) + U(U(U(four >> U(8)) & PAIR) * right))
-        mask = S(U(U(U(two & U(0xFFFF)) * U(U(256) - up)) + U(U(two >> U(16)) * up)) >> U(16))
-        value = S(S(S(base + S(S(i) * base_step)) + S(S(mix + S(S(i) * mix_step)) * mask)) >> S(16))
-        line[np.uintp(x0 + i)] = np.uint8(min(value, WHITE))
+    lead = x0 & 1
+    if lead:  # samples are of even pixels
+        between = S(S(samples[0] + samples[1]) >> S(1))
+        line[np.uintp(x0)] = np.uint8(min(S(S(base + S(mix * between)) >> S(16)), WHITE))
+        base, mix = S(base + base_step), S(mix + mix_step)
+    base_step, mix_step = S(S(2) * base_step), S(S(2) * mix_step)
+    for i in range(0, (x1 - x0 - lead + 1) >> 1, LANES):
+        paint_twice(samples, lead + i, base, base_step, mix, mix_step, WHITE, line, x0 + lead + 2 * i)
+        base, mix = S(base + S(ALL * base_step)), S(mix + S(ALL * mix_step))
 
 
-@kernel(inline="always")
-def _paint_chroma(
-    blue: ByteArray,
-    red: ByteArray,
-    row: int,
-    x0: int,
-    x1: int,
-    texels: Uint32Array,
-    level: int,
-    light: float,
-    paints: SingleArray,
-    k: int,
-) -> None:
-    """Every second pixel of an even row; ``level`` below 0: no texture."""
-    bright = 65536.0 * min(light, 1.0)
-    first, last = (x0 + 1) >> 1, (x1 + 1) >> 1
-    u_base, v_base = S(paints[k, 1] * bright) + HALF, S(paints[k, 2] * bright) + HALF
-    if level < 0:
-        for x in range(first, last):
-            blue[np.uintp(row), np.uintp(x)] = np.uint8(u_base >> 16)
-            red[np.uintp(row), np.uintp(x)] = np.uint8(v_base >> 16)
-        return
-    u_mix, v_mix = S(paints[k, 4] * bright), S(paints[k, 5] * bright)
-    blues, reds, lead = blue[np.uintp(row)], red[np.uintp(row)], 2 * first - x0
-    for i in range(last - first):
-        mask = S(texels[np.uintp(lead + 2 * i)] & U(255))
-        blues[np.uintp(first + i)] = np.uint8(S(u_base + S(u_mix * mask)) >> S(16))
-        reds[np.uintp(first + i)] = np.uint8(S(v_base + S(v_mix * mask)) >> S(16))
+@kernel(inline="always", _nrt=False)
+def _tint(
+    blues: ByteArray, reds: ByteArray, x0: int, x1: int, samples: Int32Array, step: int, light: float,
+    paints: SingleArray, k: int,
+) -> None:  # fmt: skip
+    """Colour the even pixels from ``x0`` to ``x1``; ``step`` as in ``_paint``."""
+    bright = POINT * min(light, 1.0)
+    blue, red = S(S(bright * paints[k, 1]) + GREY), S(S(bright * paints[k, 2]) + GREY)
+    blue_mix, red_mix = S(bright * paints[k, 4]), S(bright * paints[k, 5])
+    if step == 0:
+        blue_mix, red_mix = S(0), S(0)
+    first, every = (x0 + 1) >> 1, S(1 if step == 2 else 2)
+    for i in range(0, ((x1 + 1) >> 1) - first, LANES):
+        at = (x0 & 1) + i * every
+        tint(samples, at, every, blue, blue_mix, blues, first + i)
+        tint(samples, at, every, red, red_mix, reds, first + i)
 
 
-@kernel(inline="always")
+@kernel(inline="always", _nrt=False)
 def _cell(cells: ByteArray, frame: FloatArray, u: float, v: float) -> int:
     """Return the value of ``cells`` at a place of the floor."""
     column = int(min(max((u - frame[0]) * frame[2], 0.0), cells.shape[1] - 1.0))
@@ -164,7 +146,7 @@ def _cell(cells: ByteArray, frame: FloatArray, u: float, v: float) -> int:
     return int(cells[row, column])
 
 
-@kernel(inline="always")
+@kernel(inline="always", _nrt=False)
 def _shadow(cells: ByteArray, frame: FloatArray, u: float, v: float) -> float:
     """Smooth brightness 0..1 of a place of the floor."""
     column = min(max((u - frame[0]) * frame[2] - 0.5, 0.0), cells.shape[1] - 1.001)
@@ -176,28 +158,27 @@ def _shadow(cells: ByteArray, frame: FloatArray, u: float, v: float) -> float:
     return float((upper + (lower - upper) * down) / 255.0)
 
 
-@kernel(inline="always")
+@kernel(inline="always", _nrt=False)
 def _run(seen: Uint16Array, y: int, x: int, limit: int) -> int:
     """Return the end of the run of equal numbers that begins at (x, y), at most ``limit``."""
     number, end = seen[y, x], x
-    while end + BLOCK <= limit:
+    while end + RUN <= limit:
         other = np.uint16(0)
-        for i in range(BLOCK):  # a loop without an exit compiles to a few vector instructions
+        for i in range(RUN):  # a loop without an exit compiles to a few vector instructions
             other |= np.uint16(seen[np.uintp(y), np.uintp(end + i)] ^ number)
         if other:
             break
-        end += BLOCK
+        end += RUN
     while end < limit and seen[np.uintp(y), np.uintp(end)] == number:
         end += 1
     return end
 
 
-@kernel(
-    "void(uint16[:,::1], float64[:,::1], int32[::1], float32[:,::1], int32[::1], uint32[:,::1], uint8[:,::1],"
-    " uint8[:,::1], float64[::1], float64, uint8[:,::1], uint8[:,::1], uint8[:,::1])",
-)
-def shade(
+@kernel(inline="always", _nrt=False)
+def _shade_row(
+    y: int,
     seen: Uint16Array,
+    band_row: int,
     planes: FloatArray,
     sources: Int32Array,
     paints: SingleArray,
@@ -207,57 +188,107 @@ def shade(
     shadows: ByteArray,
     frame: FloatArray,
     gain: float,
+    samples: Int32Array,
+    line: ByteArray,
+    blues: ByteArray,
+    reds: ByteArray,
+) -> None:
+    """Colour one row into ``line``, ``blues`` and ``reds``."""
+    width = seen.shape[1]
+    middle = y + 0.5
+    x, last = 0, -1
+    z_end, u_end, v_end = 0.0, 0.0, 0.0
+    while x < width:
+        here = int(seen[band_row, x])
+        end = _run(seen, band_row, x, min(width, x - x % STRIP + STRIP))
+        if here < FIRST:
+            end = min(end, x - x % LEVEL + LEVEL)
+            half = 0.5 * (x + end)
+            here = 0 if planes[0, 0] * half + planes[0, 1] * middle + planes[0, 2] > 0.0 else 1
+        source = sources[here]
+        z, u, v = z_end, u_end, v_end
+        if here != last:
+            z, u, v = _at(planes, here, x + 0.5, middle)
+        z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
+        while textures[source] >= 0 and end > x + 16 and abs(z_end - z) * (end - x) > BENT * min(z, z_end):
+            end = (x + end) >> 1
+            z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
+        dark, dark_end = 1.0, 1.0
+        if here == 0:
+            ground = _cell(grounds, frame, u, v)
+            while end > x + 1 and _cell(grounds, frame, u_end, v_end) != ground:
+                end = (x + end) >> 1
+                z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
+            source += ground
+            dark, dark_end = _shadow(shadows, frame, u, v), _shadow(shadows, frame, u_end, v_end)
+        last = here
+        texture, step = textures[source], 0
+        if texture >= 0:
+            level = _level(_texels(planes, here, z, u, v))
+            du, dv = (u_end - u) / (end - x), (v_end - v) / (end - x)
+            step = 2 if 256.0 * max(abs(du), abs(dv)) <= SPARSE * (1 << level) else 1
+            lead = (x & 1) * (step - 1)
+            count = end - x if step == 1 else ((end - x + lead + 1) >> 1) + 1
+            _sample(samples, count, masks, texture, level, u - lead * du, v - lead * dv, step * du, step * dv)
+        light, light_end = _light(paints, source, z, gain) * dark, _light(paints, source, z_end, gain) * dark_end
+        _paint(line, x, end, samples, step, light, light_end, paints, source)
+        if y & 1 == 0:
+            _tint(blues, reds, x, end, samples, step, light, paints, source)
+        x = end
+
+
+@kernel(
+    "void(float64[:,:,::1], int32[:,::1], int64, float64[:,::1], int32[::1], float32[:,::1], int32[::1],"
+    " uint32[:,::1], uint8[:,::1], uint8[:,::1], float64[::1], float64, float64[:,::1], float32[:,::1], uint16[:,::1],"
+    " int32[::1], uint8[:,::1], uint8[:,::1], uint8[:,::1], uint8[:,::1])",
+    _nrt=False,
+)
+def shade(
+    outlines: FloatArray,
+    spans: Int32Array,
+    last: int,
+    planes: FloatArray,
+    sources: Int32Array,
+    paints: SingleArray,
+    textures: Int32Array,
+    masks: Uint32Array,
+    grounds: ByteArray,
+    shadows: ByteArray,
+    frame: FloatArray,
+    gain: float,
+    ends: FloatArray,
+    depth: SingleArray,
+    seen: Uint16Array,
+    samples: Int32Array,
+    lines: ByteArray,
     luma: ByteArray,
     blue: ByteArray,
     red: ByteArray,
 ) -> None:
-    """Colour the polygons that ``raster.draw`` found. Planes 0 and 1 are floor and ceiling.
+    """Draw and colour the polygons up to ``last`` that ``raster.project`` found. Planes 0 and 1: floor and ceiling.
 
     ``sources[k]`` is the row of ``paints`` and ``textures`` (-1: none) of the plane k; for the floor it is the first
     of a row per ground, and ``grounds`` says which ground a cell has. ``shadows``: the floor's brightness per cell.
     ``frame``: texture coordinates of the cells' corner, cells per texture. A paint: Y, U, V of one colour; steps to the
     other per mask unit; light; whether distance dims it.
+
+    Scratch space: ``ends``, ``depth`` and ``seen`` of as many rows as are drawn at a time, an even number; ``samples``
+    (SAMPLES); ``lines`` (3, LINE more than a row).
     """
-    height, width = seen.shape
-    uv = np.empty(4)
-    places, texels = np.empty(STRIP, np.uint32), np.empty(STRIP, np.uint32)
-    for y in range(height):
-        middle = y + 0.5
-        x, last = 0, -1
-        z_end, u_end, v_end = 0.0, 0.0, 0.0
-        while x < width:
-            here = int(seen[y, x])
-            end = _run(seen, y, x, min(width, x + STRIP))
-            if here < FIRST:
-                half = 0.5 * (x + end)
-                here = 0 if planes[0, 0] * half + planes[0, 1] * middle + planes[0, 2] > 0.0 else 1
-            source = sources[here]
-            z, u, v = z_end, u_end, v_end
-            if here != last:
-                z, u, v = _at(planes, here, x + 0.5, middle)
-            z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
-            while textures[source] >= 0 and end > x + 16 and abs(z_end - z) > BENT * min(z, z_end):
-                end = (x + end) >> 1
-                z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
-            dark, dark_end = 1.0, 1.0
-            if here == 0:
-                ground = _cell(grounds, frame, u, v)
-                while end > x + 1 and _cell(grounds, frame, u_end, v_end) != ground:
-                    end = (x + end) >> 1
-                    z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
-                source += ground
-                dark, dark_end = _shadow(shadows, frame, u, v), _shadow(shadows, frame, u_end, v_end)
-            last = here
-            texture = textures[source]
-            light, light_end = _light(paints, source, z, gain) * dark, _light(paints, source, z_end, gain) * dark_end
-            level = -1
-            if texture >= 0:
-                level = _level(_texels(planes, here, z, u, v))
-                uv[0], uv[1], uv[2], uv[3] = u, v, (u_end - u) / (end - x), (v_end - v) / (end - x)
-                _fetch(texels, places, end - x, masks, texture, level, uv)
-                _paint_textured(luma, y, x, end, texels, level, uv, light, light_end, paints, source)
-            else:
-                _paint_flat(luma, y, x, end, light, light_end, paints, source)
+    height, width = luma.shape
+    line, blues, reds = lines[0], lines[1], lines[2]
+    for top in range(0, height, depth.shape[0]):
+        rows = min(depth.shape[0], height - top)
+        fill(outlines, spans, planes, last, top, rows, ends, depth, seen)
+        for row in range(rows):
+            y = top + row
+            _shade_row(
+                y, seen, row, planes, sources, paints, textures, masks, grounds, shadows, frame, gain, samples,
+                line, blues, reds,
+            )  # fmt: skip
+            for x in range(width):
+                luma[np.uintp(y), np.uintp(x)] = line[np.uintp(x)]
             if y & 1 == 0:
-                _paint_chroma(blue, red, y >> 1, x, end, texels, level, light, paints, source)
-            x = end
+                for x in range(width >> 1):
+                    blue[np.uintp(y >> 1), np.uintp(x)] = blues[np.uintp(x)]
+                    red[np.uintp(y >> 1), np.uintp(x)] = reds[np.uintp(x)]

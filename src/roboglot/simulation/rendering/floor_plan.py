@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.kernels.posing import darken
-from roboglot.kernels.raster_rooms import ROOMS_MAX, label, look
+from roboglot.kernels.raster import ROOMS_MAX, label, look
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.blueprint import Solid, SolidKind
 from roboglot.simulation.world.description import Floor, Wall

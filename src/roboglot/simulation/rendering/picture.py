@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.kernels.layouts import COEFFICIENTS, FIRST
-from roboglot.kernels.raster import draw
-from roboglot.kernels.raster_shading import shade
+from roboglot.kernels.raster import CORNERS_MAX, project
+from roboglot.kernels.raster_shading import BAND, LINE, SAMPLES, shade
 from roboglot.simulation.rendering.interior import GROUND_TILE
 from roboglot.simulation.rendering.views import Eye, Scene
 
@@ -23,24 +23,29 @@ class Renderer:
     def __init__(self, width: int, height: int, fov: float) -> None:
         self._width, self._height = width, height
         self._lens = np.array((width / 2 / math.tan(fov / 2), width / 2, height / 2))
-        self._depth = np.empty((height, width), dtype=np.float32)
-        self._seen = np.empty((height, width), dtype=np.uint16)
         self._planes = np.empty((FIRST + POLYGONS_MAX, COEFFICIENTS))
         self._sources = np.empty(FIRST + POLYGONS_MAX, dtype=np.int32)
+        self._outlines = np.empty((FIRST + POLYGONS_MAX, CORNERS_MAX, 2))
+        self._spans = np.empty((FIRST + POLYGONS_MAX, 3), dtype=np.int32)
+        self._band = (
+            np.empty((BAND, 2)),
+            np.empty((BAND, width), dtype=np.float32),
+            np.empty((BAND, width), dtype=np.uint16),
+            np.zeros(SAMPLES, dtype=np.int32),
+            np.zeros((3, width + LINE), dtype=np.uint8),
+        )
 
     def render(self, scene: Scene, eye: Eye, gain: float) -> NDArray[np.uint8]:
         """Return the picture as YUV 4:2:0 planes, one below the other (3/2 height, width)."""
         ground, plan = scene.ground, scene.plan
         rotation = np.ascontiguousarray(eye.rotation)
         visible = plan.seen_from(eye.x, eye.y, eye.yaw, eye.spread)
-        self._depth.fill(0.0)
-        self._seen.fill(0)
         at = np.array((eye.x, eye.y, eye.z))
         drawn, paints = FIRST, len(ground.paints)
         for mesh in scene.meshes:
-            more = draw(
+            more = project(
                 mesh.corners, mesh.mappings, mesh.rooms, visible, rotation, at, self._lens, self._planes,
-                self._sources, self._depth, self._seen, drawn,
+                self._sources, self._outlines, self._spans, drawn,
             )  # fmt: skip
             self._sources[drawn : drawn + more] += paints
             drawn, paints = drawn + more, paints + len(mesh.paints)
@@ -50,10 +55,10 @@ class Renderer:
         chroma = picture[height:].reshape(2, height // 2, width // 2)
         frame = np.array((plan.x / GROUND_TILE, plan.y / GROUND_TILE, GROUND_TILE / plan.cell))
         shade(
-            self._seen, self._planes, self._sources,
+            self._outlines, self._spans, drawn, self._planes, self._sources,
             np.concatenate((ground.paints, *(mesh.paints for mesh in scene.meshes))),
             np.concatenate((ground.textures, *(mesh.textures for mesh in scene.meshes))),
-            scene.masks, plan.rooms, scene.shadows, frame, gain, picture[:height], chroma[0], chroma[1],
+            scene.masks, plan.rooms, scene.shadows, frame, gain, *self._band, picture[:height], chroma[0], chroma[1],
         )  # fmt: skip
         return picture
 

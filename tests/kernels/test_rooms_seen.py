@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from roboglot.kernels.raster_rooms import ROOMS_MAX, label, look
+from roboglot.kernels.raster import ROOMS_MAX, label, look
 
 
 def plan(*rows):
