@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.components.motion.legs import Legs
@@ -63,7 +64,8 @@ async def sensed(*, together: bool) -> list[str]:
             if Gimbal in robot:
                 lines.append(f"{robot[Gimbal].angles} {robot[Gimbal].attitude}")
             flags = robot[MotionStatus].flags if MotionStatus in robot else None
-            lines.append(f"{step} {robot.id} {values} {flags} {world.truth.pose_of(robot.id)}")
+            docked = robot[DockContact].docked if DockContact in robot else None
+            lines.append(f"{step} {robot.id} {values} {flags} {docked} {world.truth.pose_of(robot.id)}")
         if step % 10 == 5 and (happening := happenings.get(step // 10)):
             happening()
     world.close()

@@ -40,6 +40,17 @@ def _outside(dx: float, dy: float, c: float, s: float, half_x: float, half_y: fl
     return along * along + aside * aside
 
 
+@kernel("float64(float64[:,::1], float64, float64, int64)")
+def room(walls: FloatArray, x: float, y: float, floor: int) -> float:
+    """Return the distance (m) from a place to the nearest of the floor's ``walls``; inf: there is none."""
+    least = np.inf
+    for w in range(walls.shape[0]):
+        if walls[w, 6] == floor:
+            off = _outside(x - walls[w, 0], y - walls[w, 1], walls[w, 2], walls[w, 3], walls[w, 4], walls[w, 5])
+            least = min(least, off)
+    return math.sqrt(least)
+
+
 @kernel("boolean(float64[:,::1], float64[::1], float64[:,::1])")
 def _meet_walls(hulls: FloatArray, reach: FloatArray, walls: FloatArray) -> bool:
     """Return whether a hull reaches one of ``walls``: rows x, y, cosine and sine of yaw, width, depth, floor."""

@@ -57,3 +57,8 @@ STATUS_WIDTH = 7
 GIMBAL_TURNED, GIMBAL_SINCE = 1, 2  # the hull's yaw at the last tick, and its turns since the start
 GIMBAL_YAW, GIMBAL_RATE, GIMBAL_LOWEST, GIMBAL_HIGHEST, GIMBAL_ACCELERATION, GIMBAL_TOP = 3, 4, 5, 6, 7, 8
 GIMBAL_WIDTH = 9
+
+# Dock contact; and docks: x, y, cosine, sine and value of yaw, floor.
+CONTACT_DISTANCE, CONTACT_ANGLE, CONTACT_MADE = 1, 2, 3  # tolerances; flag: at a dock
+CONTACT_WIDTH = 4
+DOCK_WIDTH = 6

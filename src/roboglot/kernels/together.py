@@ -13,6 +13,9 @@ from roboglot.kernels.arrays import FloatArray, IntArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.layouts import (
     ALONE,
+    CONTACT_ANGLE,
+    CONTACT_DISTANCE,
+    CONTACT_MADE,
     GIMBAL_ACCELERATION,
     GIMBAL_HIGHEST,
     GIMBAL_LOWEST,
@@ -28,6 +31,7 @@ from roboglot.kernels.layouts import (
     HULL_DRIVE_X,
     HULL_DRIVE_Y,
     HULL_DRIVE_YAW,
+    HULL_FLOOR,
     HULL_FREE,
     HULL_GAZE_YAW,
     HULL_HELD,
@@ -35,6 +39,7 @@ from roboglot.kernels.layouts import (
     HULL_LOOKED_X,
     HULL_LOOKED_Y,
     HULL_Q,
+    HULL_RADIUS,
     HULL_REST,
     HULL_SINKING,
     HULL_SLACK,
@@ -305,4 +310,32 @@ def reckon(
             row[ODOMETRY_STATE + 7] += abs(vx) * seconds
         row[ODOMETRY_STATE], row[ODOMETRY_STATE + 3] = stamp, turned
         row[ODOMETRY_STATE + 4], row[ODOMETRY_STATE + 5], row[ODOMETRY_STATE + 6] = vx, vy, rate
+    return count
+
+
+@kernel("int64(float64[:,::1], float64[:,::1], float64[:,::1], int64[::1])")
+def touch(hulls: FloatArray, contacts: FloatArray, docks: FloatArray, others: IntArray) -> int:
+    """List the robots whose rear has come to a dock or left it."""
+    count = 0
+    for i in range(hulls.shape[0]):
+        if contacts[i, USE] == 0.0:
+            continue
+        near, made = contacts[i, CONTACT_DISTANCE], False
+        for dock in range(docks.shape[0]):
+            if docks[dock, 5] != hulls[i, HULL_FLOOR]:
+                continue
+            dx, dy, c, s = (
+                hulls[i, HULL_X] - docks[dock, 0],
+                hulls[i, HULL_Y] - docks[dock, 1],
+                docks[dock, 2],
+                docks[dock, 3],
+            )
+            if abs(c * dx + s * dy - hulls[i, HULL_RADIUS]) > near or abs(c * dy - s * dx) > near:
+                continue
+            turn = hulls[i, HULL_TURNED] - docks[dock, 4]
+            turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+            made = made or abs(turn) <= contacts[i, CONTACT_ANGLE]
+        if made != (contacts[i, CONTACT_MADE] != 0.0):
+            others[count] = i
+            count += 1
     return count

@@ -121,7 +121,8 @@ class Hull(HullState):
             self._torso, self._sinking = self.legs.torso, self.legs.sinking
         self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
         self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
-        self._servos = data.actuator_force[self._drive], data.ctrl[self._drive]  # views of the current values
+        servos = data.actuator_force, data.ctrl
+        self._servos = [of[self._drive].data.cast("B").cast("d") for of in servos]  # forces and speeds, as they are now
         self.floor = 0
         self.tilting = LEVEL  # their rates, rad/s
         self.loose = False  # whether the wheels may have left the ground
@@ -132,8 +133,7 @@ class Hull(HullState):
         self.when_touched: list[Duty] = []  # start when the hull is touched
         self.edges, self.walls = Nearness(body.hull.radius), Nearness(body.hull.radius)
         self._looked = -1  # the floor on which they were last looked up; place and reach are in the row
-        servo = self.legs.servo if self.legs else -1
-        torso, shape = (self._torso, self._sinking, servo), body.hull
+        torso, shape = (self._torso, self._sinking, self.legs.servo if self.legs else -1), body.hull
         self.enter((self._q, self._v, first), torso, shape.height - shape.torso_height, shape.radius)
 
     @property
@@ -247,7 +247,7 @@ class Hull(HullState):
         """Turn the wheels as commanded for the next ``seconds``; a kernel does the same for all on level ground."""
         speeds, row = self._servos[1], self._row
         if row[HULL_HELD]:
-            speeds[:] = 0.0  # held by a hand, or lying
+            speeds[0] = speeds[1] = speeds[2] = 0.0  # held by a hand, or lying
             return
         vx, vy, turn = row[HULL_DRIVE_X], row[HULL_DRIVE_X + 1], row[HULL_DRIVE_YAW]
         if self._tilts:  # the wheels measure along the slope and hold against it
@@ -322,8 +322,8 @@ class Hull(HullState):
     @property
     def traction_power(self) -> float:
         """Current power of the wheels, W; slip on the floor costs power, braking returns none."""
-        force, speed = self._servos
-        return max(0.0, float(force.dot(speed)))
+        forces, speeds = self._servos
+        return max(0.0, forces[0] * speeds[0] + forces[1] * speeds[1] + forces[2] * speeds[2])
 
     # -- leaps ---------------------------------------------------------------------------------------------------------
 

@@ -29,6 +29,7 @@ class Kernels:
     measure: Callable[..., int]
     watch: Callable[..., int]
     reckon: Callable[..., int]
+    touch: Callable[..., int]
 
 
 class Rows:
@@ -53,6 +54,7 @@ class Rows:
             together.measure,
             together.watch,
             together.reckon,
+            together.touch,
         )
 
     def table(self, name: str, width: int) -> FloatArray:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.blueprint import dock_solid
-from roboglot.simulation.building.floor_edges import Footing, Walls
+from roboglot.simulation.building.floor_edges import Footing
 from roboglot.simulation.building.lift import LiftCar
 from roboglot.simulation.building.lift_passengers import Passengers
 from roboglot.simulation.building.mechanics import Mechanics
@@ -36,10 +36,9 @@ class Building:
             self.lift = LiftCar(world, physics, Passengers(physics.hulls.values(), walkers, self._props))
         self.footing = Footing(world, self.lift)
         if not physics.ground.uneven:
-            walls = Walls(world)
             for hull in physics.hulls.values():
                 hull.edges.learn(self.footing.room)
-                hull.walls.learn(walls.room)
+                hull.walls.learn(physics.walls.room)
                 hull.look()
 
     def move_dock(self, front: Pose, index: int, floor: int) -> None:

@@ -1,4 +1,4 @@
-"""Edges of the floor: holes, the shaft without the lift's car, open ends; and distances to walls.
+"""Edges of the floor: holes, the shaft without the lift's car, open ends.
 
 World frame.
 """
@@ -9,42 +9,13 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from roboglot.kernels.arrays import FloatArray
-from roboglot.simulation.building.blueprint import Rectangle, SolidKind, holes_of, shaft_of, solids_of
+from roboglot.simulation.building.blueprint import Rectangle, holes_of, shaft_of
 from roboglot.simulation.world.description import WorldDescription
 
 if TYPE_CHECKING:
     from roboglot.simulation.building.lift import LiftCar
 
 STEP = 0.03  # m by which the car may be lower before that counts as a drop
-
-
-class Walls:
-    """Distances to walls and furniture, without movable things."""
-
-    def __init__(self, world: WorldDescription) -> None:
-        self._floors = []
-        for floor in world.floors:
-            solids = [s for s in solids_of(floor, world.lift, lift_here=True) if s.kind is not SolidKind.DOCK]
-            rows = [(s.pose.x, s.pose.y, math.cos(s.pose.yaw), math.sin(s.pose.yaw), *s.size[:2]) for s in solids]
-            self._floors.append(np.array(rows).reshape(-1, 6).T.copy())
-
-    def table(self) -> FloatArray:
-        """Return rows x, y, cosine and sine of yaw, half the width and the depth, floor."""
-        rows = [np.vstack((rows, np.full(rows.shape[1], floor))) for floor, rows in enumerate(self._floors)]
-        table = np.ascontiguousarray(np.hstack(rows).T)
-        table[:, 4:6] /= 2.0
-        return table
-
-    def room(self, x: float, y: float, floor: int) -> float:
-        """Return the distance to the nearest wall or piece of furniture, m; inf: there is none."""
-        at_x, at_y, c, s, width, depth = self._floors[floor]
-        dx, dy = x - at_x, y - at_y
-        along = np.maximum(0.0, np.abs(c * dx + s * dy) - width / 2)
-        aside = np.maximum(0.0, np.abs(c * dy - s * dx) - depth / 2)
-        return float(np.sqrt(np.min(along * along + aside * aside, initial=np.inf)))
 
 
 class Footing:

@@ -8,6 +8,7 @@ from typing import Protocol
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.building.props import Props
 from roboglot.simulation.building.terrain import Ground
+from roboglot.simulation.building.walls import Walls
 
 
 class Mechanics(Protocol):
@@ -24,6 +25,10 @@ class Mechanics(Protocol):
     @property
     def ground(self) -> Ground:
         """Relief of the floors."""
+
+    @property
+    def walls(self) -> Walls:
+        """Walls and furniture."""
 
     @property
     def car_lift(self) -> float:

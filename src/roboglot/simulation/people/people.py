@@ -9,7 +9,6 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import Protocol
 
 from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.people import figure
@@ -31,6 +30,7 @@ from roboglot.simulation.world.description import Person
 MANNERS = 0.8  # m in front of a robot at which people wait
 SIDE = 0.55  # m to the side at which they still pass it
 PATIENCE = 2.5  # s for which they wait for a robot before they step aside
+NEAR = 1.0  # m along an axis beyond which no robot is in the way: more than the diagonal of these two
 ASIDE = 0.75  # m by which they step aside, or back
 APART = 0.45  # m from a robot's centre that they always keep
 TURN_RATE = 2.5  # rad/s
@@ -39,15 +39,7 @@ ORDERS_MAX = 100  # steps queued per person
 AHEAD_MAX = 500  # ticks of a wait that are counted ahead
 
 
-class Placed(Protocol):
-    """An object at a place of the floor, m."""
-
-    @property
-    def x(self) -> float: ...
-    @property
-    def y(self) -> float: ...
-
-
+Spots = Sequence[tuple[float, float]]  # places of robots on the floor, m
 Free = Callable[["Walker", Point], bool]  # whether the person can walk straight to that place
 
 
@@ -142,7 +134,7 @@ class Walker:
 
     # -- time ----------------------------------------------------------------------------------------------------------
 
-    def walk(self, seconds: float, robots: Sequence[Placed], free: Free) -> bool:
+    def walk(self, seconds: float, robots: Spots, free: Free) -> bool:
         """Continue for ``seconds`` among the ``robots`` of the floor; return whether the pose changed."""
         self.walking, moved, self.displaced = False, self.displaced, False
         if self._idle:
@@ -209,7 +201,7 @@ class Walker:
             case _:
                 return True
 
-    def _walk_on(self, walk: Walk, robots: Sequence[Placed], seconds: float, free: Free) -> bool:
+    def _walk_on(self, walk: Walk, robots: Spots, seconds: float, free: Free) -> bool:
         """Walk on, unless a robot is in the way; return whether the goal is reached."""
         if self._dodging is not None:
             self._dodge(self._dodging, robots, self.person.speed * seconds)
@@ -219,8 +211,11 @@ class Walker:
         left = math.hypot(dx, dy)
         heading = math.atan2(dy, dx) if left > 1e-9 else pose.yaw
         c, s = math.cos(heading), math.sin(heading)
-        for robot in robots:
-            off_x, off_y = robot.x - pose.x, robot.y - pose.y
+        here_x, here_y = pose.x, pose.y
+        for robot_x, robot_y in robots:
+            off_x, off_y = robot_x - here_x, robot_y - here_y
+            if not (-NEAR < off_x < NEAR and -NEAR < off_y < NEAR):
+                continue
             if 0.0 < c * off_x + s * off_y < MANNERS and abs(c * off_y - s * off_x) < SIDE:
                 self._let_pass(heading, c * off_y - s * off_x, seconds, free)
                 return False
@@ -246,11 +241,11 @@ class Walker:
                 return spot
         return None
 
-    def _dodge(self, spot: Point, robots: Sequence[Placed], step: float) -> None:
+    def _dodge(self, spot: Point, robots: Spots, step: float) -> None:
         """Step towards ``spot``, and end there or before a robot that is near."""
         before = self.pose
         there = self._step(spot.x, spot.y, step)
-        spots = [Point(robot.x, robot.y) for robot in robots]
+        spots = [Point(*robot) for robot in robots]
         if any(APART > spot.distance_to(self.pose) < spot.distance_to(before) for spot in spots):
             self.pose, self.walking, there = before, False, True
         if there:

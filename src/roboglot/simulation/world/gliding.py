@@ -15,8 +15,8 @@ from roboglot.kernels import loading
 from roboglot.kernels.arrays import FloatArray
 from roboglot.simulation.bodies.sleep import RESTS
 from roboglot.simulation.bodies.support import GRAVITY
-from roboglot.simulation.building.floor_edges import Walls
 from roboglot.simulation.building.props import AWAY
+from roboglot.simulation.building.walls import Walls
 from roboglot.values import dataclass
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Gliding:
         geoms = model.body_geomadr[movable[np.argsort(model.body_mocapid[movable])]].astype(np.int64)
         people = model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE
         shapes = model.geom_size, np.where(people, -1 - geoms, geoms)
-        self._near = hulls, walls.table(), data.mocap_pos, data.mocap_quat, *shapes, AWAY[2] / 2, MARGIN
+        self._near = hulls, walls.table, data.mocap_pos, data.mocap_quat, *shapes, AWAY[2] / 2, MARGIN
         self._motion = (
             hulls,
             np.zeros((len(hulls), 7)),

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from msgspec.structs import replace
 
-from roboglot.kernels.layouts import HULL_WIDTH
+from roboglot.kernels.layouts import HULL_FLOOR, HULL_WIDTH, HULL_X, HULL_Y
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.body import Body
@@ -21,10 +21,10 @@ from roboglot.simulation.bodies.rows import Rows, Seat
 from roboglot.simulation.bodies.sleep import RESTS, Sleep, tiny
 from roboglot.simulation.bodies.support import LIFTED
 from roboglot.simulation.building.blueprint import Solid, SolidKind
-from roboglot.simulation.building.floor_edges import Walls
 from roboglot.simulation.building.props import AWAY, OBSTACLES_MAX, Props
 from roboglot.simulation.building.terrain import Ground
 from roboglot.simulation.building.things import Things
+from roboglot.simulation.building.walls import Walls
 from roboglot.simulation.people.people import keyed
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.gliding import Gliding
@@ -92,9 +92,10 @@ class Physics:
         }
         self.things = Things(model, self._data, world)
         calm = not (self.ground.uneven or any(floor.things for floor in world.floors))
+        self.walls = Walls(world)
         self._gliding: Gliding | None = None
         if calm and self.hulls:
-            self._gliding = Gliding(model, self._data, self._hull_rows, Walls(world), car=world.lift is not None)
+            self._gliding = Gliding(model, self._data, self._hull_rows, self.walls, car=world.lift is not None)
         self._meetings = Meetings(model, self._data, self._all_hulls, self.props, self._gliding)
         self._sleep = Sleep(model, self._data)
 
@@ -128,6 +129,7 @@ class Physics:
         """Move robots that nothing can touch without MuJoCo from now on."""
         if self._gliding is not None:
             self._gliding.load_kernels()
+            self.walls.load_kernel()
 
     def drive(self, seconds: float) -> None:
         """Turn the wheels of all robots as commanded, for the next ``seconds``."""
@@ -162,6 +164,12 @@ class Physics:
         touching = set(self._data.contact.geom.ravel().tolist())
         for hull in loose:
             hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
+
+    def spots(self, floor: int) -> list[tuple[float, float]]:
+        """Return the places of all robots on a floor (world, m)."""
+        rows = self._hull_rows
+        places: list[tuple[float, float]] = rows[rows[:, HULL_FLOOR] == floor, HULL_X : HULL_Y + 1].tolist()
+        return places
 
     def move_person(self, body: str, pose: Pose, floor: int) -> None:
         """Place a person at ``pose`` (world)."""

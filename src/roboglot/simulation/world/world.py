@@ -25,13 +25,12 @@ from roboglot.model.robot import Description, Robot
 from roboglot.model.sound import claps
 from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.files import load_body
-from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting
 from roboglot.simulation.bodies.rounds import Rounds
 from roboglot.simulation.building.building import Building
 from roboglot.simulation.detectors.glance import Surroundings
 from roboglot.simulation.faults.faults import Faults
-from roboglot.simulation.people.people import Walker, keyed
+from roboglot.simulation.people.people import Spots, Walker, keyed
 from roboglot.simulation.people.routine import Clap, Say
 from roboglot.simulation.radio.gadgets import Gadgets
 from roboglot.simulation.radio.radio import Radio
@@ -270,12 +269,13 @@ class World:
     def _walk(self) -> None:
         if not self._walkers:
             return
-        robots: dict[int, list[Hull]] = {}
-        for hull in self._physics.hulls.values():
-            robots.setdefault(hull.floor, []).append(hull)
+        robots: dict[int, Spots] = {}  # by floor
         free = self._environment.surroundings.lines.leads
         for walker in self._walkers:
-            if walker.walk(TICK, robots.get(walker.floor, ()), free):
+            floor = walker.floor
+            if (there := robots.get(floor)) is None:
+                there = robots[floor] = self._physics.spots(floor)
+            if walker.walk(TICK, there, free):
                 self._physics.move_person(walker.body, walker.pose, walker.floor)
             if walker.aloud:
                 for step in walker.fetch():

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from itertools import chain
 
+import numpy as np
 from msgspec import Struct
 
+from roboglot.kernels.layouts import (
+    CONTACT_ANGLE,
+    CONTACT_DISTANCE,
+    CONTACT_MADE,
+    CONTACT_WIDTH,
+    DOCK_WIDTH,
+    HULL_WIDTH,
+    TOGETHER,
+    USE,
+)
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.events import DockContactChanged, EventStream
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
+from roboglot.simulation.bodies.rows import Kernels, Rows, Sense
 
-NEAR = 1.0  # m along an axis within which docks are checked in every tick
-SELDOM = 0.5  # s between two checks far from docks: a dock may be moved
-FASTEST = 5.0  # m/s at which a robot may approach a dock at most
+TABLE = "dock contact"
 
 
 class DockContactSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -31,47 +44,56 @@ class SimulatedDockContact(DockContact):
     def __init__(
         self, section: DockContactSection, hull: Hull, docks: Sequence[Sequence[Pose]], events: EventStream
     ) -> None:
-        self._section, self._hull, self._docks, self._events = section, hull, docks, events
-        self._far = 0.0  # stamp until which docks are out of reach
-        self._felt: tuple[object, ...] = ()  # the last checked place of the robot and of the docks
-        self._docked, _ = self._touches()
+        self._section, self._hull, self._events, self.docks = section, hull, events, docks
+        self._row = hull.seat.row(TABLE, CONTACT_WIDTH)
+        self._row[USE] = TOGETHER
+        self._row[CONTACT_DISTANCE], self._row[CONTACT_ANGLE] = section.distance, section.angle
+        self._row[CONTACT_MADE] = float(self._touches())
+
+    @property
+    def index(self) -> int:
+        """Its row."""
+        return self._hull.seat.index
 
     @property
     def docked(self) -> bool:
-        return self._docked
+        return self._row[CONTACT_MADE] != 0.0
 
     def sense(self, stamp: float, _seconds: float) -> None:
-        """Check for a dock; seldom while none is near."""
-        if stamp < self._far:
-            return
-        hull = self._hull
-        here = hull.x, hull.y, hull.turned, hull.floor, *self._docks[hull.floor]
-        if here == self._felt:  # neither has moved
-            return
-        self._felt = here
-        touches, away = self._touches()
-        self._far = stamp + away / FASTEST
-        if touches != self._docked:
-            self._docked = touches
+        """Check for a dock, and publish changes."""
+        touches = self._touches()
+        if touches != self.docked:
+            self._row[CONTACT_MADE] = float(touches)
             self._events.publish(DockContactChanged(stamp=stamp, docked=touches))
 
-    def displaced(self) -> None:
-        """Check again: the robot was lifted and put elsewhere."""
-        self._far = 0.0
-
-    def _touches(self) -> tuple[bool, float]:
-        """Return whether the robot touches a dock, and the least distance to any dock's reach, m."""
-        hull, away = self._hull, SELDOM * FASTEST
-        x, y, radius, near = hull.x, hull.y, hull.body.hull.radius, self._section.distance
-        for dock in self._docks[hull.floor]:
-            off = max(abs(x - dock.x), abs(y - dock.y)) - NEAR
-            away = min(away, max(0.0, off))
-            if off > 0.0:
-                continue
+    def _touches(self) -> bool:
+        """Return whether the robot touches a dock."""
+        hull, section = self._hull, self._section
+        radius, near = hull.body.hull.radius, section.distance
+        for dock in self.docks[hull.floor]:
             seen = hull.pose.relative_to(dock)
-            if abs(seen.x - radius) <= near and abs(seen.y) <= near and abs(seen.yaw) <= self._section.angle:
-                return True, 0.0
-        return False, away
+            if abs(seen.x - radius) <= near and abs(seen.y) <= near and abs(seen.yaw) <= section.angle:
+                return True
+        return False
+
+
+def _together(rows: Rows, parts: Sequence[tuple[SimulatedDockContact, Sense]]) -> Sense:
+    """Return a function that checks for all robots in one call of the kernel, which leaves those that change."""
+    tables = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, CONTACT_WIDTH)
+    docks = parts[0][0].docks if parts else ()
+    known: list[Pose] = []
+    table = np.zeros((0, DOCK_WIDTH))
+
+    def touch(kernels: Kernels, _stamp: float, _seconds: float) -> int:
+        nonlocal known, table
+        if (there := [*chain.from_iterable(docks)]) != known:  # one was moved
+            known = there
+            floors = ((number, dock) for number, those in enumerate(docks) for dock in those)
+            fronts = [(dock.x, dock.y, math.cos(dock.yaw), math.sin(dock.yaw), dock.yaw, at) for at, dock in floors]
+            table = np.array(fronts).reshape(-1, DOCK_WIDTH)
+        return kernels.touch(*tables, table, rows.others)
+
+    return rows.sense({contact.index: sense for contact, sense in parts}, touch)
 
 
 def _fit(fit: Fitting) -> SimulatedDockContact:
@@ -84,5 +106,5 @@ PART = Part(
     section=DockContactSection,
     fit=_fit,
     sense=SimulatedDockContact.sense,
-    displaced=SimulatedDockContact.displaced,
+    together=_together,
 )

@@ -84,6 +84,7 @@ class SimulatedNetwork(Network):
         self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = None  # place, dBm of all networks
         self._joining = False
         self._published: NetworkState | None = None
+        self._known: tuple[object, ...] = ()
         self._next = -math.inf
         self.jammed = False  # whether it receives no signal at all
         self.sense(0.0, 0.0)
@@ -205,19 +206,22 @@ class SimulatedNetwork(Network):
         self.strongest = FLOOR_OF_NOISE if self.jammed else max(self._heard.values(), default=SILENCE) + noise
         listening = not self.jammed and not self._joining and self._mode is NetworkMode.STATION
         self._signal, self._ssid = self._best(noise) if listening else (FLOOR_OF_NOISE, "")
-        if (state := self.state) != self._published:
-            if self._published is not None:
-                self._robot.events.publish(NetworkChanged(stamp=stamp, state=state))
-            self._published = state
+        known = self._ssid, self._radio.mobile, self._document
+        if known != self._known:  # what the state is made of
+            self._known = known[0], known[1], dict(known[2])
+            if (state := self.state) != self._published:
+                if self._published is not None:
+                    self._robot.events.publish(NetworkChanged(stamp=stamp, state=state))
+                self._published = state
 
     def _best(self, noise: float) -> tuple[float, str]:
         """Return signal (dBm) and name of the present network, else of the first known one that is strong enough."""
-        strongest = FLOOR_OF_NOISE
-        for ssid in sorted(self._passwords, key=lambda ssid: ssid != self._ssid):
+        strongest, passwords, heard = FLOOR_OF_NOISE, self._passwords, self._heard
+        for ssid in sorted(passwords, key=lambda ssid: ssid != self._ssid):
             point = self._radio.network(ssid)
-            if point is None or (point.password and point.password != self._passwords[ssid]):
+            if point is None or (point.password and point.password != passwords[ssid]):
                 continue
-            signal = self._heard[ssid] + noise
+            signal = heard[ssid] + noise
             if signal >= self.signal_min:
                 return signal, ssid
             strongest = max(strongest, signal)
@@ -245,9 +249,13 @@ class SimulatedNetwork(Network):
         """Return the passwords by name, the preferred one first."""
         return dict(self._kept("known", list(self._section.known.items())))
 
+    @property
+    def _document(self) -> dict[str, object]:
+        """Return the settings of the network that differ from the section's."""
+        return self._robot[Settings].get(KEY, {}) if Settings in self._robot else self._unsaved
+
     def _kept(self, name: str, default: Any) -> Any:
-        document = self._robot[Settings].get(KEY, {}) if Settings in self._robot else self._unsaved
-        return document.get(name, default)
+        return self._document.get(name, default)
 
     async def _keep(self, **changes: object) -> None:
         if Settings in self._robot:
