@@ -64,7 +64,7 @@ async def looks(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         (Line(probes=4, silent=60_000), True),
     ],
 )
-async def test_dead_peers_are_no_peers_that_do_not_read(line: Line, dead: bool, looks: list[Any]) -> None:
+async def test_only_dead_peers_are_disconnected(line: Line, dead: bool, looks: list[Any]) -> None:
     probe_for_life(cast(asyncio.Transport, line))
     [(after, look, values)] = looks
     assert after == LOOK_PERIOD
