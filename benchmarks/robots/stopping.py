@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import json
 import os
 import statistics
 import tempfile
@@ -59,7 +60,8 @@ async def measure(socket: Path, robots: int, times: int) -> tuple[list[float], l
             assert await reader.readuntil(b";") == b"ok;"
         await asyncio.sleep(PAUSE)
         seconds, answer = await timed(socket, b'{"do": "look"}')
-        assert answer.count(b"drive") >= robots, "not all drive"
+        idle = [row["robot"] for row in json.loads(answer)["robots"] if not row["holder"]]
+        assert not idle, f"these do not drive: {idle}"
         looks.append(seconds)
         seconds, answer = await timed(socket, b'{"do": "stop", "all": true}')
         assert b'"error":""' in answer, answer[-200:]
