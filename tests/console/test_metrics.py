@@ -93,7 +93,7 @@ async def test_board_and_the_page_name_what_there_is(shown: Shown) -> None:
     }
     board = json.loads((ROOT / "deploy/grafana.json").read_text())
     asked = " ".join(target["expr"] for panel in board["panels"] for target in panel["targets"])
-    for text in (asked, (ROOT / "docs/metrics.md").read_text()):
+    for text in (asked, (ROOT / "docs/operation/metrics.md").read_text()):
         for name in re.findall(r"\broboglot_[a-z_]+", text):
             assert name.removesuffix("_total").removesuffix("_bucket") in reported, name
 

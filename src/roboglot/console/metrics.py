@@ -1,4 +1,4 @@
-"""``/metrics``: figures of robots and their doors, in Prometheus's text format (docs/metrics.md lists every name).
+"""``/metrics``: figures of robots and their doors, in Prometheus's text format (docs/operation/metrics.md lists every name).
 
 Requests are counted from the first scrape on; before, the tap costs nothing. Labels come from robots, doors and
 contracts, never from clients' data.
