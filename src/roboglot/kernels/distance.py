@@ -1,4 +1,4 @@
-"""Exact Euclidean distance transform, cut off at a cap.
+"""Distances in a grid: the exact Euclidean transform, cut off at a cap; and straight on, for gaps between obstacles.
 
 Near ones are compared one by one in wide instructions, far ones by parabolas (Felzenszwalb and Huttenlocher 2012): the
 same to the last bit, since squares of whole cells are exact.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import ByteArray, SingleArray
+from roboglot.kernels.arrays import ByteArray, Int16Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
 
 NEAR_MAX = 24  # cells of a cap up to which comparing one by one is quicker
@@ -111,3 +111,51 @@ def distances(marked: ByteArray, cap: float) -> SingleArray:
         for col in range(width):
             away[row, col] = np.sqrt(column[col])
     return away
+
+
+@kernel("void(uint8[:,::1], int64, int64, int64, int16[:,::1])")
+def free_cells(occupied: ByteArray, down: int, along: int, far: int, found: Int16Array) -> None:
+    """Fill in how many cells, ``far`` at most, lie between each cell and the next occupied one that way.
+
+    Nothing is occupied outside of the grid.
+    """
+    height, width = occupied.shape
+    for i in range(height):
+        row = height - 1 - i if down > 0 else i
+        for j in range(width):
+            col = width - 1 - j if along > 0 else j
+            r, c = row + down, col + along
+            if not (0 <= r < height and 0 <= c < width):
+                found[row, col] = far
+            elif occupied[r, c] != 0:
+                found[row, col] = 0
+            else:
+                found[row, col] = min(far, found[r, c] + 1)
+
+
+@kernel("uint8[:,::1](uint8[:,::1], int64[:,::1], float64, float64)")
+def gaps(occupied: ByteArray, axes: IntArray, wide: float, deep: float) -> ByteArray:
+    """Return 1 for cells between two obstacles less than ``wide`` apart, with ``deep`` cells free before and behind.
+
+    Measured along ``axes`` (n, 2: cells down and along), and across each of them.
+    """
+    height, width = occupied.shape
+    found = np.zeros((height, width), np.uint8)
+    one, other = np.empty((height, width), np.int16), np.empty((height, width), np.int16)
+    left, right = np.empty((height, width), np.int16), np.empty((height, width), np.int16)
+    for k in range(len(axes)):
+        down, along = axes[k, 0], axes[k, 1]
+        step = np.sqrt(np.float64(down * down + along * along))
+        far = int(np.ceil(wide / step))
+        free_cells(occupied, down, along, far, one)
+        free_cells(occupied, -down, -along, far, other)
+        free_cells(occupied, along, -down, far, left)
+        free_cells(occupied, -along, down, far, right)
+        for row in range(height):
+            for col in range(width):
+                ahead, behind, aside, beside = one[row, col], other[row, col], left[row, col], right[row, col]
+                if (ahead + behind + 1) * step < wide and min(aside, beside) * step >= deep:
+                    found[row, col] = 1
+                if (aside + beside + 1) * step < wide and min(ahead, behind) * step >= deep:
+                    found[row, col] = 1
+    return found

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
-from roboglot.kernels.distance import distances
+from roboglot.kernels.distance import distances, gaps
 from roboglot.model.geometry import Point
 
 HALF = 0.62  # m: half the width that two hulls of 0.27 m need side by side, with 5 cm around each
@@ -18,9 +18,10 @@ KEPT, MOVED = 5.0, 2.0  # s, m after which the map is examined again
 TILE = 64  # cells along a side of the pieces in which that is done, when asked
 THROUGH = 0.7  # m that are free on both sides of a door, across its gap
 HULL = 0.35  # m from a door within which a robot's hull is in it
-AXES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, -1), (2, 1), (1, -2))  # directions, in cells, to measure gaps in
+AXES = np.array(((0, 1), (1, 1), (1, 2), (2, 1)), np.int64)  # directions, in cells, to measure gaps in and across
 THICK = 2  # cells by which walls are thickened for that: a thin slanting one does not lie along an axis
 AROUND = 2 * math.ceil(HALF / RESOLUTION) + math.ceil(HULL / RESOLUTION) + 4  # cells around a piece that count there
+UNSEEN, OPEN, NARROW = 0, 1, 2  # of a cell
 
 
 def narrow(evidence: NDArray[np.int16]) -> NDArray[np.bool_]:
@@ -40,31 +41,8 @@ def _gaps(thick: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
     Discs from both sides cover a door in a thin wall, so they do not find it. ``thick``: cells within THICK of one.
     """
-    found, narrow_cells = np.zeros(thick.shape, bool), 2.0 * (HALF / RESOLUTION - THICK)
-    steps = {axis: math.hypot(*axis) for axis in AXES}
-    rays = {
-        way: _free_cells(thick, way, math.ceil(narrow_cells / steps[axis]))
-        for axis in AXES
-        for way in (axis, (-axis[0], -axis[1]))
-    }
-    for (down, along), step in steps.items():
-        across = (rays[down, along] + rays[-down, -along] + 1) * step < narrow_cells
-        ahead, behind = (rays[way] for way in ((along, -down), (-along, down)))
-        found |= across & (np.minimum(ahead, behind) * step >= THROUGH / RESOLUTION - THICK)
-    return found
-
-
-def _free_cells(occupied: NDArray[np.bool_], way: tuple[int, int], far: int) -> NDArray[np.int16]:
-    """Return the number of cells, ``far`` at most, between each cell and the next occupied one that way."""
-    height, width = occupied.shape
-    reach = far * max(map(abs, way))
-    around = np.pad(occupied, reach)
-    found, free = np.zeros(occupied.shape, np.int16), np.ones(occupied.shape, bool)
-    for k in range(1, far + 1):
-        top, left = reach + k * way[0], reach + k * way[1]
-        free &= ~around[top : top + height, left : left + width]
-        found += free
-    return found
+    wide, deep = 2.0 * (HALF / RESOLUTION - THICK), THROUGH / RESOLUTION - THICK
+    return gaps(thick.astype(np.uint8), AXES, wide, deep) > 0
 
 
 class NarrowPlaces:
@@ -73,8 +51,9 @@ class NarrowPlaces:
     def __init__(self) -> None:
         self._looked_at, self._around, self._grid = -math.inf, Point(), EvidenceGrid()
         self._first, self._evidence = (0, 0), np.zeros((0, 0), np.int16)
-        self._now: dict[tuple[int, int], NDArray[np.bool_]] = {}  # narrow cells of the pieces examined since
-        self._before: dict[tuple[int, int], tuple[NDArray[np.int8], NDArray[np.bool_]]] = {}  # … of what they showed
+        self._found = np.zeros((0, 0), np.uint8)  # by cell of whole pieces: UNSEEN, OPEN or NARROW
+        self._corner = (0, 0)  # row and column of its first cell, counted from the map's origin
+        self._before: dict[tuple[int, int], tuple[NDArray[np.int8], NDArray[np.uint8]]] = {}  # … of what they showed
 
     def at(self, grid: EvidenceGrid, points: NDArray[np.float64], now: float) -> NDArray[np.bool_]:
         """Return which of ``points`` (n, 2; map; the first is the robot's) lie in a narrow place.
@@ -85,29 +64,42 @@ class NarrowPlaces:
         if grid is not self._grid or now - self._looked_at > KEPT or here.distance_to(self._around) > MOVED:
             self._look(grid, here)
             self._looked_at, self._around, self._grid = now, here, grid
-        (first_row, first_column), (height, width) = self._first, self._evidence.shape
-        columns, rows = np.floor(points / RESOLUTION).astype(np.intp).T
-        within = (rows >= first_row) & (rows < first_row + height)
-        within &= (columns >= first_column) & (columns < first_column + width)
-        found, down, along = np.zeros(len(points), bool), rows // TILE, columns // TILE
-        for piece in set(zip(down[within].tolist(), along[within].tolist(), strict=True)):
-            if piece not in self._now:
-                self._now[piece] = self._examined(piece)
-            here_in = within & (down == piece[0]) & (along == piece[1])
-            found[here_in] = self._now[piece][rows[here_in] % TILE, columns[here_in] % TILE]
-        return found
+        cells = np.floor(points / RESOLUTION).astype(np.intp)
+        height, width = self._found.shape
+        if not height or not width:
+            return np.zeros(len(points), bool)
+        rows, columns = cells[:, 1] - self._corner[0], cells[:, 0] - self._corner[1]
+        within = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+        rows *= within
+        columns *= within
+        found = self._found[rows, columns]
+        if not (found | ~within).all():
+            self._examine(rows[within], columns[within])
+            found = self._found[rows, columns]
+        return (found == NARROW) & within
 
     def _look(self, grid: EvidenceGrid, here: Point) -> None:
         """Copy the map around ``here``."""
         rows, columns = GridFrame(grid.corner, grid.evidence.shape).around((here,), REACH)
         self._evidence = grid.evidence[rows, columns].copy()
-        self._first = (grid.first_row + rows.start, grid.first_column + columns.start)
-        self._now = {}
+        self._first = first = grid.first_row + rows.start, grid.first_column + columns.start
+        ends = first[0] + self._evidence.shape[0], first[1] + self._evidence.shape[1]
+        self._corner = first[0] // TILE * TILE, first[1] // TILE * TILE
+        height, width = (-(-end // TILE) * TILE - at for end, at in zip(ends, self._corner, strict=True))
+        self._found = np.full((height, width), UNSEEN, np.uint8)
         if grid is not self._grid:
             self._before = {}
 
-    def _examined(self, piece: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return the narrow cells of one piece (TILE, TILE), with the cells around it that matter.
+    def _examine(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> None:
+        """Fill in the pieces in which these cells lie."""
+        for down, along in set(zip((rows // TILE).tolist(), (columns // TILE).tolist(), strict=True)):
+            top, left = down * TILE, along * TILE
+            if self._found[top, left] == UNSEEN:
+                piece = (self._corner[0] + top) // TILE, (self._corner[1] + left) // TILE
+                self._found[top : top + TILE, left : left + TILE] = self._examined(piece)
+
+    def _examined(self, piece: tuple[int, int]) -> NDArray[np.uint8]:
+        """Return OPEN or NARROW for each cell of one piece (TILE, TILE), with the cells around it that matter.
 
         It is only examined anew if it shows something else than the last time.
         """
@@ -117,10 +109,10 @@ class NarrowPlaces:
         before = self._before.get(piece)
         if before is not None and np.array_equal(before[0], shown):
             return before[1]
-        found, whole = np.zeros((TILE, TILE), bool), narrow(shown.astype(np.int16))
+        found, whole = np.full((TILE, TILE), OPEN, np.uint8), narrow(shown.astype(np.int16))
         first_row, first_column = top - rows.start, left - columns.start  # of the piece in what is shown
         inner = whole[max(0, first_row) : first_row + TILE, max(0, first_column) : first_column + TILE]
         down, along = max(0, -first_row), max(0, -first_column)
-        found[down : down + inner.shape[0], along : along + inner.shape[1]] = inner
+        found[down : down + inner.shape[0], along : along + inner.shape[1]] += inner
         self._before[piece] = shown, found
         return found
