@@ -108,18 +108,37 @@ def _along(
     return _first(dx * dx + dy * dy + dz * dz, x * dx + y * dy + z * dz, x * x + y * y + z * z - sx * sx)
 
 
-@kernel("int64(int32[::1], float64[:,::1], float64[::1], float64[::1], float64, int64[::1], float64[::1])")
+@kernel("UniTuple(float64, 5)(float64[:,::1])")
+def _cone(directions: FloatArray) -> tuple[float, float, float, float, float]:
+    """Return a cone around all ``directions``: its axis (x, y, z), cosine and sine of half its angle; sine 2: none."""
+    x = y = z = 0.0
+    for k in range(len(directions)):
+        x, y, z = x + directions[k, 0], y + directions[k, 1], z + directions[k, 2]
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < 1e-6:
+        return 0.0, 0.0, 0.0, 0.0, 2.0
+    x, y, z = x / length, y / length, z / length
+    cosine = 1.0
+    for k in range(len(directions)):
+        cosine = min(cosine, x * directions[k, 0] + y * directions[k, 1] + z * directions[k, 2])
+    cosine -= SPARE
+    return x, y, z, cosine, (math.sqrt(1.0 - cosine * cosine) if cosine > 0.0 else 2.0)
+
+
+@kernel("int64(int32[::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1], float64, int64[::1], float64[::1])")
 def _reached(
     kinds: NDArray[np.int32],
     places: FloatArray,
     bounds: FloatArray,
     origin: FloatArray,
+    directions: FloatArray,
     reach: float,
     chosen: NDArray[np.int64],
     nearest: FloatArray,
 ) -> int:
     """Return how many solids may be met: ``chosen`` gets their rows, ``nearest`` their least distances (m), sorted."""
     count = 0
+    axis_x, axis_y, axis_z, cosine, sine = _cone(directions)
     for i in range(len(kinds)):
         if kinds[i] not in (SPHERE, CAPSULE, CYLINDER, BOX):
             continue
@@ -127,7 +146,13 @@ def _reached(
         square, bound = x * x + y * y + z * z, reach + bounds[i]
         if square > bound * bound:
             continue
-        away, place = math.sqrt(square) - bounds[i], count
+        away = math.sqrt(square)
+        if away > bounds[i] and sine < 1.0:
+            along = -(x * axis_x + y * axis_y + z * axis_z)
+            aside = math.sqrt(max(0.0, square - along * along))
+            if aside * cosine - along * sine > bounds[i] * (1.0 + SPARE) + SPARE:
+                continue  # the sphere around it lies outside of the cone
+        away, place = away - bounds[i], count
         while place > 0 and nearest[place - 1] > away:  # few are in range
             chosen[place], nearest[place] = chosen[place - 1], nearest[place - 1]
             place -= 1
@@ -153,7 +178,7 @@ def _cast_from(
 ) -> None:
     """Fill ``found``: see ``cast``, of one origin."""
     chosen, nearest = np.empty(len(kinds), np.int64), np.empty(len(kinds))
-    count = _reached(kinds, places, bounds, origin, reach, chosen, nearest)
+    count = _reached(kinds, places, bounds, origin, directions, reach, chosen, nearest)
     local, ahead = np.empty((count, 3)), np.empty((count, 4))  # the origin, relative to each solid; bounding sphere
     for place in range(count):
         i = chosen[place]

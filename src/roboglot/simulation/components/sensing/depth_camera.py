@@ -19,6 +19,7 @@ from roboglot.simulation.bodies.quantities import NotNegative, Positive
 if TYPE_CHECKING:
     from roboglot.simulation.world.rays import Rays
 
+SIGMAS = 10.0  # of noise at the range's end: what lies farther off is never seen
 Floats = NDArray[np.float64]
 
 
@@ -51,6 +52,8 @@ class SimulatedDepthCamera(DepthCamera):
         self._image: DepthImage | None = None
         self._optical = _bundle(section)
         c, s = math.cos(section.pitch), math.sin(section.pitch)
+        sigma = section.noise * section.range_max**2
+        self._reach = (section.range_max + SIGMAS * sigma) / float(self._optical[:, 0].min())  # m along a ray
         self._directions = self._optical @ np.array(((c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c)))  # base_link
 
     @property
@@ -74,7 +77,7 @@ class SimulatedDepthCamera(DepthCamera):
         turn = rotation(hull.tilt, hull.turned)
         place = turn @ (section.forward, 0.0, section.above_ground)
         origin = place + np.array(((hull.x, hull.y, hull.elevation),))
-        ways = self._rays.cast(origin, self._directions @ turn.T, section.range_max * 2.0, hull)
+        ways = self._rays.cast(origin, self._directions @ turn.T, self._reach, hull)
         depths = ways * self._optical[:, 0]
         depths += self._random.standard_normal(len(depths)) * section.noise * np.where(ways < np.inf, depths, 0.0) ** 2
         seen = (depths >= section.range_min) & (depths <= section.range_max)

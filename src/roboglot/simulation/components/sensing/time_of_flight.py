@@ -19,6 +19,7 @@ from roboglot.simulation.bodies.quantities import Angle, NotNegative, Offset, Po
 from roboglot.simulation.world.rays import Rays
 
 ZONES = 8
+SIGMAS = 10.0  # of noise: what lies farther off is never seen
 Floats = NDArray[np.float64]
 
 
@@ -91,7 +92,8 @@ class SimulatedTimeOfFlight(TimeOfFlight):
             self._held = self._hold(posture)
         held = self._held
         ahead, origins = held.ahead, held.eyes @ turn + np.array((hull.x, hull.y, hull.elevation))
-        distances = self._rays.cast(origins, ahead @ turn, section.range_max * 1.5, hull)
+        reach = section.range_max + SIGMAS * section.noise
+        distances = self._rays.cast(origins, ahead @ turn, reach, hull)
         distances += self._random.standard_normal(len(distances)) * section.noise
         distances[distances > section.range_max] = np.inf
         distances[distances < section.range_min] = -np.inf
