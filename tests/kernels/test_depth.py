@@ -53,9 +53,14 @@ def test_only_what_nothing_explains_is_remembered(seed: int, yaw: float) -> None
         if alone and np.hypot(*(echoes - (x, y)).T).min() > 0.1:
             expected[row, column] = 7.0
             new.append((x, y))
-    found = remember_low(evidence, seen, floor, obstacles, echoes, pose, corner, 7.0, 0.1, 0.05)
+    noted, many = np.empty((2000, 2), np.int32), seen.size
+    noted[:many] = np.argwhere(seen)
+    listed, found = remember_low(
+        evidence, seen, floor, obstacles, echoes, pose, corner, 7.0, 0.1, 0.05, noted, many
+    )
     assert found == pytest.approx(np.array(new).reshape(-1, 2))
     assert (seen == expected).all()
+    assert sorted(noted[:listed].tolist()) == np.argwhere(expected).tolist()
 
 
 def test_sensors_are_sorted_one_after_the_other() -> None:
@@ -68,11 +73,23 @@ def test_sensors_are_sorted_one_after_the_other() -> None:
         assert (found == np.concatenate([one[part] for one in each])).all()
 
 
-def test_recent_cells_are_found_row_by_row() -> None:
-    random = np.random.default_rng(6)
+def test_recent_cells_are_found_with_and_without_a_list() -> None:
+    random, window = np.random.default_rng(6), np.array((5, 25, 10, 40))
     seen = np.where(random.random((30, 40)) < 0.1, random.uniform(0.0, 9.0, (30, 40)), 0.0).astype(np.float32)
     row, column = np.nonzero(seen[5:25, 10:40] >= 4.0)
     expected = np.stack((-1.0 + (column + 10 + 0.5) * 0.05, 2.0 + (row + 5 + 0.5) * 0.05), axis=1)
+    noted = np.ascontiguousarray(np.argwhere(seen), np.int32)
     assert len(row)
-    assert (seen_since(seen, 5, 25, 10, 40, 4.0, -1.0, 2.0, 0.05) == expected).all()
-    assert seen_since(seen, 5, 25, 10, 40, 9.5, -1.0, 2.0, 0.05).shape == (0, 2)
+    for listed in (len(noted), -1):
+        assert (seen_since(seen, noted, listed, window, 4.0, -1.0, 2.0, 0.05) == expected).all()
+        assert seen_since(seen, noted, listed, window, 9.5, -1.0, 2.0, 0.05).shape == (0, 2)
+
+
+def test_a_list_that_overflows_is_given_up() -> None:
+    evidence, seen = np.zeros((40, 40), np.int16), np.zeros((40, 40), np.float32)
+    obstacles, none = np.stack((np.linspace(0.1, 1.8, 30), np.full(30, 1.0)), axis=1), np.empty((0, 2))
+    where = np.zeros(3), np.zeros(2), 7.0, 0.1, 0.05
+    for room in (5, 50):
+        listed, _ = remember_low(evidence, seen, none, obstacles, none, *where, np.empty((room, 2), np.int32), 0)
+        assert listed == (np.count_nonzero(seen) if room == 50 else -1)
+        seen[:] = 0.0

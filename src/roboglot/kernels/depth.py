@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import FloatArray, Int16Array, SingleArray
+from roboglot.kernels.arrays import FloatArray, Int16Array, Int32Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.obstacles import beside_occupied
 
@@ -66,9 +66,20 @@ def sort_out_all(
     return obstacles[:standing].copy(), floor[:lying].copy()
 
 
+@kernel("int64(float32[:,::1], int32[:,::1], int64)")
+def _still_noted(seen: SingleArray, noted: Int32Array, count: int) -> int:
+    """Leave those of the first ``count`` rows of ``noted`` whose cells are not 0; returns how many."""
+    left = 0
+    for k in range(count):
+        if seen[noted[k, 0], noted[k, 1]] > 0.0:
+            noted[left, 0], noted[left, 1] = noted[k, 0], noted[k, 1]
+            left += 1
+    return left
+
+
 @kernel(
-    "float64[:,::1](int16[:,::1], float32[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
-    " float64[::1], float64, float64, float64)",
+    "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float64[:,::1], float64[:,::1], float64[:,::1],"
+    " float64[::1], float64[::1], float64, float64, float64, int32[:,::1], int64)",
 )
 def remember_low(
     evidence: Int16Array,
@@ -81,12 +92,15 @@ def remember_low(
     now: float,
     explained: float,
     resolution: float,
-) -> FloatArray:
+    noted: Int32Array,
+    listed: int,
+) -> tuple[int, FloatArray]:
     """Note the time ``now`` (> 0) in cells with ``obstacles`` that neither map nor ``echoes`` explain, 0 in ``floor``.
 
-    Returns those obstacles in map (n, 2). ``floor`` and ``obstacles`` (n, 2) are in base_link at ``pose`` (x, y, yaw),
-    ``echoes`` (n, 2) and ``corner`` (of the grid) in map. Beside an occupied cell, within ``explained`` m of an echo
-    and off the grid nothing is new.
+    ``floor`` and ``obstacles`` (n, 2) are in base_link at ``pose`` (x, y, yaw), ``echoes`` (n, 2) and ``corner`` (of
+    the grid) in map. Beside an occupied cell, within ``explained`` m of an echo and off the grid nothing is new. The
+    first ``listed`` rows of ``noted`` are the cells (row, column) that are not 0. Returns how many there are now, or -1
+    when they are more than ``noted`` holds; and the new obstacles in map (n, 2).
     """
     (height, width), count = seen.shape, 0
     cos, sin, near = np.cos(pose[2]), np.sin(pose[2]), explained * explained
@@ -97,6 +111,8 @@ def remember_low(
         row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
         if 0 <= row < height and 0 <= col < width:
             seen[row, col] = 0.0
+    if listed > 0:
+        listed = _still_noted(seen, noted, listed)
     for i in range(len(obstacles)):
         x = cos * obstacles[i, 0] - sin * obstacles[i, 1] + pose[0]
         y = sin * obstacles[i, 0] + cos * obstacles[i, 1] + pose[1]
@@ -108,29 +124,44 @@ def remember_low(
             if (x - echoes[k, 0]) ** 2 + (y - echoes[k, 1]) ** 2 <= near:
                 is_new = False
                 break
-        if is_new:
-            found[count, 0], found[count, 1] = x, y
-            seen[row, col] = now
-            count += 1
-    return found[:count].copy()
+        if not is_new:
+            continue
+        found[count, 0], found[count, 1] = x, y
+        count += 1
+        if seen[row, col] == 0.0 and listed >= 0:
+            if listed < len(noted):
+                noted[listed, 0], noted[listed, 1] = row, col
+                listed += 1
+            else:
+                listed = -1
+        seen[row, col] = now
+    return listed, found[:count].copy()
 
 
-@kernel("float64[:,::1](float32[:,::1], int64, int64, int64, int64, float32, float64, float64, float64)")
+@kernel(
+    "float64[:,::1](float32[:,::1], int32[:,::1], int64, int64[::1], float32, float64, float64, float64)",
+)
 def seen_since(
-    seen: SingleArray, row0: int, row1: int, col0: int, col1: int, since: float, x: float, y: float, resolution: float
+    seen: SingleArray, noted: Int32Array, listed: int, window: IntArray, since: float, x: float, y: float, side: float
 ) -> FloatArray:
-    """Return the centres (n, 2; m) of cells in these rows and columns that were ``seen`` at ``since`` or later.
+    """Return the centres (n, 2; m) of cells in a window of rows and columns that were ``seen`` at ``since`` or later.
 
-    Row by row; (x, y) is the grid's corner.
+    ``window``: first row, end of rows, first column, end. ``noted`` and ``listed`` as for ``remember_low``; (x, y) is
+    the corner of the grid, ``side`` that of a cell.
     """
-    count = 0
-    for row in range(row0, row1):
-        for col in range(col0, col1):
+    count, few = 0, max(listed, 0)
+    for row in range(window[0], window[1] if listed < 0 else window[0]):
+        for col in range(window[2], window[3]):
             count += seen[row, col] >= since
-    found, at = np.empty((count, 2)), 0
-    for row in range(row0, row1 if count else row0):
-        for col in range(col0, col1):
+    found, at = np.empty((count + few, 2)), 0
+    for k in range(few):
+        row, col = noted[k, 0], noted[k, 1]
+        if window[0] <= row < window[1] and window[2] <= col < window[3] and seen[row, col] >= since:
+            found[at, 0], found[at, 1] = x + (col + 0.5) * side, y + (row + 0.5) * side
+            at += 1
+    for row in range(window[0], window[1] if count else window[0]):
+        for col in range(window[2], window[3]):
             if seen[row, col] >= since:
-                found[at, 0], found[at, 1] = x + (col + 0.5) * resolution, y + (row + 0.5) * resolution
+                found[at, 0], found[at, 1] = x + (col + 0.5) * side, y + (row + 0.5) * side
                 at += 1
-    return found
+    return found[:at].copy()

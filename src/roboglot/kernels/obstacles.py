@@ -9,7 +9,9 @@ from roboglot.kernels.compiled import kernel
 from roboglot.kernels.distance import distances
 
 CELL_SQUARE = 0.5001  # squared distance from a cell's centre to its corner, in cells, with a margin
-FEW = 200  # cells up to which testing them against each ray is cheaper than tracing it
+CELL_HALF = 0.7072  # its root
+FEW = 800  # cells up to which choosing the rays that come near them is cheaper than tracing all
+SECTORS = 128  # of all directions, by which rays are sorted
 
 
 @kernel("boolean(int16[:,::1], int64, int64)")
@@ -17,7 +19,7 @@ def beside_occupied(evidence: Int16Array, row: int, col: int) -> bool:
     """Return whether the cell or one of its eight neighbours is occupied."""
     for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
         for c in range(max(0, col - 1), min(evidence.shape[1], col + 2)):
-            if evidence[r, c] > 0:
+            if evidence[np.uintp(r), np.uintp(c)] > 0:
                 return True
     return False
 
@@ -37,15 +39,44 @@ def _noted_near(row: float, col: float, reach: float, noted: Int32Array, count: 
     return found
 
 
-@kernel("boolean(float64, float64, float64[:,::1], int64)")
-def _meets(up: float, along: float, near: FloatArray, count: int) -> bool:
-    """Return whether a ray in this direction may pass through one of the cells with their middles ``near``."""
-    square = up * up + along * along
+@kernel("float64(float64, float64)")
+def _bearing(up: float, along: float) -> float:
+    """Return a direction as a number from 0 to 4 that grows with the angle, by 1 for each rad at most."""
+    share = up / max(abs(up) + abs(along), 1e-12)
+    if along < 0.0:
+        return 2.0 - share
+    return share if share >= 0.0 else 4.0 + share
+
+
+@kernel("uint8[::1](float64[:,::1], float64, float64, float64[:,::1], int64)")
+def _aimed(ends: FloatArray, x: float, y: float, near: FloatArray, count: int) -> ByteArray:
+    """Return 1 for each ray from (x, y) that may pass through one of the ``count`` cells with their middles ``near``.
+
+    Rays are sorted by their direction, and only those in the direction of a cell are compared with it.
+    """
+    rays, aimed = len(ends), np.zeros(len(ends), np.uint8)
+    first, after = np.empty(SECTORS, np.int64), np.empty(rays, np.int64)
+    for sector in range(SECTORS):
+        first[sector] = -1
+    for i in range(rays):
+        sector = int(_bearing(ends[i, 1] - y, ends[i, 0] - x) * (SECTORS / 4.0)) % SECTORS
+        after[i], first[sector] = first[sector], i
     for k in range(count):
-        aside = along * near[k, 0] - up * near[k, 1]
-        if aside * aside <= CELL_SQUARE * square and up * near[k, 0] + along * near[k, 1] >= -np.sqrt(square):
-            return True
-    return False
+        up, along = near[k, 0], near[k, 1]
+        away, begin, many = np.sqrt(up * up + along * along), 0, SECTORS
+        if away > 1.1:  # the arc sine of up to 0.65 is less than 1.11 times that
+            half, middle = 1.11 * CELL_HALF / away, _bearing(up, along)
+            begin = int(np.floor((middle - half) * (SECTORS / 4.0)))
+            many = min(SECTORS, int(np.floor((middle + half) * (SECTORS / 4.0))) - begin + 1)
+        for sector in range(begin, begin + many):
+            i = first[sector % SECTORS]
+            while i >= 0:
+                ray_up, ray_along = ends[i, 1] - y, ends[i, 0] - x
+                square, aside = ray_up * ray_up + ray_along * ray_along, ray_along * up - ray_up * along
+                if aside * aside <= CELL_SQUARE * square and ray_up * up + ray_along * along >= -np.sqrt(square):
+                    aimed[i] = 1
+                i = after[i]
+    return aimed
 
 
 @kernel(
@@ -126,9 +157,11 @@ def remember(
     _place(rays, hit, pose, reach, ends, hits)
     near, listed = np.empty((max(count, 0), 2)), max(count, 0)
     few = _noted_near(y / resolution, x / resolution, reach / resolution, noted, listed, near)
+    picked = count >= 0 and few < FEW
+    aimed = _aimed(ends, x, y, near, few) if picked and few else np.empty(0, np.uint8)
     for i in range(ends.shape[0] if few or count < 0 else 0):
         dx, dy = ends[i, 0] - x, ends[i, 1] - y
-        if count >= 0 and few < FEW and not _meets(dy, dx, near, few):
+        if picked and aimed[i] == 0:
             continue
         steps = int(np.sqrt(dx * dx + dy * dy) / resolution)  # without the last cell before the end
         step_x, step_y = dx / (steps + 1.0) / resolution, dy / (steps + 1.0) / resolution  # in cells
@@ -189,14 +222,25 @@ def free_way(path: FloatArray, points: FloatArray, x: float, y: float, radius: f
 
     inf: all the way. Points from which it only moves away do not count: a robot close to a wall may leave it.
     """
-    gone = 0.0
+    low_x = low_y = np.inf
+    high_x = high_y = -np.inf
     for i in range(path.shape[0]):
+        low_x, high_x = min(low_x, path[i, 0]), max(high_x, path[i, 0])
+        low_y, high_y = min(low_y, path[i, 1]), max(high_y, path[i, 1])
+    low_x, low_y, high_x, high_y = low_x - radius, low_y - radius, high_x + radius, high_y + radius
+    near, count = np.empty((points.shape[0], 2)), 0
+    for k in range(points.shape[0]):
+        if low_x <= points[k, 0] <= high_x and low_y <= points[k, 1] <= high_y:
+            near[count, 0], near[count, 1] = points[k, 0], points[k, 1]
+            count += 1
+    gone = 0.0
+    for i in range(path.shape[0] if count else 0):
         if i > 0:
             gone += np.sqrt((path[i, 0] - path[i - 1, 0]) ** 2 + (path[i, 1] - path[i - 1, 1]) ** 2)
-        for k in range(points.shape[0]):
-            away = (path[i, 0] - points[k, 0]) ** 2 + (path[i, 1] - points[k, 1]) ** 2
+        for k in range(count):
+            away = (path[i, 0] - near[k, 0]) ** 2 + (path[i, 1] - near[k, 1]) ** 2
             if away < radius * radius:
-                now = np.sqrt((x - points[k, 0]) ** 2 + (y - points[k, 1]) ** 2)
+                now = np.sqrt((x - near[k, 0]) ** 2 + (y - near[k, 1]) ** 2)
                 if np.sqrt(away) < now - 0.01:
                     return gone
     return np.inf

@@ -100,26 +100,27 @@ def _clear_ray(
     per_row = 1.0 / abs(dy) if dy != 0 else np.inf
     next_col = ((col + 1 - cell_x) if dx > 0 else (cell_x - col)) * per_col if dx != 0 else np.inf
     next_row = ((row + 1 - cell_y) if dy > 0 else (cell_y - row)) * per_row if dy != 0 else np.inf
-    gone = 0.0
+    gone, touched, at, down = 0.0, marks.reshape(-1), row * width + col, step_row * width
     while gone < last:
-        if row < 0 or col < 0 or row >= height or col >= width:
+        if not (np.uintp(row) < np.uintp(height) and np.uintp(col) < np.uintp(width)):  # both signs in one comparison
             return
-        if (
-            marks[row, col] != scan
-            and marks[row, col] != FROZEN
-            and not (evidence[row, col] > 0 and (gentle or _is_grazed(evidence, surface, row, col, dx, dy, resolution)))
-        ):
-            marks[row, col] = scan
-            value = max(EVIDENCE_MIN, evidence[row, col] + MISS)
-            evidence[row, col] = value if value != 0 else -1
+        mark = touched[np.uintp(at)]
+        if mark != scan and mark != FROZEN:
+            before = evidence[np.uintp(row), np.uintp(col)]
+            if not (before > 0 and (gentle or _is_grazed(evidence, surface, row, col, dx, dy, resolution))):
+                touched[np.uintp(at)] = scan
+                value = max(EVIDENCE_MIN, before + MISS)
+                evidence[np.uintp(row), np.uintp(col)] = value if value != 0 else -1
         if next_col < next_row:
             gone = next_col
             next_col += per_col
             col += step_col
+            at += step_col
         else:
             gone = next_row
             next_row += per_row
             row += step_row
+            at += down
 
 
 @kernel("void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], int64, float64, float64, float64)")

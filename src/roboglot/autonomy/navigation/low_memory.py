@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.low_sight import NONE, LowView
 from roboglot.autonomy.navigation.rules import GridFrame
-from roboglot.autonomy.navigation.scan_memory import Cells
+from roboglot.autonomy.navigation.scan_memory import Sightings
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.depth import remember_low, seen_since
 from roboglot.model.geometry import Pose
@@ -27,7 +27,7 @@ class LowMemory:
     """Memory of low obstacles on one map at a time."""
 
     def __init__(self) -> None:
-        self._seen = Cells(np.float32)
+        self._sightings = Sightings()
         self._latest = -math.inf  # s: time of the last sighting of all
 
     def observe(self, grid: EvidenceGrid, view: LowView, echoes: Points, pose: Pose, now: float) -> Points:
@@ -35,11 +35,12 @@ class LowMemory:
 
         Obstacles are forgotten where the view shows floor.
         """
-        corner = grid.corner
-        at, first = np.array((pose.x, pose.y, pose.yaw)), np.array((corner.x, corner.y))
-        seen, stamp = self.seen(grid), max(now, 1e-3)
-        found: Points = remember_low(
-            grid.evidence, seen, view.floor, view.obstacles, echoes, at, first, stamp, EXPLAINED, RESOLUTION
+        corner, sightings, stamp = grid.corner, self._sightings, max(now, 1e-3)
+        seen, at = sightings.of(grid), np.array((pose.x, pose.y, pose.yaw))
+        first, noted = np.array((corner.x, corner.y)), (sightings.noted, sightings.count)
+        found: Points
+        sightings.count, found = remember_low(
+            grid.evidence, seen, view.floor, view.obstacles, echoes, at, first, stamp, EXPLAINED, RESOLUTION, *noted
         )
         if len(found):
             self._latest = stamp
@@ -47,7 +48,7 @@ class LowMemory:
 
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
         """Return the time (s) of the last sighting in each of the map's cells; 0: never."""
-        return self._seen.of(grid)
+        return self._sightings.of(grid)
 
     def around(self, grid: EvidenceGrid, pose: Pose, reach: float, since: float) -> Points:
         """Return the middles (map, m; n, 2) of cells within ``reach`` m with an obstacle seen ``since`` then (s).
@@ -56,8 +57,9 @@ class LowMemory:
         """
         if self._latest < since - SPARE:
             return NONE  # most robots see nothing low for most of the time
-        corner = grid.corner
+        corner, seen, sightings = grid.corner, self._sightings.of(grid), self._sightings
         rows, columns = GridFrame(corner, grid.evidence.shape).around((pose.point,), reach)
-        window, least = (rows.start, rows.stop, columns.start, columns.stop), max(since, 1e-3)
-        found: Points = seen_since(self.seen(grid), *window, least, corner.x, corner.y, RESOLUTION)
+        window = np.array((rows.start, rows.stop, columns.start, columns.stop))
+        listed = sightings.noted, sightings.count
+        found: Points = seen_since(seen, *listed, window, max(since, 1e-3), corner.x, corner.y, RESOLUTION)
         return found

@@ -46,19 +46,14 @@ class GridFrame:
 
     def around(self, points: tuple[Point, ...], reach: float) -> tuple[slice, slice]:
         """Return the rows and columns within ``reach`` m of the points' bounding box."""
-        rows, columns = (
-            slice(
-                *(
-                    min(max(int((v - c) // RESOLUTION) + d, 0), n)
-                    for v, d in ((min(values) - reach, 0), (max(values) + reach, 1))
-                )
-            )
-            for values, c, n in (
-                ([p.y for p in points], self.corner.y, self.shape[0]),
-                ([p.x for p in points], self.corner.x, self.shape[1]),
-            )
-        )
-        return rows, columns
+        corner, (height, width) = self.corner, self.shape
+        if len(points) == 1:
+            x, y = points[0].x, points[0].y
+            rows = _cells(y - reach - corner.y, y + reach - corner.y, height)
+            return rows, _cells(x - reach - corner.x, x + reach - corner.x, width)
+        along, up = [point.x for point in points], [point.y for point in points]
+        rows = _cells(min(up) - reach - corner.y, max(up) + reach - corner.y, height)
+        return rows, _cells(min(along) - reach - corner.x, max(along) + reach - corner.x, width)
 
     def centres(self, rows: slice, columns: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return x and y (map, m; broadcastable) of the cells' centres."""
@@ -99,6 +94,12 @@ class GridFrame:
         x, y = self.centres(rows, columns)
         mask[rows, columns] = np.hypot(x - point.x, y - point.y) <= reach
         return mask
+
+
+def _cells(begin: float, end: float, count: int) -> slice:
+    """Return the cells of ``count`` from ``begin`` to ``end``, m from the first one."""
+    first, last = int(begin // RESOLUTION), int(end // RESOLUTION) + 1
+    return slice(min(max(first, 0), count), min(max(last, 0), count))
 
 
 def _pieces(lines: tuple[Line, ...]) -> Iterator[tuple[Point, Point]]:

@@ -13,7 +13,7 @@ from roboglot.kernels.obstacles import remember
 from roboglot.model.geometry import Pose
 
 OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
-NOTED_MAX = 4000  # cells in the list; when there are more, all rays are traced
+NOTED_MAX = 4000  # cells in the list; when there are more, all of the map's count
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -40,33 +40,45 @@ class Cells(Generic[Scalar]):
         return cells
 
 
+class Sightings:
+    """Times (s) of the last sighting in a map's cells, 0: never, with a list of the others while they are few.
+
+    ``noted``: (row, column) of the first ``count`` of them; a negative count: they are too many.
+    """
+
+    def __init__(self) -> None:
+        self._seen = Cells(np.float32)
+        self._listed: NDArray[np.float32] | None = None
+        self.noted, self.count = np.empty((NOTED_MAX, 2), np.int32), 0
+
+    def of(self, grid: EvidenceGrid) -> NDArray[np.float32]:
+        """Return the times, which may be written to; what becomes more than 0 must be noted."""
+        seen = self._seen.of(grid)
+        if seen is not self._listed:
+            cells = np.argwhere(seen)
+            self._listed, self.count = seen, len(cells) if len(cells) <= NOTED_MAX else -1
+            self.noted[: max(0, self.count)] = cells[: max(0, self.count)]
+        return seen
+
+
 class ScanMemory:
     """Memory of scans on one map at a time."""
 
     def __init__(self) -> None:
-        self._seen = Cells(np.float32)
-        self._listed: NDArray[np.float32] | None = None  # the nonzero cells of it, if they are few
-        self._noted, self._count = np.empty((NOTED_MAX, 2), np.int32), 0
+        self._sightings = Sightings()
 
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
         """Return the time (s) of the last sighting in each of the map's cells; 0: never, or rays have passed since."""
-        return self._seen.of(grid)
+        return self._sightings.of(grid)
 
     def observe(
         self, grid: EvidenceGrid, shown: NDArray[np.int16], scan: ScanPoints, pose: Pose, now: float
     ) -> NDArray[np.float64]:
         """Remember obstacles of ``scan`` that are not ``shown`` on the map; return its near echoes in map (n, 2; m)."""
-        corner, seen = grid.corner, self._seen.of(grid)
-        if seen is not self._listed:
-            self._list(seen)
-        at, stamp = np.array((pose.x - corner.x, pose.y - corner.y, pose.yaw)), max(now, 1e-3)
-        self._count, echoes = remember(
-            shown, seen, scan.ends, scan.hit, at, OBSTACLE_RANGE, stamp, RESOLUTION, self._noted, self._count
+        corner, sightings, stamp = grid.corner, self._sightings, max(now, 1e-3)
+        seen, at = sightings.of(grid), np.array((pose.x - corner.x, pose.y - corner.y, pose.yaw))
+        sightings.count, echoes = remember(
+            shown, seen, scan.ends, scan.hit, at, OBSTACLE_RANGE, stamp, RESOLUTION, sightings.noted, sightings.count
         )
-        placed: NDArray[np.float64] = echoes + np.array((corner.x, corner.y))
-        return placed
-
-    def _list(self, seen: NDArray[np.float32]) -> None:
-        cells = np.argwhere(seen)
-        self._listed, self._count = seen, len(cells) if len(cells) <= NOTED_MAX else -1
-        self._noted[: max(0, self._count)] = cells[: max(0, self._count)]
+        echoes += (corner.x, corner.y)
+        return echoes
