@@ -23,6 +23,11 @@ def directions(random: np.random.Generator) -> np.ndarray:
     return ways / np.linalg.norm(ways, axis=1, keepdims=True)
 
 
+def bundle(random: np.random.Generator) -> np.ndarray:
+    ways = random.standard_normal(3) + random.uniform(0.05, 0.6) * random.standard_normal((RAYS, 3))
+    return ways / np.linalg.norm(ways, axis=1, keepdims=True)
+
+
 @given(st.integers(0, 2**32 - 1), st.floats(0.3, 9.0))
 def test_every_shape_is_met_as_by_mujoco(seed: int, reach: float) -> None:
     random = np.random.default_rng(seed)
@@ -34,7 +39,7 @@ def test_every_shape_is_met_as_by_mujoco(seed: int, reach: float) -> None:
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    origins, ways = random.uniform(-3, 3, (2, 3)), np.concatenate((directions(random), directions(random)))
+    origins, ways = random.uniform(-3, 3, (2, 3)), np.concatenate((directions(random), bundle(random)))
     found, expected = np.empty((2, RAYS), np.int32), np.empty((2, RAYS))
     groups = np.ones(6, np.uint8)
     for number, there in enumerate(np.split(ways, 2)):

@@ -125,10 +125,25 @@ def _cone(directions: FloatArray) -> tuple[float, float, float, float, float]:
     return x, y, z, cosine, (math.sqrt(1.0 - cosine * cosine) if cosine > 0.0 else 2.0)
 
 
-@kernel("int64(int32[::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1], float64, int64[::1], float64[::1])")
+@kernel("float64(float64, float64, float64, float64[::1], float64[::1])")
+def _off_box(x: float, y: float, z: float, turn: FloatArray, size: FloatArray) -> float:
+    """Return the distance from a place, relative to a box's middle, to the box: walls are much longer than wide."""
+    square = 0.0
+    for axis in range(3):
+        off = abs(turn[axis] * x + turn[3 + axis] * y + turn[6 + axis] * z) - size[axis]
+        square += off * off if off > 0.0 else 0.0
+    return math.sqrt(square)
+
+
+@kernel(
+    "int64(int32[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1],"
+    " float64, int64[::1], float64[::1])"
+)
 def _reached(
     kinds: NDArray[np.int32],
     places: FloatArray,
+    turns: FloatArray,
+    sizes: FloatArray,
     bounds: FloatArray,
     origin: FloatArray,
     directions: FloatArray,
@@ -153,6 +168,10 @@ def _reached(
             if aside * cosine - along * sine > bounds[i] * (1.0 + SPARE) + SPARE:
                 continue  # the sphere around it lies outside of the cone
         away, place = away - bounds[i], count
+        if kinds[i] == BOX:
+            away = _off_box(x, y, z, turns[i], sizes[i]) - SPARE
+            if away > reach:
+                continue
         while place > 0 and nearest[place - 1] > away:  # few are in range
             chosen[place], nearest[place] = chosen[place - 1], nearest[place - 1]
             place -= 1
@@ -178,7 +197,7 @@ def _cast_from(
 ) -> None:
     """Fill ``found``: see ``cast``, of one origin."""
     chosen, nearest = np.empty(len(kinds), np.int64), np.empty(len(kinds))
-    count = _reached(kinds, places, bounds, origin, directions, reach, chosen, nearest)
+    count = _reached(kinds, places, turns, sizes, bounds, origin, directions, reach, chosen, nearest)
     local, ahead = np.empty((count, 3)), np.empty((count, 4))  # the origin, relative to each solid; bounding sphere
     for place in range(count):
         i = chosen[place]
