@@ -55,9 +55,7 @@ def test_only_what_nothing_explains_is_remembered(seed: int, yaw: float) -> None
             new.append((x, y))
     noted, many = np.empty((2000, 2), np.int32), seen.size
     noted[:many] = np.argwhere(seen)
-    listed, found = remember_low(
-        evidence, seen, floor, obstacles, echoes, pose, corner, 7.0, 0.1, 0.05, noted, many
-    )
+    listed, found = remember_low(evidence, seen, floor, obstacles, echoes, pose, corner, 7.0, 0.1, 0.05, noted, many)
     assert found == pytest.approx(np.array(new).reshape(-1, 2))
     assert (seen == expected).all()
     assert sorted(noted[:listed].tolist()) == np.argwhere(expected).tolist()
@@ -73,7 +71,7 @@ def test_sensors_are_sorted_one_after_the_other() -> None:
         assert (found == np.concatenate([one[part] for one in each])).all()
 
 
-def test_recent_cells_are_found_with_and_without_a_list() -> None:
+def test_recent_cells_are_found_by_list_or_window() -> None:
     random, window = np.random.default_rng(6), np.array((5, 25, 10, 40))
     seen = np.where(random.random((30, 40)) < 0.1, random.uniform(0.0, 9.0, (30, 40)), 0.0).astype(np.float32)
     row, column = np.nonzero(seen[5:25, 10:40] >= 4.0)

@@ -31,16 +31,16 @@ def _surfaces(
 
     Of each: mean x and y of its hits, the summed unit vector towards the sensors, the number of hits.
     """
-    count = 0
+    count, place = 0, around[np.uintp(i)]
     for r in range(max(0, row - 2), min(evidence.shape[0], row + 3)):
         for c in range(max(0, col - 2), min(evidence.shape[1], col + 3)):
-            hits = surface[r, c, 0]
-            if hits <= 0.0 or not (evidence[r, c] > 0 or is_surface(evidence, r, c)):
+            cell = surface[np.uintp(r), np.uintp(c)]
+            hits = cell[0]
+            if hits <= 0.0 or not (evidence[np.uintp(r), np.uintp(c)] > 0 or is_surface(evidence, r, c)):
                 continue
-            one = 1.0 / hits
-            around[i, count, 0] = surface[r, c, 1] * one + c * resolution
-            around[i, count, 1] = surface[r, c, 2] * one + r * resolution
-            around[i, count, 2], around[i, count, 3], around[i, count, 4] = surface[r, c, 3], surface[r, c, 4], hits
+            one, found = 1.0 / hits, place[np.uintp(count)]
+            found[0], found[1] = cell[1] * one + c * resolution, cell[2] * one + r * resolution
+            found[2], found[3], found[4] = cell[3], cell[4], hits
             count += 1
     return count
 
@@ -51,12 +51,14 @@ def _line(
 ) -> tuple[float, float, float, float, float]:
     """The surface around (x, y) as ``surface_near`` has it, from the ``count`` rows of ``around[i]``."""
     total = mean_x = mean_y = xx = xy = yy = 0.0
+    place = around[np.uintp(i)]
     for k in range(count):
-        hits = around[i, k, 4]
-        if around[i, k, 2] * beam_x + around[i, k, 3] * beam_y > 0.2 * hits:
+        cell = place[np.uintp(k)]
+        hits = cell[4]
+        if cell[2] * beam_x + cell[3] * beam_y > 0.2 * hits:
             continue
         # Relative to (x, y), for precision.
-        dx, dy = around[i, k, 0] - x, around[i, k, 1] - y
+        dx, dy = cell[0] - x, cell[1] - y
         near = 1.0 - (dx * dx + dy * dy) / (SPREAD * SPREAD)
         if near <= 0.0:
             continue

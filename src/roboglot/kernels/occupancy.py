@@ -32,7 +32,7 @@ def is_surface(evidence: Int16Array, row: int, col: int) -> bool:
     """
     for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
         for c in range(max(0, col - 1), min(evidence.shape[1], col + 2)):
-            if evidence[r, c] > 0:
+            if evidence[np.uintp(r), np.uintp(c)] > 0:
                 return True
     return False
 
