@@ -24,7 +24,7 @@ def meeting(way: Way, narrow: NDArray[np.bool_] = CORRIDOR, seconds: float = 0.0
     stretches = OneWay()
     stretches.observe([way], 0.0)
     stretches.observe([Way(way.points, 0.0, RADIUS, way.outranks, way.name)] if seconds else [way], seconds)
-    return stretches.meeting(EAST, narrow, 0.5, RADIUS, [way], seconds)
+    return stretches.meeting(EAST, lambda: narrow, 0.5, RADIUS, [way], seconds)
 
 
 def test_first_one_in_goes_first() -> None:

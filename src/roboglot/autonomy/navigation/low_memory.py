@@ -17,6 +17,7 @@ from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.depth import remember_low, seen_since
 from roboglot.model.geometry import Pose
 
+KEPT = 60.0  # s after which a sighting counts no more for anyone
 SPARE = 0.1  # s: cells round their time
 EXPLAINED = 0.1  # m around an echo within which depth adds nothing
 
@@ -35,6 +36,8 @@ class LowMemory:
 
         Obstacles are forgotten where the view shows floor.
         """
+        if not len(view.obstacles) and self._latest < now - KEPT:
+            return NONE  # nothing to note, and nothing that floor would clear
         corner, sightings, stamp = grid.corner, self._sightings, max(now, 1e-3)
         seen, at = sightings.of(grid), np.array((pose.x, pose.y, pose.yaw))
         first, noted = np.array((corner.x, corner.y)), (sightings.noted, sightings.count)

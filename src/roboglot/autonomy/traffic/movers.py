@@ -55,7 +55,7 @@ class Mover:
     @property
     def speed(self) -> float:
         """Speed, m/s."""
-        return float(np.hypot(self.vx, self.vy)) if self.vx or self.vy else 0.0
+        return math.hypot(self.vx, self.vy)
 
     def take(self, x: float, y: float, stamp: float) -> None:
         """Take a new sighting."""
@@ -63,13 +63,15 @@ class Mover:
         self.x, self.y, self.stamp = x, y, stamp
         if len(self._seen) < 3:
             return
-        times, xs, ys = np.array(self._seen).T
-        times = times - times.mean()
-        spread = float(times @ times)
+        middle = sum(stamp for stamp, _, _ in self._seen) / len(self._seen)
+        spread = along = up = 0.0
+        for seen_at, seen_x, seen_y in self._seen:
+            late = seen_at - middle
+            spread, along, up = spread + late * late, along + late * seen_x, up + late * seen_y
         if spread <= 0.0:
             return
-        vx, vy = float(times @ xs) / spread, float(times @ ys) / spread
-        moves = np.hypot(vx, vy) >= MOVES
+        vx, vy = along / spread, up / spread
+        moves = math.hypot(vx, vy) >= MOVES
         self.vx, self.vy = (vx, vy) if moves else (0.0, 0.0)
         if moves:
             self.heading, self.moved_at = math.atan2(vy, vx), stamp
@@ -105,7 +107,7 @@ def _expected(movers: Sequence[Mover], x: float, y: float, stamp: float) -> Move
     best, found = SAME, None
     for mover in movers:
         seconds = stamp - mover.stamp
-        away = float(np.hypot(mover.x + mover.vx * seconds - x, mover.y + mover.vy * seconds - y))
+        away = math.hypot(mover.x + mover.vx * seconds - x, mover.y + mover.vy * seconds - y)
         if away < best:
             best, found = away, mover
     return found
@@ -125,9 +127,9 @@ def _things(echoes: Points, pose: Pose) -> list[tuple[float, float]]:
         if end - begin < ECHOES_MIN:
             continue
         thing = echoes[begin:end]
-        if float(np.hypot(*(thing.max(axis=0) - thing.min(axis=0)))) > WIDE_MAX:
+        if math.hypot(*(thing.max(axis=0) - thing.min(axis=0)).tolist()) > WIDE_MAX:
             continue
         x, y = thing.mean(axis=0).tolist()
-        away = max(float(np.hypot(x - pose.x, y - pose.y)), 1e-6)
+        away = max(math.hypot(x - pose.x, y - pose.y), 1e-6)
         found.append((x + DEPTH * (x - pose.x) / away, y + DEPTH * (y - pose.y) / away))
     return found

@@ -60,10 +60,7 @@ class NarrowPlaces:
 
         No disc as wide as two robots fits into the free floor there, or it is a door.
         """
-        here = Point(float(points[0, 0]), float(points[0, 1]))
-        if grid is not self._grid or now - self._looked_at > KEPT or here.distance_to(self._around) > MOVED:
-            self._look(grid, here)
-            self._looked_at, self._around, self._grid = now, here, grid
+        self._update(grid, Point(float(points[0, 0]), float(points[0, 1])), now)
         cells = np.floor(points / RESOLUTION).astype(np.intp)
         height, width = self._found.shape
         if not height or not width:
@@ -76,7 +73,26 @@ class NarrowPlaces:
         if not (found | ~within).all():
             self._examine(rows[within], columns[within])
             found = self._found[rows, columns]
-        return (found == NARROW) & within
+        is_narrow: NDArray[np.bool_] = (found == NARROW) & within
+        return is_narrow
+
+    def holds(self, grid: EvidenceGrid, here: Point, place: Point, now: float) -> bool:
+        """Return the same for one ``place``; the robot is ``here``."""
+        self._update(grid, here, now)
+        height, width = self._found.shape
+        row = math.floor(place.y / RESOLUTION) - self._corner[0]
+        column = math.floor(place.x / RESOLUTION) - self._corner[1]
+        if not (0 <= row < height and 0 <= column < width):
+            return False
+        if self._found[row, column] == UNSEEN:
+            self._examine(np.array([row]), np.array([column]))
+        return bool(self._found[row, column] == NARROW)
+
+    def _update(self, grid: EvidenceGrid, here: Point, now: float) -> None:
+        """Copy the map around ``here`` if the copy is too old, or of another place."""
+        if grid is not self._grid or now - self._looked_at > KEPT or here.distance_to(self._around) > MOVED:
+            self._look(grid, here)
+            self._looked_at, self._around, self._grid = now, here, grid
 
     def _look(self, grid: EvidenceGrid, here: Point) -> None:
         """Copy the map around ``here``."""

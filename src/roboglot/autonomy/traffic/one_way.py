@@ -7,7 +7,7 @@ way. The first one in goes first; of two that would come in at about the same ti
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,16 +37,23 @@ class OneWay:
         self._moved = {way.name: stamp if way.speed > 0.05 else moved.get(way.name, stamp) for way in ways if way.name}
 
     def meeting(
-        self, path: Points, narrow: NDArray[np.bool_], speed: float, radius: float, ways: Sequence[Way], stamp: float
+        self,
+        path: Points,
+        narrow: Callable[[], NDArray[np.bool_]],
+        speed: float,
+        radius: float,
+        ways: Sequence[Way],
+        stamp: float,
     ) -> Meeting | None:
-        """Return the first stretch of ``path`` (dense; ``narrow``: where two cannot pass) that must stay free for now.
+        """Return the first stretch of ``path`` (dense) that must stay free for now.
 
-        The robot drives at ``speed`` m/s.
+        ``narrow`` tells where two cannot pass, and is called only if others come. The robot drives at ``speed`` m/s.
         """
         coming = [way for way in ways if len(way.points) >= 2 and stamp - self._moved.get(way.name, stamp) < GIVEN_UP]
-        if not coming or narrow[0]:
+        if not coming:
             return None
-        for begin, end in _stretches(narrow):
+        tight = narrow()
+        for begin, end in () if tight[0] else _stretches(tight):
             if begin * SPACING > NEAR:
                 return None
             mine = path[begin : end : round(STEP / SPACING)]

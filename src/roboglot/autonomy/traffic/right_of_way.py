@@ -144,8 +144,9 @@ def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> 
     if len(mine) < 2:
         return
     seconds = np.arange(len(mine)) * STEP / max(speed, SLOW)
+    x, y = path[0].tolist()
     for way in ways:
-        if len(way.points) < 2:
+        if len(way.points) < 2 or _is_far(way, x, y, len(path), radius + CLEAR):
             continue
         close = way.distances(mine) < radius + way.radius + CLEAR
         if not close.any():
@@ -164,6 +165,16 @@ def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> 
             yield Meeting(float(meets.argmax()) * STEP, way, stands)
 
 
+def _is_far(way: Way, x: float, y: float, count: int, reach: float) -> bool:
+    """True if ``count`` points of a dense path from (x, y) all stay more than ``reach`` m beside a hull on its way.
+
+    Announced ways are not looked at: their points may lie farther apart than STEP.
+    """
+    if way.name:
+        return False
+    return not way.is_within(SPACING * count + STEP * len(way.points) + reach + way.radius, Pose(x, y))
+
+
 def directions(points: Points) -> Points:
     """Return unit vectors along a way (n, 2)."""
     ahead = np.diff(points, axis=0, append=points[-1:])
@@ -175,9 +186,9 @@ def directions(points: Points) -> Points:
 
 def free_of_movers(path: Points, pose: Pose, radius: float, ways: Sequence[Way]) -> float:
     """Return the distance along ``path`` that stays clear of others that brake now, m; inf: all of it."""
-    free = math.inf
+    free, (x, y) = math.inf, path[0].tolist()
     for way in ways:
-        if len(way.points) < 2:
+        if len(way.points) < 2 or _is_far(way, x, y, len(path), radius + CLEAR_MOVING):
             continue
         points = way.stopping()
         if len(points) < 2:

@@ -22,19 +22,18 @@ from roboglot.autonomy.traffic.right_of_way import (
     announced_way,
     expected_way,
     free_of_movers,
-    joined,
     meetings,
     shifted,
     straight_on,
     through_narrow,
 )
+from roboglot.autonomy.traffic.tight import BETWEEN, Tight
 from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 
 if TYPE_CHECKING:
     from roboglot.autonomy.traffic.movers import Mover, MoverTracker
-    from roboglot.autonomy.traffic.narrow_places import NarrowPlaces
 
 ANNOUNCED = 5.0  # m of the route that are announced, plus any narrow place beyond
 SAME = 0.6  # m between the sighting and the announcement of the same robot
@@ -47,7 +46,6 @@ STOPPED = 5.0  # s after which a robot standing in a narrow place may reverse, t
 IN_IT = 0.9  # m between the centre of such a robot and the place that it blocks
 TRAIL = 20  # places that were passed
 TRAIL_STEP = 0.2  # m between two of them
-BETWEEN = 2.0  # m between two narrow places of a way that count as one: a robot that waits there is in the way
 
 Points = NDArray[np.float64]
 
@@ -58,8 +56,8 @@ class Traffic:
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot, self._belief = robot, belief
         self._announcer = Announcer(robot, belief)
-        self._tracker: MoverTracker | None = None  # set once something drives: these two need the kernels
-        self._narrow: NarrowPlaces | None = None
+        self._tracker: MoverTracker | None = None  # set once something drives: it needs the kernels
+        self._tight = Tight(robot.clock, belief)
         self._ways: list[Way] = []
         self._one_way = OneWay()
         self._went: dict[str, float] = {}  # time of the last announced route by robot, s
@@ -100,7 +98,7 @@ class Traffic:
         behind = [(point.x, point.y) for point in self._trail]
         ahead = self._announcer.way[: round(BETWEEN / STEP)]
         line = np.concatenate([[(pose.x, pose.y)], np.reshape(behind, (-1, 2)), [(pose.x, pose.y)], ahead])
-        return bool(self._narrow_at(line, STEP, skipped=1)[len(behind)])
+        return bool(self._tight.along(line, STEP, skipped=1)[len(behind)])
 
     def _goes(self, other: Announcement) -> bool:
         """True if another robot announces a way, or did so a moment ago."""
@@ -111,11 +109,10 @@ class Traffic:
     def _expected(self, mover: Mover, pose: Pose, stamp: float, *, inside: bool) -> Way:
         """Return the way of a robot that announces none: it goes first if only it is in a narrow place."""
         stood = stamp - mover.moved_at
-        if not inside and stood <= STOPPED:
+        if not inside and stood <= STOPPED and self._tight.holds(pose.point, mover.point):
             points = straight_on(mover, THROUGH)
-            narrow = self._narrow_at(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
-            if narrow[0]:
-                return through_narrow(mover, points, narrow)
+            narrow = self._tight.along(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
+            return through_narrow(mover, points, narrow)
         return expected_way(mover, lively=stood <= LIVELY)
 
     def _watch(self) -> MoverTracker:
@@ -156,9 +153,9 @@ class Traffic:
         self.meets = any(meeting.way.outranks or not meeting.way.name for meeting in found)
         ruled = [meeting for meeting in found if meeting.way.outranks]
         self.meeting = min(ruled, key=lambda meeting: meeting.along, default=None)
-        if self.meeting is None and not self.giving_way:
-            narrow, now = self._narrow_at(way), self._robot.clock.time()
-            self.meeting = self._one_way.meeting(way, narrow, speed, radius, self._ways, now)
+        if self.meeting is None and not self.giving_way and not self._tight.holds(pose.point, Point(*way[0].tolist())):
+            now = self._robot.clock.time()
+            self.meeting = self._one_way.meeting(way, lambda: self._tight.along(way), speed, radius, self._ways, now)
         if self.meeting is not None:
             self.meets, free = True, min(free, self._before_narrow(way, self.meeting, radius))
         return free
@@ -168,7 +165,7 @@ class Traffic:
 
         In the other's way only where the robot is in it already.
         """
-        narrow = self._narrow_at(path)
+        narrow = self._tight.along(path)
         last = min(int(meeting.along / SPACING), len(narrow) - 1)
         if narrow[0] or not narrow[last]:
             return meeting.along
@@ -177,18 +174,6 @@ class Traffic:
         away = meeting.way.distances(path[: entry + 1]).min(axis=1)
         clear = np.flatnonzero(away >= radius + meeting.way.radius + CLEAR)
         return float(clear[-1] if len(clear) else entry) * SPACING
-
-    def _narrow_at(self, path: Points, spacing: float = SPACING, *, skipped: int = 0) -> NDArray[np.bool_]:
-        """Return which points of ``path``, ``spacing`` m apart, are too narrow for two, or between two such places.
-
-        The first point is the robot's; the first ``skipped`` ones do not belong to the path.
-        """
-        if self._narrow is None:
-            from roboglot.autonomy.traffic.narrow_places import NarrowPlaces
-
-            self._narrow = NarrowPlaces()
-        narrow = self._narrow.at(self._belief.map, path, self._robot.clock.time())[skipped:]
-        return joined(narrow, round(BETWEEN / spacing))
 
     def shunned(self) -> list[tuple[Points, float]]:
         """Return ways to avoid, with their distances (m): of robots with right of way or without announcements."""
@@ -237,7 +222,7 @@ class Traffic:
         back = (here - there) / max(float(np.hypot(*(here - there))), 1e-6)
         steps = np.arange(0.0, THROUGH, STEP)[:, None]
         line = np.concatenate([[here], (here + steps * back)[::-1], there - steps * back])
-        narrow = self._narrow_at(line, STEP, skipped=1)
+        narrow = self._tight.along(line, STEP, skipped=1)
         mine, others = narrow[: len(steps)][::-1], narrow[len(steps) :]
         if not (mine[0] and others[0]):
             return False
@@ -263,8 +248,8 @@ class Traffic:
         if not announcer.frame:
             return
         end = round(ANNOUNCED / SPACING)
-        if self._ways:
-            narrow = self._narrow_at(path)
+        if self._ways and end < len(path):
+            narrow = self._tight.along(path)
             while end < len(narrow) and narrow[end]:
                 end += 1
         if self.meeting is not None:

@@ -1,0 +1,48 @@
+"""Places too narrow for two robots, along ways and one by one; loads what finds them when first asked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.autonomy.navigation.route import SPACING
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.traffic.right_of_way import joined
+from roboglot.model.clock import Clock
+from roboglot.model.geometry import Point
+
+if TYPE_CHECKING:
+    from roboglot.autonomy.traffic.narrow_places import NarrowPlaces  # it needs the kernels
+
+BETWEEN = 2.0  # m between two narrow places of a way that count as one: a robot that waits there is in the way
+
+Points = NDArray[np.float64]
+
+
+class Tight:
+    """Narrow places on the believed map."""
+
+    def __init__(self, clock: Clock, belief: Belief) -> None:
+        self._clock, self._belief = clock, belief
+        self._places: NarrowPlaces | None = None
+
+    def along(self, path: Points, spacing: float = SPACING, *, skipped: int = 0) -> NDArray[np.bool_]:
+        """Return which points of ``path``, ``spacing`` m apart, are too narrow for two, or between two such places.
+
+        The first point is the robot's; the first ``skipped`` ones do not belong to the path.
+        """
+        narrow = self._found().at(self._belief.map, path, self._clock.time())[skipped:]
+        return joined(narrow, round(BETWEEN / spacing))
+
+    def holds(self, here: Point, place: Point) -> bool:
+        """True if ``place`` itself is too narrow for two; the robot is ``here``."""
+        return self._found().holds(self._belief.map, here, place, self._clock.time())
+
+    def _found(self) -> NarrowPlaces:
+        if self._places is None:
+            from roboglot.autonomy.traffic.narrow_places import NarrowPlaces
+
+            self._places = NarrowPlaces()
+        return self._places
