@@ -71,6 +71,16 @@ class Client:
     def __init__(self) -> None:
         self.said: asyncio.Queue[str] = asyncio.Queue()
         self.readies: asyncio.Queue[str] = asyncio.Queue()
+        self._keeping: asyncio.Task[None]
+
+    async def next(self, queue: asyncio.Queue[str]) -> str:
+        """Return what comes next; raise what ended the client before."""
+        coming = asyncio.ensure_future(queue.get())
+        await asyncio.wait([coming, self._keeping], return_when=asyncio.FIRST_COMPLETED)
+        if not coming.done():
+            coming.cancel()
+            await self._keeping
+        return await coming
 
     @contextlib.asynccontextmanager
     async def connected(self, registry: str, token: str) -> AsyncIterator[asyncio.Task[None]]:
@@ -80,6 +90,7 @@ class Client:
 
         with registered(registry) as places:
             keeping = asyncio.ensure_future(Dialling(places, "a", token, HERE, ready, self.said.put_nowait).keep())
+            self._keeping = keeping
             yield keeping
             keeping.cancel()
             with contextlib.suppress(asyncio.CancelledError, ConnectionError):
@@ -96,11 +107,11 @@ async def test_client_follows_its_robot_to_the_next_program(tmp_path: Path) -> N
     async with contextlib.AsyncExitStack() as stack:
         async with program(tmp_path / "one", registry, HOMES[0]) as (_, token):
             await stack.enter_async_context(client.connected(registry, token))
-            first = await client.readies.get()
+            first = await client.next(client.readies)
             assert await answers()
             same_people(tmp_path / "one", tmp_path / "two")
         async with program(tmp_path / "two", registry, HOMES[1], token):
-            second = await client.readies.get()
+            second = await client.next(client.readies)
             assert second != first  # another data folder, another certificate
             assert await answers()
 
@@ -109,7 +120,7 @@ async def test_client_leaves_a_program_that_lost_its_robot(tmp_path: Path) -> No
     """The old one lives on, cut off from the registry, and its tunnel too."""
     registry, client = str(tmp_path / "registry.db"), Client()
     async with program(tmp_path / "one", registry, HOMES[0]) as (old, token), client.connected(registry, token):
-        await client.readies.get()
+        await client.next(client.readies)
         renewals = known(old._residence)._keeping[0]
         renewals.cancel()  # it would take its robot back within half a second
         await asyncio.wait([renewals])
@@ -118,8 +129,8 @@ async def test_client_leaves_a_program_that_lost_its_robot(tmp_path: Path) -> No
         homes = Homes(database)
         await homes.release((await homes.all())["a"].holder, {"a": 1})
         async with program(tmp_path / "two", registry, HOMES[1], token):
-            await client.readies.get()
-            assert await client.said.get() == "robot a: it moved"
+            await client.next(client.readies)
+            assert await client.next(client.said) == "robot a: it moved"
             assert await answers()
             assert (await homes.all())["a"].epoch == 2
         database.close()
@@ -139,7 +150,7 @@ async def test_only_certificate_that_the_registry_has_is_believed(tmp_path: Path
                 await keeping
         await homes.announce(home.holder, "nonsense", home.certificate)
         async with client.connected(registry, token) as keeping:
-            assert "'nonsense'" in await client.said.get()
+            assert "'nonsense'" in await client.next(client.said)
             assert not keeping.done()
         database.close()
 
