@@ -10,6 +10,9 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterable
 from contextlib import nullcontext
+from contextvars import copy_context
+from functools import partial
+from inspect import iscoroutinefunction
 from time import perf_counter
 from typing import get_args
 
@@ -17,7 +20,9 @@ import msgspec
 
 from roboglot.model.admission import NO_PROOF, Forbidden, LockedOut, Proof, ProofKind, Unknown
 from roboglot.model.client_context import ask_for
+from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.inputs.fairness import Use
 from roboglot.model.lateness import late
 from roboglot.model.stand_in import StandIn
 from roboglot.operations import BadParameters, Operation, Right
@@ -68,6 +73,7 @@ from roboglot.wire.contracts import Row, contract
 log = logging.getLogger(__name__)
 LOGGED_MAX = 200  # characters of a path or a refusal in a log line
 
+Repeated = Callable[[], bytes | None]  # a whole response, or None: the request has to be read anew
 Send = Callable[[dict[str, object]], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
 
@@ -130,12 +136,57 @@ class Application:
         if self._tap.watched:
             self._note_reply(scope, status, body, why)
         if fairness:
-            fairness.took(fairness.of(address), perf_counter() - begun)
+            fairness.lend(fairness.of(address), perf_counter() - begun)
         await late(self._context.robot)
         headers += shared
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []
         await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": body})
+
+    def at_once(self, scope: Scope) -> Repeated | None:
+        """Return what answers a GET of a client whenever it comes again; None if that takes more than a plain call.
+
+        For what has just been answered, with the client's name. It returns None where nothing was done, and the
+        request has to come in as the first one did: for a follower, a slow network, a refusal.
+        """
+        robot = self._context.robot
+        operation, match = self._found(scope)
+        if operation is None or match is None or self._admission.asks or robot.stand_in is not None:
+            return None
+        try:
+            values = operation.parse(self._parameters.named(operation, match, scope))
+            shared = self._admit(scope)
+        except (HttpError, BadParameters):
+            return None
+        handler = partial(copy_context().run, operation.handler, self._context, **values)
+        card = robot[Network] if Network in robot else None  # noqa: SIM401 - one that comes later is real and on time
+        peer = scope.get("client") or ("", 0)
+        use = robot.fairness.of(f"{peer[0]}:{peer[1]}") if robot.fairness else Use("")
+        tap = self._tap
+
+        def reply() -> bytes | None:
+            if not use.left or tap.watched or (card is not None and card.delay) or log.isEnabledFor(logging.DEBUG):
+                return None
+            try:
+                answer = handler()
+            except Exception:  # noqa: BLE001 - it only read: asked once more, it is worded and logged
+                return None
+            if answer is NO_CONTENT or answer is None:
+                return None
+            use.left -= 1
+            headers, body = self._render(answer, scope)
+            return written([*headers, *shared], body)
+
+        return reply
+
+    def _found(self, scope: Scope) -> tuple[Operation[str] | None, Match | None]:
+        """Return the operation that a GET reads by a plain function, if it means one."""
+        if scope["method"] != "GET" or (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
+            return None, None
+        operation = TABLE.get(match.methods["GET"].key) if "GET" in match.methods else None
+        if operation is None or operation.right is not Right.SEE or "body" in operation.names:
+            return None, None
+        return (None, None) if iscoroutinefunction(operation.handler) else (operation, match)
 
     def _admit(self, scope: Scope) -> Headers:
         """Return what tells the browser which page may read the answer. Raises HttpError 403 for strangers' pages."""
@@ -285,6 +336,12 @@ class Application:
                 return [JSON], self._encode(answer.value)
             case _:
                 return [JSON], self._encode(answer)
+
+
+def written(headers: Headers, body: bytes) -> bytes:
+    """Return a response with status 200 as the server writes it."""
+    rows = [b"%s: %s\r\n" % row for row in headers]
+    return b"HTTP/1.1 200 OK\r\n%scontent-length: %d\r\n\r\n%s" % (b"".join(rows), len(body), body)
 
 
 def _wire_form(scope: Scope) -> bytes:

@@ -2,6 +2,9 @@
 
 Loaded, with uvicorn, for a door's first client. Knows neither the robot nor the API. Its times are the machine's, not
 the robot's: they guard sockets.
+
+A request that comes again, byte for byte, is answered without the parser, ASGI and a task, where the application knows
+how (``at_once``).
 """
 
 from __future__ import annotations
@@ -9,13 +12,14 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Callable, Sequence
-from typing import cast
+from typing import Protocol, cast
 
 import httptools
 from uvicorn.config import Config
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from uvicorn.server import ServerState
 
+from roboglot.protocols.slamware.bodies import Scope
 from roboglot.protocols.slamware.config import CONNECTIONS_MAX
 from roboglot.protocols.slamware.errors import REASON
 
@@ -25,6 +29,7 @@ JOINED_MAX = 1 << 16  # bytes of a body that is sent with its head
 REQUEST_SECONDS_MAX = 10.0  # for a request (or a piece of its body) to arrive, and for a new connection's first one
 WRITE_SECONDS_MAX = 30.0  # for a client that does not read its answer
 KEEP_ALIVE_SECONDS = 75
+REPEATED_MAX, REPEATED_BYTES_MAX = 8, 1024  # requests of a connection that are known by their bytes, and these
 
 _REASON_LINE = b"\r\n" + REASON + b": "
 _STATUS = b"HTTP/1.1 "
@@ -34,6 +39,13 @@ _TOO_LARGE = (
     b"HTTP/1.1 431 Request Header Fields Too Large\r\ncontent-type: text/plain; charset=utf-8\r\n"
     b"content-length: 31\r\nconnection: close\r\n\r\nRequest Header Fields Too Large"
 )
+
+
+class Answering(Protocol):
+    """An ASGI application that may know how to answer a request whenever it comes again."""
+
+    def at_once(self, scope: Scope) -> Callable[[], bytes | None] | None:
+        """Return a function for the whole response, or for None, where the request has to be read anew."""
 
 
 class ReasonTransport(asyncio.Transport):
@@ -80,6 +92,11 @@ class ReasonTransport(asyncio.Transport):
             self.flush()
             self._inner.write(data)
 
+    def send(self, response: bytes) -> None:
+        """Send a whole response."""
+        self.flush()
+        self._inner.write(response)
+
     def flush(self) -> None:
         """Send a head whose response has no body, or a large one."""
         if self._head:
@@ -113,6 +130,15 @@ class HttpConnection(HttpToolsProtocol):
     _parsed_bytes = 0  # of these, parsed: long headers may arrive at once
     _reading: bytes | memoryview = b""
     _unread: Sequence[bytes | memoryview] = ()  # received, to be parsed first
+    _begun = 0  # requests in what was received last
+    _idle = True  # nothing is half received or half answered
+    _whole, _last = b"", b""  # the request that is being answered, if it came in one piece, and the one before
+    _answered_again = False  # since the keep-alive's timer was set
+
+    def __init__(self, application: Answering, config: Config, state: ServerState) -> None:
+        super().__init__(config, state, {}, asyncio.get_running_loop())
+        self._application = application
+        self._said: dict[bytes, Callable[[], bytes | None]] = {}
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         reasoned = ReasonTransport(cast(asyncio.Transport, transport))
@@ -129,6 +155,15 @@ class HttpConnection(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
+        if self._idle and (repeated := self._said.get(data)) is not None and (response := repeated()) is not None:
+            self._answered_again = True
+            cast(ReasonTransport, self.transport).send(response)
+        else:
+            self._read(data)
+
+    def _read(self, data: bytes) -> None:
+        idle, self._idle = self._idle, False
+        self._begun, self._whole = 0, b""
         unread: list[bytes | memoryview] = [data]
         while unread:
             self._reading = unread.pop(0)
@@ -138,6 +173,8 @@ class HttpConnection(HttpToolsProtocol):
                 if self._head_bytes > HEAD_MAX:
                     self._refuse_head()
             unread, self._unread = [*self._unread, *unread], ()
+        if idle and self._begun == 1 and not self._receiving and len(data) <= REPEATED_BYTES_MAX:
+            self._whole = data
 
     def send_400_response(self, msg: str) -> None:
         """Answer a request that cannot be parsed, or that ``_measure`` stopped; called by uvicorn."""
@@ -190,6 +227,7 @@ class HttpConnection(HttpToolsProtocol):
         self._unread = [b"\r\n".join(head) + b"\r\n\r\n", memoryview(self._reading)[wish.args[0] :]]
 
     def on_message_begin(self) -> None:
+        self._begun += 1
         self._receiving = self._in_head = True
         self._head_bytes = self._parsed_bytes = self._body_bytes = 0
         self._guard(REQUEST_SECONDS_MAX)
@@ -215,8 +253,31 @@ class HttpConnection(HttpToolsProtocol):
         assert isinstance(self.transport, ReasonTransport)
         self.transport.flush()  # the answer to a HEAD has no body
         super().on_response_complete()
+        self._answered_again = False
+        if not (self._receiving or self.pipeline or self.flow.write_paused or self.transport.is_closing()):
+            self._idle = True
+            if self._whole and self._whole == self._last:
+                self._learn(self._whole)
+            self._last = self._whole
+
+    def _learn(self, request: bytes) -> None:
+        """Keep what answers this request, which came twice, one after the other."""
+        if self.cycle.keep_alive and (repeated := self._application.at_once(cast(Scope, self.scope))) is not None:
+            if len(self._said) >= REPEATED_MAX:
+                self._said.clear()
+            self._said[request] = repeated
+
+    def timeout_keep_alive_handler(self) -> None:
+        if self._answered_again:
+            self._answered_again = False
+            self.timeout_keep_alive_task = self.loop.call_later(
+                self.timeout_keep_alive, self.timeout_keep_alive_handler
+            )
+        else:
+            super().timeout_keep_alive_handler()
 
     def pause_writing(self) -> None:
+        self._idle = False
         self._guard(WRITE_SECONDS_MAX)
         super().pause_writing()
 
@@ -247,9 +308,10 @@ class HttpConnection(HttpToolsProtocol):
 class HttpConnections:
     """All connections to one application, and their requests under way."""
 
-    def __init__(self, application: Callable[..., object]) -> None:
+    def __init__(self, application: Answering) -> None:
+        self._application = application
         self._config = Config(
-            application,
+            cast(Callable[..., object], application),
             http=HttpConnection,
             ws="none",
             lifespan="off",
@@ -264,7 +326,7 @@ class HttpConnections:
 
     def add(self) -> HttpConnection:
         """Return the protocol of a new connection."""
-        return HttpConnection(self._config, self._state, {}, asyncio.get_running_loop())
+        return HttpConnection(self._application, self._config, self._state)
 
     @property
     def open(self) -> list[HttpConnection]:

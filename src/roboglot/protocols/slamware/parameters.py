@@ -32,13 +32,7 @@ class Parameters:
 
     async def read(self, operation: Operation[str], match: Match, scope: Scope, receive: Receive) -> dict[str, object]:
         """Return a handler's parameters by name: path over query, and the body. Raises HttpError."""
-        try:
-            text = scope["query_string"].decode("latin-1")
-            query = parse_qsl(text, max_num_fields=QUERY_FIELDS_MAX) if text else ()
-        except ValueError as error:
-            raise bad_request(operation.key, str(error)) from None
-        values: dict[str, object] = {**dict(query), **match.values}
-        values.pop("body", None)
+        values = self.named(operation, match, scope)
         kind = operation.parameters.__annotations__.get("body")
         if kind is bytes:
             values["body"] = scope["body"] = await self.whole(scope, receive)
@@ -55,6 +49,17 @@ class Parameters:
             except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
                 why = misfit(error, "the body") if body else "a JSON body is needed"
                 raise bad_request(operation.key, why) from None
+        return values
+
+    def named(self, operation: Operation[str], match: Match, scope: Scope) -> dict[str, object]:
+        """Return the parameters in path and query. Raises HttpError."""
+        try:
+            text = scope["query_string"].decode("latin-1")
+            query = parse_qsl(text, max_num_fields=QUERY_FIELDS_MAX) if text else ()
+        except ValueError as error:
+            raise bad_request(operation.key, str(error)) from None
+        values: dict[str, object] = {**dict(query), **match.values}
+        values.pop("body", None)
         return values
 
     async def whole(self, scope: Scope, receive: Receive) -> bytes:

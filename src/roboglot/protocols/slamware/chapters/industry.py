@@ -72,7 +72,7 @@ async def create_task_template(context: Context, body: TemplateRequest) -> TaskT
 
 
 @TABLE.on(f"GET {TEMPLATES}", right=Right.SEE, needs=(Industry,))
-async def get_task_templates(context: Context) -> list[TaskTemplate]:
+def get_task_templates(context: Context) -> list[TaskTemplate]:
     """Return the templates in the order of their creation."""
     return [_template(context, template) for template in context.robot[Industry].templates]
 
@@ -85,7 +85,7 @@ async def delete_task_template(context: Context, key_id: str) -> CommonResponse:
 
 
 @TABLE.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Industry, Places))
-async def get_industry_tasks(
+def get_industry_tasks(
     context: Context,
     type: Literal["carry_calling_by_template", "carry_calling", "industry"] | None = None,
     status: StatusFilter | None = None,
@@ -103,7 +103,7 @@ async def get_industry_tasks(
 
 
 @TABLE.on("POST /api/industry/v1/generate_landing_pose", right=Right.SEE, needs=(Localization,))
-async def generate_landing_pose(context: Context, body: LandingRequest) -> LandingPose:
+def generate_landing_pose(context: Context, body: LandingRequest) -> LandingPose:
     """Return the robot's pose, and the pose ahead to approach it from: MoveToTag's target.
 
     Beyond the manual; real robots place it ``distance`` m straight ahead, headed as the robot or, ``reversed``, back.

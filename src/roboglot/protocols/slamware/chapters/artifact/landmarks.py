@@ -23,7 +23,7 @@ API = "/api/core/artifact/v1/laser-landmarks"
 
 
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
-async def get_laser_landmarks(context: Context) -> list[PoseEntry]:
+def get_laser_landmarks(context: Context) -> list[PoseEntry]:
     """Return landmarks found by the lidar and those that were set."""
     return [entry_of(mark) for mark in context.robot[MapAnnotations].current.landmarks]
 
@@ -40,7 +40,7 @@ async def put_laser_landmarks(
 
 
 @TABLE.on(f"GET {API}/:update", right=Right.SEE, needs=(LaserLandmarks,))
-async def get_laser_landmark_update(context: Context) -> bool:
+def get_laser_landmark_update(context: Context) -> bool:
     """Return whether the robot adds landmarks found by its lidar."""
     return context.robot[LaserLandmarks].updating
 

@@ -25,7 +25,7 @@ LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
 
 
 @TABLE.on(f"GET {LINES}", right=Right.SEE, needs=(MapAnnotations,))
-async def get_lines(context: Context, usage: LineUsage) -> list[wire.Line]:
+def get_lines(context: Context, usage: LineUsage) -> list[wire.Line]:
     """Return all lines of one kind, oldest first."""
     return [wire_line(line) for line in context.robot[MapAnnotations].current.lines_of(LINE_KINDS[usage])]
 
@@ -79,7 +79,7 @@ async def remove_line_by_id(context: Context, usage: LineUsage, id: int) -> bool
 
 
 @TABLE.on(f"GET {AREAS}", right=Right.SEE, needs=(MapAnnotations,))
-async def get_rectangle_areas(context: Context, usage: AreaUsage) -> list[RectangleArea]:
+def get_rectangle_areas(context: Context, usage: AreaUsage) -> list[RectangleArea]:
     """Return all areas of one kind, oldest first."""
     return [wire_area(area) for area in context.robot[MapAnnotations].current.areas_of(AREA_KINDS[usage])]
 

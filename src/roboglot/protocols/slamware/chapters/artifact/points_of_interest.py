@@ -15,7 +15,7 @@ API = "/api/core/artifact/v1/pois"
 
 
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(Places,))
-async def get_current_pois(context: Context) -> list[PoseEntry]:
+def get_current_pois(context: Context) -> list[PoseEntry]:
     """Return all points of interest, oldest first."""
     return [entry_of(place) for place in context.robot[Places].all()]
 
@@ -41,7 +41,7 @@ async def adjust_pois(context: Context) -> None:
 
 
 @TABLE.on(f"GET {API}/{{poi_id}}", right=Right.SEE, needs=(Places,))
-async def get_poi_by_id(context: Context, poi_id: Identifier) -> PoseEntry:
+def get_poi_by_id(context: Context, poi_id: Identifier) -> PoseEntry:
     """Return a point; 404 if there is none."""
     return entry_of(context.robot[Places].get(poi_id))
 

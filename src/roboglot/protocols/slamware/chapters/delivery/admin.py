@@ -52,7 +52,7 @@ async def _set(context: Context, policy: Policy) -> OperationReply:
 
 
 @TABLE.on(f"GET {API}/admin/password", right=Right.ADMIN, needs=(Settings,))
-async def get_password(context: Context) -> AdminPassword:
+def get_password(context: Context) -> AdminPassword:
     """Return the password of the settings on the robot's screen; it never expires."""
     return AdminPassword(msgspec.convert(context.robot[Settings].get(PASSWORD, {"enable": False}), Password))
 
@@ -68,7 +68,7 @@ async def set_password(context: Context, body: Password | None = None) -> Operat
 
 
 @TABLE.on(f"GET {API}/admin/mode", right=Right.SEE, needs=(Delivery,))
-async def get_work_mode(context: Context) -> WorkModeEntry:
+def get_work_mode(context: Context) -> WorkModeEntry:
     """Return the work mode: the tasks that may be created at the robot."""
     return msgspec.convert({"work_mode": context.robot[Delivery].policy.work_mode.value.upper()}, WorkModeEntry)
 
@@ -80,7 +80,7 @@ async def set_work_mode(context: Context, body: WorkModeEntry) -> OperationReply
 
 
 @TABLE.on(f"GET {API}/admin/language", right=Right.SEE, needs=(Settings,))
-async def get_language(context: Context) -> Language:
+def get_language(context: Context) -> Language:
     """Return the language; Chinese by default."""
     return Language(language_of(context.robot))
 
@@ -95,7 +95,7 @@ async def set_language(context: Context, body: Language) -> OperationReply:
 
 
 @TABLE.on(f"GET {API}/admin/working_time", right=Right.SEE, needs=(Delivery,))
-async def get_working_time(context: Context) -> WorkingTime:
+def get_working_time(context: Context) -> WorkingTime:
     """Return the working hours, UTC; no hours: always."""
     policy = context.robot[Delivery].policy
     return WorkingTime([Hours(_clock(a), _clock(b)) for a, b in policy.hours], list(policy.rest_days))
@@ -119,7 +119,7 @@ def _clock(seconds: int) -> str:
 
 
 @TABLE.on(f"GET {API}/admin/move_options", right=Right.SEE, needs=(Delivery,))
-async def get_move_options(context: Context) -> MoveOptions:
+def get_move_options(context: Context) -> MoveOptions:
     """Return the settings for driving in tasks."""
     return _effective(msgspec.convert(dict(context.robot[Delivery].policy.words), MoveOptions))
 
@@ -161,7 +161,7 @@ def _effective(how: MoveOptions) -> MoveOptions:
 
 
 @TABLE.on(f"GET {API}/admin/line_speed", right=Right.SEE, needs=(Base, Delivery))
-async def get_line_speed(context: Context) -> LineSpeed:
+def get_line_speed(context: Context) -> LineSpeed:
     """Return the speeds on the way to people and back, m/s; by default the robot's top speed."""
     policy, most = context.robot[Delivery].policy, context.robot[Base].limits.twist.x
     there = most if policy.delivery_speed is None else policy.delivery_speed
@@ -178,7 +178,7 @@ async def set_line_speed(context: Context, body: LineSpeed) -> None:
 
 
 @TABLE.on(f"GET {API}/configurations", right=Right.SEE, needs=(Settings,))
-async def get_configurations(context: Context) -> Configuration:
+def get_configurations(context: Context) -> Configuration:
     """Return the machine's configuration; it does not relocalize when parked."""
     plate = context.robot.description
     cargos = all_cargos(context.robot) if Cargo in context.robot else []
@@ -186,7 +186,7 @@ async def get_configurations(context: Context) -> Configuration:
 
 
 @TABLE.on(f"GET {API}/settings", right=Right.SEE, needs=(Delivery,))
-async def get_delivery_settings(context: Context) -> WrappedSettings:
+def get_delivery_settings(context: Context) -> WrappedSettings:
     """Return battery levels (percent) and time-outs (s)."""
     policy = context.robot[Delivery].policy
     levels = BatteryLevels(policy.level_off, policy.level_home, policy.level_no_cloud, policy.level_no_takeout)
@@ -207,7 +207,7 @@ async def set_timeout_settings(context: Context, body: TimeoutChange) -> None:
 
 
 @TABLE.on(f"GET {API}/voice_resources", right=Right.SEE, needs=(Settings,))
-async def get_voice_resources(context: Context) -> VoicePackages:
+def get_voice_resources(context: Context) -> VoicePackages:
     """Return the cloud's voice packages; ``result`` false without a cloud, or out of reach."""
     if not context.cloud.reached:
         why = "the cloud is out of reach" if context.cloud.managed else "no cloud manages this robot"

@@ -41,26 +41,26 @@ def all_cargos(robot: Robot) -> list[Cargo]:
 
 
 @TABLE.on(f"GET {CARGOS}", right=Right.SEE, needs=(CargoComponent,))
-async def get_cargos(context: Context) -> list[Cargo]:
+def get_cargos(context: Context) -> list[Cargo]:
     """Return all cargos with the state of each box."""
     return all_cargos(context.robot)
 
 
 @TABLE.on(f"GET {BOXES}", right=Right.SEE, needs=(CargoComponent,))
-async def get_cargo_boxes(context: Context, cargo_id: str) -> list[Box]:
+def get_cargo_boxes(context: Context, cargo_id: str) -> list[Box]:
     """Return the boxes of a cargo; 404 if there is none."""
     cargo = context.robot[CargoComponent]
     return [box_of(cargo.box(id)) for id in _compartment(context, cargo_id).boxes]
 
 
 @TABLE.on(f"GET {BOXES}/{{box_id}}", right=Right.SEE, needs=(CargoComponent,))
-async def get_cargo_box(context: Context, cargo_id: str, box_id: int) -> Box:
+def get_cargo_box(context: Context, cargo_id: str, box_id: int) -> Box:
     """Return a box; 404 if the cargo has none of that number."""
     return box_of(context.robot[CargoComponent].box(_box_id(context, cargo_id, box_id)))
 
 
 @TABLE.on(f"PUT {BOXES}/{{box_id}}/{{op}}", right=Right.DRIVE, needs=(CargoComponent,))
-async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
+def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[":open", ":close"]) -> None:
     """Start opening or closing a box; ``operation_result`` has the outcome."""
     cargo, id = context.robot[CargoComponent], _box_id(context, cargo_id, box_id)
     if op == ":open":
@@ -70,7 +70,7 @@ async def operate_box(context: Context, cargo_id: str, box_id: int, op: Literal[
 
 
 @TABLE.on(f"GET {BOXES}/{{box_id}}/operation_result", right=Right.SEE, needs=(CargoComponent,))
-async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> OperationResult:
+def get_operation_result(context: Context, cargo_id: str, box_id: int) -> OperationResult:
     """Return the last opening or closing of the box; 404 if there was none."""
     id = _box_id(context, cargo_id, box_id)
     if (action := context.boxes.last(id)) is None:
@@ -89,7 +89,7 @@ async def get_operation_result(context: Context, cargo_id: str, box_id: int) -> 
 
 
 @TABLE.on(f"GET {CARGOS}/assigned", right=Right.SEE, needs=(Delivery, Places))
-async def get_assigned_cargos(context: Context) -> list[AssignedCargo]:
+def get_assigned_cargos(context: Context) -> list[AssignedCargo]:
     """Return the boxes that belong to takeouts that have not ended."""
     return [
         AssignedCargo(

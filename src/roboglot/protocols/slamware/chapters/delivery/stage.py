@@ -29,7 +29,7 @@ LANDING = {None: "INITIALIZING", "approaching": "GOING_TO_LANDING_POINT"}  # by 
 
 
 @TABLE.on("GET /api/delivery/v1/stage", right=Right.SEE, needs=(Delivery, Places))
-async def get_stage(context: Context) -> TaskStage:
+def get_stage(context: Context) -> TaskStage:
     """Return the stage: a fault that stops the robot comes before the task, and that before the way to rest."""
     delivery, floor = context.robot[Delivery], context.maps.current.floor
     if errors := _errors(context):

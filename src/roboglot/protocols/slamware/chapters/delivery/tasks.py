@@ -40,7 +40,7 @@ StatusFilter = Literal["ready", "running", "succeeded", "failed", "all"]
 
 
 @TABLE.on(f"GET {TASKS}", right=Right.SEE, needs=(Delivery, Places))
-async def get_tasks(
+def get_tasks(
     context: Context, type: KindFilter | None = None, status: StatusFilter | None = None
 ) -> list[DeliveryTask]:
     """Return ready and running tasks, oldest first; with ``status`` "all", ended ones, too."""

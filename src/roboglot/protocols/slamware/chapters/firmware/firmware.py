@@ -71,7 +71,7 @@ class InstalledApp(msgspec.Struct):
 
 
 @TABLE.on(f"GET {API}/newversion", right=Right.SEE, needs=(Firmware,))
-async def get_new_version(context: Context) -> FirmwareInfo:
+def get_new_version(context: Context) -> FirmwareInfo:
     """Return the version offered by the manufacturer, if newer than the running one."""
     plate = context.robot.description
     if (package := context.robot[Firmware].available) is None:
@@ -80,7 +80,7 @@ async def get_new_version(context: Context) -> FirmwareInfo:
 
 
 @TABLE.on(f"GET {API}/autoupdate/:enable", right=Right.SEE, needs=(Firmware,))
-async def get_enable_auto_update(context: Context) -> bool:
+def get_enable_auto_update(context: Context) -> bool:
     """Return whether the robot updates itself on its dock."""
     return context.robot[Firmware].automatic
 
@@ -92,7 +92,7 @@ async def set_enable_auto_update(context: Context, body: Switch) -> None:
 
 
 @TABLE.on(f"POST {API}/autoupdate/:start", right=Right.ADMIN, needs=(Firmware,))
-async def start_update(context: Context) -> Outcome:
+def start_update(context: Context) -> Outcome:
     """Download the newest version, install it and restart."""
     firmware = context.robot[Firmware]
     if firmware.available is None:
@@ -104,7 +104,7 @@ async def start_update(context: Context) -> Outcome:
 
 
 @TABLE.on(f"POST {API}/update/:start", right=Right.ADMIN, needs=(Disk, Firmware))
-async def upload_and_start_update(context: Context, body: Upload) -> UploadOutcome:
+def upload_and_start_update(context: Context, body: Upload) -> UploadOutcome:
     """Install the uploaded package, whatever its version, and restart; a zip archive with ``firmware.json``."""
     firmware, plate = context.robot[Firmware], context.robot.description
     if context.updater.busy or firmware.progress.state not in IDLE:
@@ -122,7 +122,7 @@ async def upload_and_start_update(context: Context, body: Upload) -> UploadOutco
 
 
 @TABLE.on(f"GET {API}/progress", right=Right.SEE, needs=(Firmware,))
-async def get_firmware_progress(context: Context) -> UpdateProgress:
+def get_firmware_progress(context: Context) -> UpdateProgress:
     """Return the progress of the update."""
     progress = context.robot[Firmware].progress
     step, status = PROGRESS[progress.state]
@@ -133,7 +133,7 @@ async def get_firmware_progress(context: Context) -> UpdateProgress:
 
 
 @TABLE.on(f"GET {APPS}", right=Right.SEE, needs=(Apps,))
-async def get_apps(context: Context) -> list[InstalledApp]:
+def get_apps(context: Context) -> list[InstalledApp]:
     """Return the installed apps."""
     return [InstalledApp(app.name, app.version) for app in context.robot[Apps].all()]
 

@@ -89,7 +89,7 @@ FACTORIES: dict[str, Factory] = {
 
 
 @TABLE.on(f"GET {API}/action-factories", right=Right.SEE)
-async def get_action_factories(context: Context) -> list[ActionFactory]:
+def get_action_factories(context: Context) -> list[ActionFactory]:
     """Return the kinds of action that this robot can do."""
     return [
         ActionFactory(context.actions.prefix + word)
@@ -99,45 +99,45 @@ async def get_action_factories(context: Context) -> list[ActionFactory]:
 
 
 @TABLE.on(f"POST {API}/actions", right=Right.DRIVE)
-async def create_action(context: Context, body: ActionRequest) -> ActionInfo:
+def create_action(context: Context, body: ActionRequest) -> ActionInfo:
     """Start an action in place of the current one; 400 for unknown or unsupported ones."""
     return context.actions.enter(body.action_name, create(context, body))
 
 
 @TABLE.on(f"GET {API}/actions/:current", right=Right.SEE)
-async def get_current_action(context: Context) -> ActionInfo:
+def get_current_action(context: Context) -> ActionInfo:
     """Return the running action; 404 when there is none."""
     return context.actions.current_info()
 
 
 @TABLE.on(f"DELETE {API}/actions/:current", right=Right.DRIVE)
-async def abort_current_action(context: Context) -> None:
+def abort_current_action(context: Context) -> None:
     """Stop the robot, no matter which client moves it; no effect at rest."""
     context.actions.abort()
 
 
 @TABLE.on(f"GET {API}/actions/{{action_id}}", right=Right.SEE)
-async def get_action_result(context: Context, action_id: int) -> ActionInfo | ActionGravestone:
+def get_action_result(context: Context, action_id: int) -> ActionInfo | ActionGravestone:
     """Return an action under way, or the result of one of the last 20; 404 otherwise."""
     return context.actions.look_up(action_id)
 
 
 @TABLE.on(f"GET {API}/path", right=Right.SEE)
-async def get_remaining_path(context: Context) -> PathPoints:
+def get_remaining_path(context: Context) -> PathPoints:
     """Return the remaining path; empty when the robot has no goal."""
     feedback = _navigation(context)
     return _path_points(feedback.remaining.points if feedback else ())
 
 
 @TABLE.on(f"GET {API}/milestones", right=Right.SEE)
-async def get_remaining_milestones(context: Context) -> PathPoints:
+def get_remaining_milestones(context: Context) -> PathPoints:
     """Return the goals that remain."""
     feedback = _navigation(context)
     return _path_points(feedback.milestones if feedback else ())
 
 
 @TABLE.on(f"GET {API}/speed", right=Right.SEE, needs=(Odometry,))
-async def get_current_speed(context: Context) -> Speed:
+def get_current_speed(context: Context) -> Speed:
     """Return the robot's velocity by its odometry."""
     require_heard(context.robot)
     twist = context.robot[Odometry].reading.twist
@@ -145,7 +145,7 @@ async def get_current_speed(context: Context) -> Speed:
 
 
 @TABLE.on(f"GET {API}/time", right=Right.SEE)
-async def get_remaining_time(context: Context) -> float:
+def get_remaining_time(context: Context) -> float:
     """Return the seconds to the goal; 0 without one."""
     feedback = _navigation(context)
     return feedback.time_to_goal if feedback else 0.0

@@ -26,14 +26,14 @@ def _current(robot: Robot) -> str:
 
 
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(Navigation,))
-async def get_motion_strategies(context: Context) -> list[str]:
+def get_motion_strategies(context: Context) -> list[str]:
     """Return all strategies."""
     _ = context.robot[Navigation]
     return list(SHARES)
 
 
 @TABLE.on(f"GET {API}/:current", right=Right.SEE, needs=(Navigation,))
-async def get_current_strategy(context: Context) -> Text:
+def get_current_strategy(context: Context) -> Text:
     """Return the current strategy."""
     _ = context.robot[Navigation]
     return Text(_current(context.robot))

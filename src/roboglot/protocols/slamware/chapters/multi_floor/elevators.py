@@ -144,19 +144,19 @@ def elevator_called(robot: Robot, id: str) -> Elevator:
 
 
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(MapAnnotations,))
-async def get_elevators(context: Context) -> list[ElevatorInfo]:
+def get_elevators(context: Context) -> list[ElevatorInfo]:
     """Return the elevators of this floor and their waiting places."""
     return [elevator.info for elevator in elevators_here(context.robot)]
 
 
 @TABLE.on(f"GET {API}/{{elevator_id}}", right=Right.SEE, needs=(MapAnnotations,))
-async def get_elevators_by_id(context: Context, elevator_id: Identifier) -> ElevatorInfo:
+def get_elevators_by_id(context: Context, elevator_id: Identifier) -> ElevatorInfo:
     """Return an elevator; 400 if there is none."""
     return elevator_called(context.robot, elevator_id).info
 
 
 @TABLE.on(f"GET {API}/{{elevator_id}}/pose_relation", right=Right.SEE, needs=(Localization, MapAnnotations))
-async def get_pose_relation_to_elevator(context: Context, elevator_id: Identifier) -> PoseRelation:
+def get_pose_relation_to_elevator(context: Context, elevator_id: Identifier) -> PoseRelation:
     """Return whether the robot is in the elevator, over its sill or outside; 400 if there is none."""
     robot = context.robot
     return elevator_called(robot, elevator_id).relation(robot[Localization].pose, robot.description.radius)

@@ -47,7 +47,7 @@ MAP, LOCALIZATION = "/api/multi-floor/map/v1", "/api/multi-floor/localization/v1
 
 
 @TABLE.on("GET /api/multi-floor/status", right=Right.SEE, needs=(Mapping, Settings))
-async def get_status(context: Context) -> MultiFloorStatus:
+def get_status(context: Context) -> MultiFloorStatus:
     """Return the status of the map on disk."""
     return MultiFloorStatus(
         context.robot[Mapping].enabled, context.maps.status, is_managed_by_cloud=context.cloud.managed
@@ -107,14 +107,14 @@ async def unbind_scene(context: Context, body: Unbinding | None = None) -> None:
 
 
 @TABLE.on(f"GET {MAP}/floors", right=Right.SEE)
-async def get_floors(context: Context) -> list[FloorInfo]:
+def get_floors(context: Context) -> list[FloorInfo]:
     """Return the floors of the loaded map; none before the first load."""
     names = (floor.name for floor in context.maps.floors)
     return [FloorInfo(name.building, name.floor, name.order, name.default) for name in names]
 
 
 @TABLE.on(f"GET {MAP}/floors/:current", right=Right.SEE, needs=(Localization, MapAnnotations))
-async def get_current_floor(context: Context) -> CurrentFloorInfo:
+def get_current_floor(context: Context) -> CurrentFloorInfo:
     """Return the floor whose map is in memory, and the elevator that the robot is in."""
     name = context.maps.current
     return CurrentFloorInfo(name.building, name.floor, elevator_around(context.robot), name.map_id)
@@ -150,21 +150,19 @@ def _dock(name: FloorName, dock: PointOfInterest) -> DockInfo:
 
 
 @TABLE.on(f"GET {MAP}/pois", right=Right.SEE)
-async def get_all_pois(context: Context, floor: FloorText = "", building: FloorText = "") -> list[PoiInfo]:
+def get_all_pois(context: Context, floor: FloorText = "", building: FloorText = "") -> list[PoiInfo]:
     """Return the places of the loaded map, of one floor or of all; new ones appear after a sync."""
     return [_poi(f.name, place) for f in _asked(context, floor, building) for place in f.places]
 
 
 @TABLE.on(f"GET {MAP}/homedocks", right=Right.SEE)
-async def get_multi_floor_home_docks(
-    context: Context, floor: FloorText = "", building: FloorText = ""
-) -> list[DockInfo]:
+def get_multi_floor_home_docks(context: Context, floor: FloorText = "", building: FloorText = "") -> list[DockInfo]:
     """Return the docks of the loaded map, of one floor or of all."""
     return [_dock(f.name, dock) for f in _asked(context, floor, building) for dock in f.annotations.docks]
 
 
 @TABLE.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE, needs=(Localization, MapAnnotations))
-async def search_nearby_poi(context: Context) -> NearbyPoi:
+def search_nearby_poi(context: Context) -> NearbyPoi:
     """Return the nearest place on this floor; ON_DOCK, IN_ELEVATOR, or UNKNOWN if there is none."""
     if DockContact in context.robot and context.robot[DockContact].docked:
         return NearbyPoi("ON_DOCK", relative_pose=Point(0.0, 0.0))
@@ -180,7 +178,7 @@ async def search_nearby_poi(context: Context) -> NearbyPoi:
 
 
 @TABLE.on(f"POST {MAP}/homedocks/:search_nearby", right=Right.SEE, needs=(Localization,))
-async def search_nearby_home_dock(context: Context) -> DockInfo:
+def search_nearby_home_dock(context: Context) -> DockInfo:
     """Return the nearest dock on this floor, in a straight line; 404 if there is none."""
     here = context.robot[Localization].pose
     docks = [(floor, dock) for floor in _here(context) for dock in floor.annotations.docks]
@@ -196,7 +194,7 @@ def _here(context: Context) -> list[FloorMap]:
 
 
 @TABLE.on(f"GET {MAP}/homedocks/:current", right=Right.SEE, needs=(Settings,))
-async def get_current_home_dock(context: Context) -> BoundDock:
+def get_current_home_dock(context: Context) -> BoundDock:
     """Return the dock that the robot is bound to."""
     bound = context.robot[Settings].get(BOUND)
     found = _find_dock(context, bound) if bound else None
@@ -220,7 +218,7 @@ async def set_current_home_dock(context: Context, body: DockChoice) -> None:
 
 
 @TABLE.on(f"PUT {LOCALIZATION}/pose", right=Right.DRIVE, needs=(Localization,))
-async def set_pose_by_poi(context: Context, body: PoiChoice) -> bool:
+def set_pose_by_poi(context: Context, body: PoiChoice) -> bool:
     """Set the robot's pose to a place of the floor, by name or id; 404 if there is none."""
     for place in (place for floor in _here(context) for place in floor.places):
         if body.poi_name in (place.metadata.get(NAME), place.id):
@@ -230,7 +228,7 @@ async def set_pose_by_poi(context: Context, body: PoiChoice) -> bool:
 
 
 @TABLE.on(f"PUT {LOCALIZATION}/homedock", right=Right.DRIVE, needs=(Docking, Localization, MapAnnotations, Settings))
-async def set_pose_by_homedock(context: Context, body: DockChoice | None = None) -> None:
+def set_pose_by_homedock(context: Context, body: DockChoice | None = None) -> None:
     """Set the robot's pose to the front of a dock, by default its own; 404 if there is none."""
     if body is None:
         dock = home_dock(context.robot)

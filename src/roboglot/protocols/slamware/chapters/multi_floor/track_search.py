@@ -15,7 +15,7 @@ from roboglot.wire.slamware.chapters.multi_floor import TrackQuery
 
 
 @TABLE.on("POST /api/multi-floor/map/v1/search_path_points", right=Right.SEE, needs=(Localization, MapAnnotations))
-async def search_path_points_in_graph(context: Context, body: TrackQuery) -> PathPoints:
+def search_path_points_in_graph(context: Context, body: TrackQuery) -> PathPoints:
     """Return the shortest way along the tracks, each from its start to its end only if ``with_direction``.
 
     Empty if there is none; 400 for a floor that is not loaded, or for another one without a start.

@@ -12,12 +12,12 @@ API = "/api/platform/v1"
 
 
 @TABLE.on(f"GET {API}/timestamp", right=Right.SEE)
-async def get_timestamp(context: Context) -> str:
+def get_timestamp(context: Context) -> str:
     """Return milliseconds since the start, as text."""
     return milliseconds(context.robot.clock.time())
 
 
 @TABLE.on(f"GET {API}/events", right=Right.SEE)
-async def get_events(context: Context) -> list[RobotEvent]:
+def get_events(context: Context) -> list[RobotEvent]:
     """Return the events since the last call."""
     return context.events.read()

@@ -41,7 +41,7 @@ def _entered(robot: Robot, entry: PoseEntry) -> PointOfInterest:
 
 
 @TABLE.on(f"GET {API}/homepose", right=Right.SEE, needs=(Docking,))
-async def get_home_pose(context: Context) -> Pose3D:
+def get_home_pose(context: Context) -> Pose3D:
     """Return the robot's pose when docked; 404 if it knows no dock."""
     if (home := context.robot[Docking].home) is None:
         raise DockNotFound("the map has no dock")
@@ -62,7 +62,7 @@ async def set_home_pose(context: Context, body: Pose3D) -> bool:
 
 
 @TABLE.on(f"GET {API}/homedocks", right=Right.SEE, needs=(Docking, MapAnnotations, Settings))
-async def get_home_docks(context: Context) -> list[PoseEntry]:
+def get_home_docks(context: Context) -> list[PoseEntry]:
     """The docks on the map."""
     return [entry_of(dock) for dock in known_docks(context.robot)]
 

@@ -37,47 +37,47 @@ Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
 @TABLE.on(f"GET {API}/localization/pose", right=Right.SEE, needs=(Localization,))
-async def get_pose(context: Context) -> Pose3D:
+def get_pose(context: Context) -> Pose3D:
     """Return the robot's pose in the map."""
     require_heard(context.robot)
     return pose3d(context.robot[Localization].pose)
 
 
 @TABLE.on(f"PUT {API}/localization/pose", right=Right.DRIVE, needs=(Localization,))
-async def set_pose(context: Context, body: Pose3D) -> None:
+def set_pose(context: Context, body: Pose3D) -> None:
     """Set the robot's pose in the map."""
     context.robot[Localization].set_pose(pose_of(body))
 
 
 @TABLE.on(f"GET {API}/localization/odopose", right=Right.SEE, needs=(Odometry,))
-async def get_odo_pose(context: Context) -> Pose3D:
+def get_odo_pose(context: Context) -> Pose3D:
     """Return the robot's pose by its wheels, from where it started."""
     require_heard(context.robot)
     return pose3d(context.robot[Odometry].reading.pose)
 
 
 @TABLE.on(f"GET {API}/localization/quality", right=Right.SEE, needs=(Localization,))
-async def get_localization_quality(context: Context) -> int:
+def get_localization_quality(context: Context) -> int:
     """Return the fit of the lidar's scans to the map, 0..100."""
     require_heard(context.robot)
     return round(context.robot[Localization].quality * 100)
 
 
 @TABLE.on(f"GET {API}/localization/:enable", right=Right.SEE, needs=(Localization,))
-async def get_map_localization(context: Context) -> bool:
+def get_map_localization(context: Context) -> bool:
     """Return whether the lidar corrects the pose."""
     return context.robot[Localization].enabled
 
 
 @TABLE.on(f"PUT {API}/localization/:enable", right=Right.EDIT, needs=(Localization,))
-async def set_map_localization(context: Context, body: Switch) -> bool:
+def set_map_localization(context: Context, body: Switch) -> bool:
     """Switch the correction of the pose by the lidar; off, it follows the wheels alone."""
     context.robot[Localization].enable(body.enable)
     return True
 
 
 @TABLE.on(f"POST {API}/localization/status/:reset", right=Right.DRIVE, needs=(Localization,))
-async def reset_localization_status(context: Context) -> bool:
+def reset_localization_status(context: Context) -> bool:
     """Restart localization at the current pose, searched in a wide circle by the lidar."""
     robot = context.robot
     robot[Localization].set_pose(robot[Localization].pose)
@@ -89,33 +89,33 @@ async def reset_localization_status(context: Context) -> bool:
 
 
 @TABLE.on(f"GET {API}/mapping/:enable", right=Right.SEE, needs=(Mapping,))
-async def get_map_update(context: Context) -> bool:
+def get_map_update(context: Context) -> bool:
     """Return whether the lidar updates the map."""
     return context.robot[Mapping].enabled
 
 
 @TABLE.on(f"PUT {API}/mapping/:enable", right=Right.EDIT, needs=(Mapping,))
-async def set_map_update(context: Context, body: Switch) -> bool:
+def set_map_update(context: Context, body: Switch) -> bool:
     """Switch updates of the map by the lidar."""
     context.robot[Mapping].enable(body.enable)
     return True
 
 
 @TABLE.on(f"GET {API}/loopclosure/:enable", right=Right.SEE, needs=(Mapping,))
-async def get_loop_closure(context: Context) -> bool:
+def get_loop_closure(context: Context) -> bool:
     """Return whether loop closures correct the map."""
     return context.robot[Mapping].closes_loops
 
 
 @TABLE.on(f"PUT {API}/loopclosure/:enable", right=Right.EDIT, needs=(Mapping,))
-async def set_loop_closure(context: Context, body: Switch) -> bool:
+def set_loop_closure(context: Context, body: Switch) -> bool:
     """Switch loop closures."""
     context.robot[Mapping].close_loops(body.enable)
     return True
 
 
 @TABLE.on(f"GET {API}/imu", right=Right.SEE, needs=(Imu,))
-async def get_imu(context: Context) -> ImuData:
+def get_imu(context: Context) -> ImuData:
     """Return attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
     require_heard(context.robot)
     imu = context.robot[Imu]
@@ -127,7 +127,7 @@ async def get_imu(context: Context) -> ImuData:
 
 
 @TABLE.on(f"GET {API}/knownarea", right=Right.SEE, needs=(Mapping,))
-async def get_known_area(context: Context) -> Rectangle:
+def get_known_area(context: Context) -> Rectangle:
     """Return the extent of the map, m."""
     grid = context.robot[Mapping].grid
     return Rectangle(grid.origin.x, grid.origin.y, grid.width * grid.resolution, grid.height * grid.resolution)

@@ -34,7 +34,7 @@ Bound = Annotated[float, msgspec.Meta(ge=-COORDINATE_MAX, le=COORDINATE_MAX)]
 
 
 @TABLE.on(f"GET {API}/maps/explore", right=Right.SEE, needs=(Mapping,))
-async def get_explore_map(
+def get_explore_map(
     context: Context,
     min_x: Bound | None = None,
     min_y: Bound | None = None,
@@ -54,7 +54,7 @@ async def get_explore_map(
 
 
 @TABLE.on(f"GET {API}/maps/stcm", right=Right.SEE, needs=(Docking, MapAnnotations, Mapping, Places, Settings))
-async def get_composite_map(context: Context) -> bytes:
+def get_composite_map(context: Context) -> bytes:
     """Return the map with all its drawings as a composite map; 403 while one is being loaded."""
     return context.maps.export()
 

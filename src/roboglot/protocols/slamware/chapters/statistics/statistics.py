@@ -11,12 +11,12 @@ API = "/api/core/statistics/v1"
 
 
 @TABLE.on(f"GET {API}/odometry", right=Right.SEE, needs=(Odometry,))
-async def get_odometry(context: Context) -> float:
+def get_odometry(context: Context) -> float:
     """Return the metres travelled."""
     return round(context.totals.metres, 3)
 
 
 @TABLE.on(f"GET {API}/runtime", right=Right.SEE)
-async def get_runtime(context: Context) -> float:
+def get_runtime(context: Context) -> float:
     """Return the seconds of robot time."""
     return round(context.totals.seconds, 3)

@@ -55,13 +55,13 @@ class JackStatus(msgspec.Struct):
 
 
 @TABLE.on(f"POST {SYSTEM}/aeb/control", right=Right.EDIT, needs=(EmergencyBraking,))
-async def set_aeb_control(context: Context, body: OnOff) -> None:
+def set_aeb_control(context: Context, body: OnOff) -> None:
     """Switch automatic emergency braking."""
     context.robot[EmergencyBraking].enable(body is OnOff.ON)
 
 
 @TABLE.on(f"POST {SYSTEM}/jack/status", right=Right.DRIVE, needs=(Jack,))
-async def set_jack_req(context: Context, body: JackCommand) -> None:
+def set_jack_req(context: Context, body: JackCommand) -> None:
     """Lift (Up, On), set down (Down, Off), stop, or acknowledge the alarm."""
     jack = context.robot[Jack]
     match body:
@@ -77,7 +77,7 @@ async def set_jack_req(context: Context, body: JackCommand) -> None:
 
 
 @TABLE.on(f"GET {SYSTEM}/jack/status", right=Right.SEE, needs=(Jack,))
-async def get_jack_status(context: Context) -> JackStatus:
+def get_jack_status(context: Context) -> JackStatus:
     """Return the position and state of the jack's platform."""
     jack = context.robot[Jack]
     counts = LOWEST + round(jack.position / jack.stroke * (HIGHEST - LOWEST))
@@ -85,13 +85,13 @@ async def get_jack_status(context: Context) -> JackStatus:
 
 
 @TABLE.on(f"PUT {SENSORS}/depth/:enable", right=Right.EDIT, needs=(DepthCamera,))
-async def set_depth_sensor_state(context: Context, body: Switch) -> None:
+def set_depth_sensor_state(context: Context, body: Switch) -> None:
     """Switch the depth camera."""
     context.robot[DepthCamera].enable(body.enable)
 
 
 @TABLE.on(f"GET {SENSORS}/masks", right=Right.SEE, needs=(SensorMasks,))
-async def get_disabled_sensors_mask_data(context: Context) -> list[DisabledSensor]:
+def get_disabled_sensors_mask_data(context: Context) -> list[DisabledSensor]:
     """Return the sensors that are switched off."""
     return [DisabledSensor(id, always) for id, always in sorted(context.robot[SensorMasks].masked.items())]
 

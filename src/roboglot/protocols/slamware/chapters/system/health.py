@@ -55,7 +55,7 @@ def record_of(fault: Fault) -> BaseError:
 
 
 @TABLE.on(f"GET {API}", right=Right.SEE)
-async def get_robot_health(context: Context) -> BaseHealthInfo:
+def get_robot_health(context: Context) -> BaseHealthInfo:
     """Return the current faults."""
     robot = context.robot
     records = _records(robot)
@@ -92,7 +92,7 @@ def _stopped(robot: Robot) -> bool:
 
 
 @TABLE.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)
-async def clear_robot_health(context: Context, error_code: int) -> None:
+def clear_robot_health(context: Context, error_code: int) -> None:
     """Dismiss a fault, which returns while its cause persists; 400 for an unknown code.
 
     The flags go on saying how the robot is.

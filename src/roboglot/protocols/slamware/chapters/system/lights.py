@@ -24,7 +24,7 @@ ZONES = {
 
 
 @TABLE.on("POST /api/core/system/v1/light/control", right=Right.DRIVE, needs=(Light,))
-async def set_light_control(context: Context, body: LightControl) -> None:
+def set_light_control(context: Context, body: LightControl) -> None:
     """Set the light of one half of a channel; 501 if the robot has no such strip."""
     light, zone = context.robot[Light], ZONES[body.channel, body.control_part]
     if zone not in light.zones:

@@ -26,7 +26,7 @@ BEST, WORST = -50.0, -100.0  # dBm that count as 100 and as 0
 
 
 @TABLE.on(f"GET {API}/status", right=Right.SEE, needs=(Network,))
-async def get_network_status(context: Context) -> WrappedStatus:
+def get_network_status(context: Context) -> WrappedStatus:
     """Return the link of the Wi-Fi card; switched off, it is a station without a network."""
     network = context.robot[Network]
     state = network.state
@@ -56,7 +56,7 @@ async def set_network_status(context: Context, body: NetworkRequest) -> bool:
 
 
 @TABLE.on(f"GET {API}/route", right=Right.SEE, needs=(Network,))
-async def get_network_route(context: Context) -> RouteStatus:
+def get_network_route(context: Context) -> RouteStatus:
     """Return the preferred uplink."""
     return RouteStatus(PRIORITIES[context.robot[Network].priority])
 
@@ -68,7 +68,7 @@ async def set_network_route(context: Context, body: RouteStatus) -> None:
 
 
 @TABLE.on(f"GET {API}/apn", right=Right.SEE, needs=(Network,))
-async def get_cmlink_apn(context: Context) -> ApnStatus:
+def get_cmlink_apn(context: Context) -> ApnStatus:
     """Return the modem's access point name."""
     if (mobile := context.robot[Network].mobile) is None:
         raise ComponentMissing(Network)

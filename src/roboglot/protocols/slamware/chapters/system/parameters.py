@@ -20,7 +20,7 @@ SWITCH = {"on": True, "off": False}
 
 
 @TABLE.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base, Docking))
-async def get_system_parameter(context: Context, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
+def get_system_parameter(context: Context, param: Annotated[str, msgspec.Meta(min_length=1)]) -> Text:
     """Return a top speed (m/s, rad/s), as text with six decimals, or when touched docks are registered."""
     match param:
         case "base.max_moving_speed":
@@ -35,7 +35,7 @@ async def get_system_parameter(context: Context, param: Annotated[str, msgspec.M
 
 
 @TABLE.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base, EmergencyStop))
-async def set_system_parameter(context: Context, body: Parameter) -> bool:
+def set_system_parameter(context: Context, body: Parameter) -> bool:
     """Set a speed limit, the emergency stop or the brake release."""
     match body.param:
         case "base.max_moving_speed":

@@ -17,7 +17,7 @@ MODULES = {RestartMode.SOFT: Module.SOFTWARE, RestartMode.BASE: Module.BASE}
 
 
 @TABLE.on(f"POST {API}/:shutdown", right=Right.ADMIN, needs=(Power,))
-async def shutdown(context: Context, body: Shutdown) -> bool:
+def shutdown(context: Context, body: Shutdown) -> bool:
     """Switch off, at once or later, and optionally on again. There are no answers while off."""
     restart = body.restart_time_interval * 60.0 or None
     context.robot[Power].shut_down(source=SOURCE, after=body.shutdown_time_interval * 60.0, restart_after=restart)
@@ -25,19 +25,19 @@ async def shutdown(context: Context, body: Shutdown) -> bool:
 
 
 @TABLE.on(f"POST {API}/:hibernate", right=Right.ADMIN, needs=(Power,))
-async def hibernate(context: Context) -> None:
+def hibernate(context: Context) -> None:
     """Sleep: the lidar rests and nothing moves until it is woken up."""
     context.robot[Power].sleep(source=SOURCE)
 
 
 @TABLE.on(f"POST {API}/:wakeup", right=Right.ADMIN, needs=(Power,))
-async def wakeup(context: Context) -> None:
+def wakeup(context: Context) -> None:
     """Wake up, which takes some seconds."""
     context.robot[Power].wake(source=SOURCE)
 
 
 @TABLE.on(f"POST {API}/:restartmodule", right=Right.ADMIN, needs=(Firmware,))
-async def restart_module(context: Context, body: Restart) -> bool:
+def restart_module(context: Context, body: Restart) -> bool:
     """Restart the robot (without answers meanwhile), its software, or its base; 403 during an update."""
     context.actions.abort()
     if body.mode is RestartMode.HARD:

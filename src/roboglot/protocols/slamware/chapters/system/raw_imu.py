@@ -13,14 +13,14 @@ API = "/api/core/system/v1"
 
 
 @TABLE.on(f"GET {API}/rawadcimu", right=Right.SEE, needs=(Imu,))
-async def get_imu_raw_adc_data(context: Context) -> ImuCounts:
+def get_imu_raw_adc_data(context: Context) -> ImuCounts:
     """Return the counts of accelerometer, gyro and compass."""
     raw = context.robot[Imu].raw
     return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
 
 
 @TABLE.on(f"GET {API}/rawimu", right=Right.SEE, needs=(Imu,))
-async def get_imu_raw_data(context: Context) -> ImuValues:
+def get_imu_raw_data(context: Context) -> ImuValues:
     """Return the uncorrected readings in m/s2, rad/s and microtesla."""
     raw = context.robot[Imu].raw
     a, r, f = in_units(raw)

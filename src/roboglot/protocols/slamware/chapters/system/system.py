@@ -42,7 +42,7 @@ SLEEP_MODES = {
 
 
 @TABLE.on(f"GET {API}/capabilities", right=Right.SEE)
-async def get_capabilities(context: Context) -> list[Capability]:
+def get_capabilities(context: Context) -> list[Capability]:
     """Return this robot's capabilities; ``core`` is enabled once it can navigate and its lidar turns.
 
     ``multi_floor`` is enabled while no map is being loaded.
@@ -59,7 +59,7 @@ async def get_capabilities(context: Context) -> list[Capability]:
 
 
 @TABLE.on(f"GET {API}/power/status", right=Right.SEE, needs=(Battery,))
-async def get_power_status(context: Context) -> PowerStatus:
+def get_power_status(context: Context) -> PowerStatus:
     """Return the state of battery, dock and power mode."""
     require_heard(context.robot)
     state = context.robot[Battery].state
@@ -77,7 +77,7 @@ async def get_power_status(context: Context) -> PowerStatus:
 
 
 @TABLE.on(f"GET {API}/battery/pack", right=Right.SEE, needs=(Battery,))
-async def get_battery_pack(context: Context) -> BatteryPack:
+def get_battery_pack(context: Context) -> BatteryPack:
     """Return current (mA, positive: charging) and temperature (0.1 degrees Celsius)."""
     require_heard(context.robot)
     state = context.robot[Battery].state
@@ -85,7 +85,7 @@ async def get_battery_pack(context: Context) -> BatteryPack:
 
 
 @TABLE.on(f"GET {API}/robot/info", right=Right.SEE)
-async def get_robot_info(context: Context) -> DeviceInfo:
+def get_robot_info(context: Context) -> DeviceInfo:
     """Return the name plate; numbers that only the vendor assigns are derived from names, and stable."""
     plate = context.robot.description
     return DeviceInfo(
@@ -111,7 +111,7 @@ def device_id(serial: str) -> str:
 
 
 @TABLE.on(f"GET {API}/laserscan", right=Right.SEE, needs=(Lidar, Localization, Odometry))
-async def get_laser_scan(context: Context) -> LaserScan:
+def get_laser_scan(context: Context) -> LaserScan:
     """Return the lidar's last turn (rad from straight ahead, m) and the robot's pose at its time."""
     _ = context.robot[Lidar]
     return LaserScan(pose3d(context.laser.pose), context.laser.points)
