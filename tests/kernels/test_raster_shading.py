@@ -107,7 +107,7 @@ def test_texture_and_light_are_exact_for_each_pixel(ends, tile):
         assert np.abs(plane - (128 + light[even] * (first + step * mixed[even]))).max() < 6.0
 
 
-def test_plain_walls_are_even_far_ones_take_smaller_copies():
+def test_plain_walls_are_even_far_ones_smooth():
     corners, mappings = wall(2.0, 2.0, 1.0)
     luma, blue, red = picture(corners, mappings, hills(), texture=-1)
     light = PAINT[6] * (DARKEST + (1 - DARKEST) / (1 + 2 * HAZE))
@@ -120,7 +120,7 @@ def test_plain_walls_are_even_far_ones_take_smaller_copies():
     assert OFFSETS[1] == 256 * 256
 
 
-def test_surfaces_look_alike_on_both_sides_of_a_post():
+def test_surfaces_look_alike_on_both_sides():
     mask, (corners, mappings) = hills(), wall(1.5, 4.0, 1.0)
     post = np.array([[(1.0, 0.03, -0.4), (1.0, -0.021, -0.4), (1.0, -0.021, 0.4), (1.0, 0.03, 0.4)]])
     alone, *_ = picture(corners, mappings, mask)
