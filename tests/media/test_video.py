@@ -8,7 +8,7 @@ import re
 import av
 import numpy as np
 
-from roboglot.media.h264 import H264Encoder
+from roboglot.media.h264 import BITRATE_MAX, H264Encoder
 from roboglot.media.video import VideoStream
 from tests.media.conftest import HEIGHT, WIDTH, number_of, picture
 from tests.narrowing import of_kind
@@ -52,6 +52,23 @@ def test_a_keyframe_comes_when_it_is_asked_for():
 
 def test_the_same_pictures_give_the_same_bytes():
     assert [packet.data for packet in encoded(10)] == [packet.data for packet in encoded(10)]
+
+
+def test_a_stream_that_is_too_large_becomes_coarser():
+    """Noise is more than fits; the picture stays whole over the change, and is fine again once it is calm."""
+    noise, encoder, packets = np.random.default_rng(3), H264Encoder(WIDTH, HEIGHT, 30.0), []
+    for i in range(180):
+        frame = picture(0, i / 30)
+        if i < 120:
+            frame.planes[:] = noise.integers(16, 236, frame.planes.shape)
+        packets.append(encoder.encode(frame))
+    sizes = [8 * sum(len(packet.data) for packet in packets[i : i + 30]) for i in range(0, 180, 30)]
+    assert sizes[0] > BITRATE_MAX
+    assert sizes[3] <= BITRATE_MAX
+    with av.open(io.BytesIO(b"".join(packet.data for packet in packets)), format="h264") as file:
+        seen = [of_kind(each, av.VideoFrame).to_ndarray()[:HEIGHT].astype(int) for each in file.decode(video=0)]
+    assert len(seen) == 180
+    assert np.abs(seen[-1] - frame.luma).mean() < 1.5
 
 
 def test_colours_are_declared_and_survive():
