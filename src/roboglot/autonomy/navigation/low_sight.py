@@ -6,6 +6,7 @@ Floors and ramps are no obstacles: only surfaces too steep for wheels and too hi
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import is_
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +40,9 @@ class LowSight:
 
         self._robot, self._height, self._radius = robot, robot.description.height, robot.description.radius
         self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # the newest image and its points
-        self._eyes: list[tuple[object, object]] = []  # rays and places of the zones' sensors at the last look
+        self._eyes: list[object] = []  # rays and places of the zones' sensors at the last look
         self._rays, self._places = np.empty((0, 0, 0, 3)), np.empty((0, 3))  # … the same as arrays
+        self._distances = np.empty((0, 0, 0))  # room for theirs
         self._sort_out: Sorting = sort_out
         self._sort_out_all: Sorting = sort_out_all
 
@@ -54,11 +56,11 @@ class LowSight:
             views.append(self._in_zones([eyes.reading(name) for name in eyes.names]))
         if not views:
             return LowView(NONE, NONE)
-        obstacles = np.concatenate([standing for standing, _ in views])
+        obstacles = _joined([standing for standing, _ in views if len(standing)])
         if len(obstacles) and Gripper in robot and robot[Gripper].status is not GripperStatus.OPEN:
             held = (obstacles[:, 0] > 0.0) & (obstacles[:, 0] < GRASP) & (np.abs(obstacles[:, 1]) < GRASP_SIDE)
             obstacles = obstacles[~held]
-        return LowView(obstacles, np.concatenate([floor for _, floor in views]))
+        return LowView(obstacles, _joined([floor for _, floor in views if len(floor)]))
 
     def _in_image(self, image: DepthImage) -> tuple[Points, Points]:
         """Return obstacle and floor points of a depth image; a slow camera's image is sorted only once."""
@@ -69,14 +71,20 @@ class LowSight:
 
     def _in_zones(self, readings: list[ZoneDistances]) -> tuple[Points, Points]:
         """Return obstacle and floor points in the zones of all time-of-flight sensors."""
-        eyes: list[tuple[object, object]] = [(reading.rays, reading.eye) for reading in readings]
-        if len(eyes) != len(self._eyes) or not all(
-            a is c and b is d for (a, b), (c, d) in zip(eyes, self._eyes, strict=True)
-        ):
+        eyes: list[object] = [reading.rays for reading in readings]
+        eyes += [reading.eye for reading in readings]
+        if len(eyes) != len(self._eyes) or not all(map(is_, eyes, self._eyes)):
             self._eyes, zones = eyes, readings[0].distances.shape
             self._rays = np.array([reading.rays for reading in readings], np.float64).reshape(-1, *zones, 3)
             self._places = np.array([(reading.eye.x, reading.eye.y, reading.eye.z) for reading in readings])
-        distances = np.empty(self._rays.shape[:3])
-        for row, reading in zip(distances, readings, strict=True):
+            self._distances = np.empty(self._rays.shape[:3])
+        for row, reading in zip(self._distances, readings, strict=True):
             row[:] = reading.distances
-        return self._sort_out_all(self._rays, distances, self._places, self._height, self._radius)
+        return self._sort_out_all(self._rays, self._distances, self._places, self._height, self._radius)
+
+
+def _joined(parts: list[Points]) -> Points:
+    """Return the parts as one array; most looks have one or none."""
+    if len(parts) > 1:
+        return np.concatenate(parts)
+    return parts[0] if parts else NONE

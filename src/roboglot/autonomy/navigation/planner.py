@@ -293,6 +293,8 @@ class Planner:
 
     def _age(self, places: Sequence[Point], until: float) -> None:
         """Make sightings around ``places`` at most as new as ``until``, s."""
+        if not places:
+            return
         grid = self._belief.map
         frame, memories = GridFrame(grid.corner, grid.evidence.shape), (self._scans.seen(grid), self._low.seen(grid))
         for window in (frame.around((place,), MOVING_REACH) for place in places):

@@ -92,7 +92,8 @@ class Route:
         stretch = slice(self._at, min(self._at + CENTRED, len(self.points)))
         way = self._planned[stretch]
         shift, width = sideways(way, echoes, clearance)
-        for goal in self.goals:
+        begin, far = Point(*way[0].tolist()), CENTRED * SPACING + GOAL_KEPT
+        for goal in (goal for goal in self.goals if begin.distance_to(goal) <= far):
             shift[np.hypot(way[:, 0] - goal.x, way[:, 1] - goal.y) < GOAL_KEPT] = 0.0
         self.points[stretch] = way + shift
         self._spots[stretch] = self.points[stretch].tolist()

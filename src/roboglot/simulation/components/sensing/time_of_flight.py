@@ -91,7 +91,8 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         if self._held is None or self._held.posture != posture:
             self._held = self._hold(posture)
         held = self._held
-        ahead, origins = held.ahead, held.eyes @ turn + np.array((hull.x, hull.y, hull.elevation))
+        ahead, origins = held.ahead, held.eyes @ turn
+        origins += (hull.x, hull.y, hull.elevation)
         reach = section.range_max + SIGMAS * section.noise
         distances = self._rays.cast(origins, ahead @ turn, reach, hull)
         distances += self._random.standard_normal(len(distances)) * section.noise
