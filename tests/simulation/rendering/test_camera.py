@@ -290,6 +290,30 @@ async def test_the_same_seed_gives_the_same_bytes():
     assert len(set(first)) == 5
 
 
+async def test_an_unchanged_view_is_not_drawn_again():
+    """And anything that changes it is seen at once."""
+    floor = room(people=[{"path": [[6.0, 5.8]]}], things=[{"name": "can", "at": [3.6, 5.2]}])
+    world, robot, clock = await lab(floor, others=[Pose(4.5, 5, math.pi)])
+    camera, box = robot[Camera], world.hands.add_obstacle(Pose(4.25, 4.2), (0.5, 0.5, 0.6))
+    changes = (
+        lambda: world.hands.place("r0", Pose(4.6, 5, math.pi)),
+        lambda: world.hands.place("a", Pose(2, 5.01)),
+        lambda: world.truth.thing("can").put(np.array((3.6, 4.9, 0.0))),
+        lambda: world.hands.remove_obstacle(box),
+        lambda: camera.set_exposure(0.5),
+    )
+    for change in changes:
+        await clock.advance(1.0)  # what moved comes to rest
+        before = await camera.capture()
+        await clock.advance(0.1)
+        again = await camera.capture()
+        assert again.planes is before.planes
+        assert again.stamp > before.stamp
+        change()
+        assert ((await camera.capture()).planes != again.planes).any()
+    world.close()
+
+
 async def test_a_frame_is_sound_and_read_only():
     world, robot, _ = await lab(room())
     frame = await robot[Camera].capture()

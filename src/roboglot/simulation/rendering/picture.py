@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,11 @@ LOWEST = 0.05  # m that the eye keeps from floor and ceiling
 
 
 class Renderer:
-    """Buffers for pictures of one size; one picture at a time."""
+    """Buffers for pictures of one size; one picture at a time. The last one is kept, with the key of its view."""
 
     def __init__(self, width: int, height: int, fov: float) -> None:
         self._width, self._height = width, height
+        self._last: tuple[object, NDArray[np.uint8]] | None = None
         self._lens = np.array((width / 2 / math.tan(fov / 2), width / 2, height / 2))
         self._planes = np.empty((FIRST + POLYGONS_MAX, COEFFICIENTS))
         self._sources = np.empty(FIRST + POLYGONS_MAX, dtype=np.int32)
@@ -34,6 +36,14 @@ class Renderer:
             np.zeros(SAMPLES, dtype=np.int32),
             np.zeros((3, width + LINE), dtype=np.uint8),
         )
+
+    def develop(self, key: object, scene: Callable[[], Scene], eye: Eye, gain: float) -> NDArray[np.uint8]:
+        """Return the last picture if its view had the same ``key``, else draw the ``scene``; read only."""
+        if self._last is None or self._last[0] != key:
+            planes = self.render(scene(), eye, gain)
+            planes.setflags(write=False)
+            self._last = key, planes
+        return self._last[1]
 
     def render(self, scene: Scene, eye: Eye, gain: float) -> NDArray[np.uint8]:
         """Return the picture as YUV 4:2:0 planes, one below the other (3/2 height, width)."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from roboglot.simulation.rendering.floor_plan import Plan
     from roboglot.simulation.rendering.shapes import Floats, Mesh
 
+PLACES = 6  # behind the point, of m and of directions
 REACH = 0.5  # m by which shadows and arms extend beyond the radius
 
 
@@ -41,6 +42,10 @@ class Eye:
     def level(self) -> bool:
         """True if the eye looks neither steeply up or down nor askew."""
         return abs(float(self.rotation[2, 2])) < 0.5 and abs(float(self.rotation[0, 2])) < 0.2
+
+    def key(self) -> tuple[object, ...]:
+        """Return a key that is equal for eyes that see the same."""
+        return (*_place(self), self.fov)
 
     @property
     def spread(self) -> float:
@@ -77,6 +82,18 @@ class Instant:
 
     floor: int
     figures: tuple[Figure, ...]
+
+    def key(self) -> tuple[object, ...]:
+        """Return a key that is equal only for instants that look the same; may run in any thread."""
+        figures = self.figures
+        places = tuple((*_place(figure), figure.radius) for figure in figures)
+        return self.floor, places, tuple(figure.make() for figure in figures)
+
+
+def _place(thing: Eye | Figure) -> tuple[object, ...]:
+    """Return position and attitude in steps that are too small to be seen: what lies still trembles in the physics."""
+    steps = (round(value, PLACES) for value in (thing.x, thing.y, thing.z))
+    return (*steps, (thing.rotation.round(PLACES) + 0.0).tobytes())  # + 0.0: no negative zeros
 
 
 @dataclass(frozen=True, slots=True)

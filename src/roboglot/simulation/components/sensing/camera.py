@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -60,10 +61,13 @@ class _Shot:
     gain: float
 
     def develop(self) -> Frame:
-        """Draw the picture; takes some milliseconds, in any thread, one at a time per renderer."""
-        planes = self.renderer.render(self.stage.scene(self.instant), self.eye, self.gain)
-        planes.setflags(write=False)
-        return Frame(self.stamp, planes)
+        """Draw the picture; takes some milliseconds, in any thread, one at a time per renderer.
+
+        An unchanged view is not drawn again.
+        """
+        key = self.instant.key(), self.eye.key(), self.gain
+        scene = partial(self.stage.scene, self.instant)
+        return Frame(self.stamp, self.renderer.develop(key, scene, self.eye, self.gain))
 
 
 class Shortfall:
