@@ -131,7 +131,7 @@ class Autonomy:
         robot.add(TagDocking, MarkDocking(robot, navigation, driving))
         robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
         if LiftClient in robot:
-            robot.add(Floors, LiftFloors(robot, belief, navigation))
+            robot.add(Floors, LiftFloors(robot, self._course, navigation))
         if Jack in robot:
             self._carried = CarriedLegs(robot, belief, self._course.load)
         if MapAnnotations in robot:

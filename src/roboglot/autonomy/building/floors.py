@@ -5,15 +5,17 @@ Those of other floors are kept on disk, too, and are restored after a restart wh
 
 from __future__ import annotations
 
+import contextlib
 import math
+from functools import partial
 
 import numpy as np
 
 from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
+from roboglot.autonomy.building.lift_queue import LiftQueue
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
-from roboglot.autonomy.navigation.course import Goal
+from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
-from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.scan_points import ScanReader
 from roboglot.model.actions import Action, OnBusy
 from roboglot.model.components.logistics.lift_client import LiftClient, LiftDoor
@@ -24,7 +26,7 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
 from roboglot.model.components.sensing.lidar import Lidar
-from roboglot.model.errors import Blocked, Expired, InvalidGoal, Refused
+from roboglot.model.errors import Blocked, Expired, InvalidGoal, Refused, Unreachable
 from roboglot.model.events import MapReplaced, PoseJumped
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
@@ -37,14 +39,18 @@ LEAN, LEAN_MAX = 1.5, 0.3  # rad per m of offset from the straight line
 THERE = 0.03  # m
 ROOM = 0.08  # m that must stay free in front of the hull
 PATIENCE = 20.0  # s without progress through the door
+MOUTH = 1.5  # m in front of the waiting place that robots in a queue leave free …
+BESIDE, LINE = 0.3, 0.2  # m … between two hulls, and m between its points
+LOOKS = 1.0  # s until some scans have shown what stands around
 TRIP_MAX = 10.0  # m between the waiting place and the car
 
 
 class LiftFloors(Floors):
     """Floors reached by lift: straight through the door by the lidar, without mapping in the car."""
 
-    def __init__(self, robot: Robot, belief: Belief, navigation: GridNavigation) -> None:
-        self.robot, self.belief, self.navigation = robot, belief, navigation
+    def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
+        self.robot, self.belief, self.navigation = robot, course.belief, navigation
+        self._course, self._queue = course, LiftQueue(robot)
         self._others = StoreyShelf(robot)
         self._current = 0
         self._places: tuple[Pose, Pose] | None = None  # the waiting place, and the place inside the car
@@ -82,10 +88,39 @@ class LiftFloors(Floors):
         if self._places is None:
             return
         waiting, inside = self._places
-        lift, belief = self.robot[LiftClient], self.belief
-        aboard = belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2  # still there from the last try
-        if floor == self._current and not aboard:
+        aboard = self.belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2  # still there from the last try
+        if aboard:
+            await self._go(action, floor, redraw, aboard=True)
+        elif floor != self._current:
+            action.report(RideStage.APPROACHING)
+            async with self._queue.turn(partial(self._make_way, action)):
+                await self._go(action, floor, redraw, aboard=False)
+
+    async def _make_way(self, action: Action) -> None:
+        """Leave the way between the car and the floor in front of it, if the robot is in it and there is room."""
+        assert self._places is not None
+        waiting, inside = self._places
+        reach = 2.0 * self.robot.description.radius + BESIDE
+        steps = np.arange(0.0, waiting.distance_to(inside) + MOUTH, LINE)[:, None]
+        out = np.array((-math.cos(inside.yaw), -math.sin(inside.yaw)))
+        line = np.array((inside.x, inside.y)) + steps * out
+        here = self.belief.pose
+        if float(np.hypot(*(line - (here.x, here.y)).T).min()) > reach:
             return
+        await self.robot.clock.sleep(LOOKS)  # on a floor that it does not know, it has no map yet
+        planner, scan = await self._course.ready(), self.robot[Lidar].scan
+        if scan is not None:  # it has not looked out for others since it got in
+            planner.observe(self.belief.reader.read(scan), self.belief.pose, self.robot.clock.time())
+        place = await self._course.waiting_place(here.point, [(line, reach)])
+        if place is not None:
+            with contextlib.suppress(Blocked, Unreachable):
+                await self.navigation.drive(action, Goal((place,), NavigationOptions(tolerance=0.2)), _unheard)
+
+    async def _go(self, action: Action, floor: int, redraw: bool, *, aboard: bool) -> None:
+        """Ride to ``floor`` from the floor here, or from the car. Raises what its steps do."""
+        assert self._places is not None
+        waiting, inside = self._places
+        lift, belief = self.robot[LiftClient], self.belief
         if not aboard:
             action.report(RideStage.APPROACHING)
             await self.navigation.drive(action, Goal((waiting.point,), NavigationOptions(yaw=waiting.yaw)), _unheard)

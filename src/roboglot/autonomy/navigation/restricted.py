@@ -20,6 +20,7 @@ from roboglot.model.robot import Robot
 
 BRAKING, REACTION, MARGIN = 0.5, 0.3, 0.25  # m/s2, s, m: for the distance at which an area counts as entered
 SOON = 5.0  # s within which a claimed area is entered or released
+AREA = "area "  # begins the name of an area in claims
 STEP = 0.1  # m between the places ahead that are checked
 MANUAL = frozenset({"drive", "move by"})  # manual driving is not held up
 
@@ -59,7 +60,8 @@ class RestrictedAreas:
         inside = {name for name, area in areas.items() if _touches(area, pose, radius)}
         entering = self._entering.items()
         self._entering = {name: until for name, until in entering if until > event.stamp and name not in inside}
-        claims = inside | self._entering.keys()
+        others = {name for name in radio.claims if not name.startswith(AREA)}  # such as a ticket for the lift
+        claims = inside | self._entering.keys() | others
         if claims != radio.claims:
             radio.claim(claims)
 
@@ -94,7 +96,7 @@ class RestrictedAreas:
 
 
 def _name(area: Area) -> str:
-    return f"{area.id}:{area.start.distance_to(area.end):.2f}x{area.half_width:.2f}"
+    return f"{AREA}{area.id}:{area.start.distance_to(area.end):.2f}x{area.half_width:.2f}"
 
 
 def _touches(area: Area, pose: Pose, radius: float) -> bool:
