@@ -17,7 +17,7 @@ NEAR = 2.5  # m from base_link within which depth is accurate enough
 def sort_out(
     rays: FloatArray, ways: FloatArray, eye: FloatArray, height: float, inner: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return obstacles and floor: x and y in base_link (n, 2; m), row by row.
+    """Return obstacles, with their heights, and floor, with the heights seen above it: (n, 3) in base_link, m.
 
     ``rays`` (rows from above, columns, 3) go out from ``eye`` (3), both in base_link; ``ways`` (rows, columns) is how
     many of its lengths each goes, not finite where nothing was seen. What is above ``height`` (m) is passed below; what
@@ -25,7 +25,7 @@ def sort_out(
     """
     rows, columns = ways.shape
     away, up = np.empty((rows, columns)), np.empty((rows, columns))
-    obstacles, floor = np.empty((rows * columns, 2)), np.empty((rows * columns, 2))
+    obstacles, floor = np.empty((rows * columns, 3)), np.empty((rows * columns, 3))
     standing = lying = 0
     for row in range(rows):
         for column in range(columns):
@@ -34,6 +34,9 @@ def sort_out(
             up[row, column], away[row, column] = rays[row, column, 2] * way + eye[2], np.sqrt(x * x + y * y)
             if abs(up[row, column]) < FLOOR and away[row, column] < NEAR:
                 floor[lying, 0], floor[lying, 1] = x, y
+                across = np.sqrt(rays[0, column, 0] ** 2 + rays[0, column, 1] ** 2)  # of the column's highest ray
+                far = np.sqrt((x - eye[0]) ** 2 + (y - eye[1]) ** 2)
+                floor[lying, 2] = eye[2] + rays[0, column, 2] * far / across if across > 0.0 else 0.0
                 lying += 1
     for row in range(rows - 1):
         for column in range(columns):
@@ -42,6 +45,7 @@ def sort_out(
             if here - below > STEEP * farther and LOW < here < height and inner < away[row, column] < NEAR:
                 obstacles[standing, 0] = rays[row, column, 0] * ways[row, column] + eye[0]
                 obstacles[standing, 1] = rays[row, column, 1] * ways[row, column] + eye[1]
+                obstacles[standing, 2] = here
                 standing += 1
     return obstacles[:standing].copy(), floor[:lying].copy()
 
@@ -53,15 +57,17 @@ def sort_out_all(
     rays: FloatArray, ways: FloatArray, eyes: FloatArray, height: float, inner: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return obstacles and floor of several equal sensors, one after the other; see ``sort_out``."""
-    obstacles, floor = np.empty((ways.size, 2)), np.empty((ways.size, 2))
+    obstacles, floor = np.empty((ways.size, 3)), np.empty((ways.size, 3))
     standing = lying = 0
     for k in range(len(ways)):
         some, flat = sort_out(rays[k], ways[k], eyes[k], height, inner)
         for i in range(len(some)):
-            obstacles[standing, 0], obstacles[standing, 1] = some[i, 0], some[i, 1]
+            for part in range(3):
+                obstacles[standing, part] = some[i, part]
             standing += 1
         for i in range(len(flat)):
-            floor[lying, 0], floor[lying, 1] = flat[i, 0], flat[i, 1]
+            for part in range(3):
+                floor[lying, part] = flat[i, part]
             lying += 1
     return obstacles[:standing].copy(), floor[:lying].copy()
 
@@ -78,12 +84,13 @@ def _still_noted(seen: SingleArray, noted: Int32Array, count: int) -> int:
 
 
 @kernel(
-    "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float64[:,::1], float64[:,::1], float64[:,::1],"
-    " float64[::1], float64[::1], float64, float64, float64, int32[:,::1], int64)",
+    "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float32[:,::1], float64[:,::1], float64[:,::1],"
+    " float64[:,::1], float64[::1], float64[::1], float64, float64, float64, int32[:,::1], int64)",
 )
 def remember_low(
     evidence: Int16Array,
     seen: SingleArray,
+    heights: SingleArray,
     floor: FloatArray,
     obstacles: FloatArray,
     echoes: FloatArray,
@@ -97,10 +104,12 @@ def remember_low(
 ) -> tuple[int, FloatArray]:
     """Note the time ``now`` (> 0) in cells with ``obstacles`` that neither map nor ``echoes`` explain, 0 in ``floor``.
 
-    ``floor`` and ``obstacles`` (n, 2) are in base_link at ``pose`` (x, y, yaw), ``echoes`` (n, 2) and ``corner`` (of
-    the grid) in map. Beside an occupied cell, within ``explained`` m of an echo and off the grid nothing is new. The
-    first ``listed`` rows of ``noted`` are the cells (row, column) that are not 0. Returns how many there are now, or -1
-    when they are more than ``noted`` holds; and the new obstacles in map (n, 2).
+    ``floor`` and ``obstacles`` (n, 3) are in base_link at ``pose`` (x, y, yaw), ``echoes`` (n, 2) and ``corner`` (of
+    the grid) in map. Beside an occupied cell, within ``explained`` m of an echo and off the grid nothing is new.
+    ``heights`` keeps the lowest height seen in each cell: floor below something that hangs higher than the view reaches
+    there, as a table top does, does not show that it has gone. The first ``listed`` rows of ``noted`` are the cells
+    (row, column) that are not 0. Returns how many there are now, or -1 when they are more than ``noted`` holds; and the
+    new obstacles in map (n, 2).
     """
     (height, width), count = seen.shape, 0
     cos, sin, near = np.cos(pose[2]), np.sin(pose[2]), explained * explained
@@ -109,7 +118,7 @@ def remember_low(
         x = cos * floor[i, 0] - sin * floor[i, 1] + pose[0] - corner[0]
         y = sin * floor[i, 0] + cos * floor[i, 1] + pose[1] - corner[1]
         row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
-        if 0 <= row < height and 0 <= col < width:
+        if 0 <= row < height and 0 <= col < width and heights[row, col] <= floor[i, 2]:
             seen[row, col] = 0.0
     if listed > 0:
         listed = _still_noted(seen, noted, listed)
@@ -134,6 +143,8 @@ def remember_low(
                 listed += 1
             else:
                 listed = -1
+        up = np.float32(obstacles[i, 2])
+        heights[row, col] = min(heights[row, col], up) if seen[row, col] == np.float32(now) else up
         seen[row, col] = now
     return listed, found[:count].copy()
 

@@ -19,7 +19,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 
-BODY = LowView(np.array([(1.0, 0.1 * n) for n in range(-2, 3)]), NONE)  # 1 m ahead, off the lidar's plane
+BODY = LowView(np.array([(1.0, 0.1 * n, 0.3) for n in range(-2, 3)]), NONE)  # 1 m ahead, off the lidar's plane
 RADIUS = 0.25
 
 

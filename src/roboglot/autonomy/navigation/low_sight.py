@@ -21,12 +21,12 @@ GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside that an object in the gripper
 
 Points = NDArray[np.float64]
 Sorting = Callable[[Points, Points, Points, float, float], tuple[Points, Points]]
-NONE: Points = np.empty((0, 2))
+NONE: Points = np.empty((0, 3))
 
 
 @dataclass(frozen=True, slots=True)
 class LowView:
-    """Points of obstacles and of floor, x and y in base_link (n, 2; m)."""
+    """Points of obstacles with their heights, and of floor with the heights seen above it, in base_link (n, 3; m)."""
 
     obstacles: Points
     floor: Points
