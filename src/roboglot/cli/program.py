@@ -9,7 +9,6 @@ import json
 import logging
 import re
 import sys
-import tempfile
 from collections.abc import AsyncIterator, Coroutine
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -344,22 +343,21 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
     from roboglot.storage.database import Database
     from roboglot.storage.programs import program_stores
 
-    with tempfile.TemporaryDirectory() as folder:
-        database, engine = Database(Path(folder) / "roboglot.db"), Engine()
-        engine.open_soon()
-        await asyncio.sleep(0)  # its process loads while we build the world
-        robots = (RobotConfig(body=body),)
-        fleet = build_fleet(world, robots, clock=RealClock(speed), seed=1, database=database)
-        robot = fleet.robots[robots[0].name]
-        service = ProgramService(robot, engine, program_stores(database, robot.id))
-        door = VisualDoor(service, "127.0.0.1", VisualConfig(port=0))
-        closing: list[Coroutine[object, None, None]] = [fleet.close(), engine.close()]
-        try:
-            await fleet.start(wait=False)  # without waiting for compilation; skills that need it follow
-            await door.start()
-            closing.insert(0, door.close())
-            yield door.endpoints[0].address.removesuffix(FRAMES)
-        finally:
-            for close in closing:
-                await close
-            database.close()
+    database, engine = Database(":memory:"), Engine()  # nothing of it is kept: no disk to wait for
+    engine.open_soon()
+    await asyncio.sleep(0)  # its process loads while we build the world
+    robots = (RobotConfig(body=body),)
+    fleet = build_fleet(world, robots, clock=RealClock(speed), seed=1, database=database)
+    robot = fleet.robots[robots[0].name]
+    service = ProgramService(robot, engine, program_stores(database, robot.id))
+    door = VisualDoor(service, "127.0.0.1", VisualConfig(port=0))
+    closing: list[Coroutine[object, None, None]] = [fleet.close(), engine.close()]
+    try:
+        await fleet.start(wait=False)  # without waiting for compilation; skills that need it follow
+        await door.start()
+        closing.insert(0, door.close())
+        yield door.endpoints[0].address.removesuffix(FRAMES)
+    finally:
+        for close in closing:
+            await close
+        database.close()

@@ -105,7 +105,7 @@ async def test_opening_in_the_background_does_not_wait() -> None:
 async def test_without_a_filter_nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Machines with unknown system calls, and with a filter that loads but doesn't hold."""
     for trick in (
-        "import platform; platform.machine = lambda: 'pdp11'",
+        "import os, types; os.uname = lambda: types.SimpleNamespace(machine='pdp11')",
         "from roboglot.programs.worker import seccomp; seccomp.load = lambda *a: None",
     ):
         monkeypatch.setattr(launcher, "_BOOT", launcher._BOOT.replace("zygote.main", f"{trick}\nzygote.main"))
@@ -122,7 +122,7 @@ async def test_without_a_filter_nothing_runs(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize(
     "trick",
     [
-        "import platform; platform.machine = lambda: 'pdp11'",
+        "import os, types; os.uname = lambda: types.SimpleNamespace(machine='pdp11')",
         "from roboglot.programs.worker import seccomp; seccomp.load = lambda *a: None",
     ],
 )

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-import platform
 import resource
 import signal
 
@@ -96,7 +95,7 @@ def confine_program(libc: ctypes.CDLL, parent: int, used: int, quota: Quota, cod
 
 def filter_code() -> bytes:
     """Return the filter for this machine. Raises SeccompUnavailable."""
-    return seccomp.program(platform.machine())
+    return seccomp.program(os.uname().machine)
 
 
 def _prctl(libc: ctypes.CDLL, option: int, value: int) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import errno
-import platform
+import os
 import struct
 
 SOCKET_FD = 3
@@ -53,7 +53,7 @@ class SeccompUnavailable(OSError):
 
 
 def program(machine: str) -> bytes:
-    """Return the filter as BPF instructions for a machine (``platform.machine()``).
+    """Return the filter as BPF instructions for a machine (``os.uname().machine``).
 
     Raises SeccompUnavailable for a machine without a table.
     """
@@ -99,7 +99,7 @@ class _SockFprog(ctypes.Structure):
 
 def load(libc: ctypes.CDLL, code: bytes | None = None) -> None:
     """Install the filter for this thread, irrevocably. Needs no_new_privs. Raises SeccompUnavailable."""
-    code = program(platform.machine()) if code is None else code
+    code = program(os.uname().machine) if code is None else code
     buffer = ctypes.create_string_buffer(code, len(code))
     fprog = _SockFprog(len(code) // 8, ctypes.cast(buffer, ctypes.c_void_p))
     if libc.prctl(_PR_SET_SECCOMP, _SECCOMP_MODE_FILTER, ctypes.addressof(fprog), 0, 0) != 0:
