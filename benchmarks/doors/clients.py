@@ -64,6 +64,12 @@ def cpu(folder: Path) -> float:
     return used
 
 
+def starved(folder: Path) -> float:
+    """Return the s that the serving threads of all shards wanted a processor so far, and others had it."""
+    waits = [Path(f"/proc/{row['pid']}/schedstat").read_text().split()[1] for row in look(folder)["shards"]]
+    return sum(map(int, waits)) / 1e9
+
+
 def look(folder: Path) -> dict[str, Any]:
     """Return what `roboglot fleet list --json` shows."""
     answer: dict[str, Any] = json.loads(asyncio.run(local_socket.ask(folder / SOCKET, b"{}", PATIENCE)))
@@ -100,11 +106,12 @@ def measure(claims: Claims, part: Part, settle: float, seconds: float) -> None:
         with ThreadPoolExecutor(1) as beside:
             lesson = beside.submit(in_a_process, Lesson(robots, set(filmed), proof, APP, settle, seconds))
             time.sleep(settle + 1.0)
-            began, used, factors = time.monotonic(), cpu(folder), list[float]()
+            began, used, waited, factors = time.monotonic(), cpu(folder), starved(folder), list[float]()
             while not lesson.done() and time.monotonic() - began < seconds - 1.0:
                 time.sleep(1.0)
                 factors.append(min(row["factor"] for row in look(folder)["shards"]))
-            cores = (cpu(folder) - used) / (time.monotonic() - began)
+            passed = time.monotonic() - began
+            cores, share = (cpu(folder) - used) / passed, (starved(folder) - waited) / passed / part.shards
             seen, own = lesson.result()
         for log in (folder / "shards").glob("*/log"):
             worth = [line for line in log.read_text().splitlines() if " INFO " not in line]
@@ -113,6 +120,7 @@ def measure(claims: Claims, part: Part, settle: float, seconds: float) -> None:
     print(
         f"reference: the clients' own loop was late by {percentile(own.late, 0.99):.1f} ms (p99), {own.cores:.2f} cores"
     )
+    print(f"reference: the serving threads waited for a processor for {share:.0%} of the time")
     print(f"{cores:.2f} cores, load {os.getloadavg()[0]:.1f}")
     claims.at_least("robot time", sum(factors) / len(factors), 0.995, "x real time")
 
