@@ -101,3 +101,20 @@ def test_one_of_two_in_a_corridor_backs_out(robot: Robot, belief: Belief, here: 
     assert other.backs_out(Pose(here + 0.8)) == (here > 2.1)
     traffic.close()
     other.close()
+
+
+@pytest.mark.world("empty")
+def test_what_flickers_in_a_corridor_has_no_right(belief: Belief, robot: Robot) -> None:
+    """A robot that comes out of it goes first; a ghost of a wall, seen for a moment, does not."""
+    corner, evidence = belief.map.corner, belief.map.evidence
+    rows = [int((y - corner.y) / RESOLUTION) for y in (-0.55, 0.55)]
+    evidence[rows, int((1.0 - corner.x) / RESOLUTION) : int((5.0 - corner.x) / RESOLUTION)] = 500
+    traffic, here, waits = Traffic(robot, belief), Pose(0.5), list[bool]()
+    front = np.stack((0.02 * np.abs(np.arange(-4, 5)), 0.05 * np.arange(-4, 5)), axis=1)
+    for scan in range(9):
+        echoes = front + np.array((4.0 - 0.1 * scan, 0.0))
+        traffic.observe(echoes, here, 20.0 + 0.1 * scan)
+        waits.append(traffic.is_in_the_way(here))
+    traffic.close()
+    assert waits[:4] == [False] * 4
+    assert waits[5:] == [True] * 4

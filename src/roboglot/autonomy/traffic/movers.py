@@ -40,6 +40,7 @@ class Mover:
     x: float
     y: float
     stamp: float
+    since: float  # s: time of its first sighting
     radius: float = HULL
     vx: float = 0.0
     vy: float = 0.0
@@ -94,7 +95,7 @@ class MoverTracker:
             if mover is not None:
                 free.remove(mover)
             elif len(self.movers) < THINGS_MAX:
-                mover = Mover(x, y, stamp)
+                mover = Mover(x, y, stamp, stamp)
                 self.movers.append(mover)
             else:
                 continue

@@ -42,6 +42,7 @@ FACING = 0.27 + 0.5  # m between a hull and the centre of the object in front of
 AROUND = 4.0  # m within which other robots may be the obstacle
 LIVELY = 8.0  # s after its last motion for which a robot counts as under way
 FAR = 3.0  # m at which such robots will have left before the robot arrives
+PROVEN = 0.4  # s for which a thing must be seen to go first: ghosts of walls, in a turn, last shorter
 STOPPED = 5.0  # s after which a robot standing in a narrow place may reverse, too
 IN_IT = 0.9  # m between the centre of such a robot and the place that it blocks
 TRAIL = 20  # places that were passed
@@ -108,8 +109,8 @@ class Traffic:
 
     def _expected(self, mover: Mover, pose: Pose, stamp: float, *, inside: bool) -> Way:
         """Return the way of a robot that announces none: it goes first if only it is in a narrow place."""
-        stood = stamp - mover.moved_at
-        if not inside and stood <= STOPPED and self._tight.holds(pose.point, mover.point):
+        stood, proven = stamp - mover.moved_at, stamp - mover.since >= PROVEN
+        if not inside and proven and stood <= STOPPED and self._tight.holds(pose.point, mover.point):
             points = straight_on(mover, THROUGH)
             narrow = self._tight.along(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
             return through_narrow(mover, points, narrow)
