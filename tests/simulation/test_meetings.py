@@ -72,3 +72,15 @@ async def test_alone_no_contact_is_looked_for(simulate: Simulate) -> None:
     simulation.world.hands.add_person(simulation.pose.compose(Pose(0.6)))
     await simulation.clock.advance(0.02)
     assert not options.disableflags
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+async def test_robot_in_its_dock_sleeps(simulate: Simulate, *, compiled: bool) -> None:
+    simulation = simulate("office")
+    physics = simulation.world._physics
+    if compiled:
+        await simulation.world.prepare(wait=True)
+    simulation.world.start()
+    await simulation.clock.advance(2.0)
+    assert physics._meetings.off
+    assert physics._sleep.lasts
