@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import signal
 import subprocess
 import sys
@@ -48,3 +49,13 @@ async def test_engine_that_still_starts_closes_at_once(monkeypatch: pytest.Monke
     async with asyncio.timeout(60):
         await engine.close()
     assert started[0].returncode == -signal.SIGKILL
+
+
+@pytest.mark.parametrize("event", ["ready", "unavailable"])
+async def test_zygote_that_is_ready_too_late_is_ignored(event: str) -> None:
+    """Its message was read in the turn of the loop in which its caller stopped waiting."""
+    late = Launcher(lambda _lost: None)
+    late._ready = asyncio.get_running_loop().create_future()
+    late._ready.cancel()
+    late._handle(launcher._decode(json.dumps({"event": event})), [])
+    assert late.pid == 0

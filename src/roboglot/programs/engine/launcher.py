@@ -216,6 +216,8 @@ class Launcher:
     def _handle(self, message: _Message, handles: list[int]) -> None:
         worker = self._workers.get(message.run)
         match message.event, worker:
+            case "ready" | "unavailable", _ if self._ready.done():
+                pass  # the caller stopped waiting just before
             case "ready", _:
                 self.pid = message.pid
                 self._ready.set_result(message.layers)
