@@ -46,9 +46,9 @@ async def draw(claims: Claims, folder: Path | None) -> None:
     camera = robot[Camera]
     await camera.capture()  # loads the kernels
     for name, pose in VIEWS.items():
-        world.hands.place("a", pose)
         times = []
-        for _ in range(60):
+        for turn in range(60):
+            world.hands.place("a", Pose(pose.x, pose.y, pose.yaw + 0.0001 * turn))  # an unchanged view is not drawn
             posing.cache_clear()  # as if all people were walking
             began = time.thread_time()  # lockstep draws in the calling thread
             frame = await camera.capture()
@@ -78,7 +78,7 @@ async def stream(claims: Claims) -> None:
         while (passed := time.monotonic() - began) < SECONDS:
             yaw = 1.7 + 0.5 * passed
             world.hands.place("a", Pose(12.0, 14.0, yaw))
-            await asyncio.sleep(0.1)
+            await asyncio.sleep(1 / 60)  # a new view for each picture
             for number, viewer in enumerate(watching):
                 got = viewer.drain()
                 if number == 0:
