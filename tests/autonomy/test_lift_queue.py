@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
+from roboglot.autonomy.building import lift_queue
 from roboglot.autonomy.building.lift_queue import LiftQueue
 from roboglot.config import RobotConfig, StartConfig
 from roboglot.fleet import Fleet, build_fleet
@@ -59,6 +60,31 @@ async def test_each_has_its_turn(fleet: Fleet, clock: LockstepClock) -> None:
     assert seen[5:] == ["b rides"]
     await clock.advance(3.0)
     await asyncio.gather(rides[0], rides[2], again)
+
+
+async def test_queue_never_runs_out_of_tickets(
+    fleet: Fleet, clock: LockstepClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three take turns for ever: none gets a number that the others do not look at, and no two ride at once."""
+    monkeypatch.setattr(lift_queue, "TICKETS_MAX", 3)
+    riding, most, rides = list[str](), 0, 0
+
+    async def make_way() -> None:
+        pass
+
+    async def ride(name: str) -> None:
+        nonlocal most, rides
+        for _ in range(4):
+            async with LiftQueue(fleet.robots[name]).turn(make_way):
+                riding.append(name)
+                most, rides = max(most, len(riding)), rides + 1
+                await clock.sleep(0.3)
+                riding.remove(name)
+
+    turns = [asyncio.ensure_future(ride(name)) for name in NAMES]
+    await clock.advance(12.0)
+    await asyncio.gather(*turns)
+    assert (most, rides) == (1, 12)
 
 
 @pytest.mark.slow  # two minutes of three robots; the order: test_each_has_its_turn

@@ -33,23 +33,38 @@ class LiftQueue:
         if TrafficRadio not in self._robot:
             yield
             return
-        radio, clock, waits = self._robot[TrafficRadio], self._robot.clock, False
-        ticket = max(self._tickets(), default=-1) + 1
-        radio.claim(radio.claims | {f"{TICKET}{ticket}"})
+        clock, waits = self._robot.clock, False
+        deadline = clock.time() + TURN_MAX
+        while (ticket := max(self._tickets(), default=-1) + 1) >= TICKETS_MAX:
+            self._check(deadline)
+            await clock.sleep(LOOK)
+        self._change(None, ticket)
         try:
-            deadline = clock.time() + TURN_MAX
-            while any(other < ticket for other in self._tickets()):
+            while lower := [other for other in self._tickets() if other < ticket]:
+                self._change(ticket, max(lower) + 1)  # numbers stay small
+                ticket = max(lower) + 1
                 if not waits:
                     await make_way()
                 waits = True
-                if clock.time() > deadline:
-                    raise Expired(f"the turn in front of the lift did not come within {TURN_MAX:g} s")
+                self._check(deadline)
                 await clock.sleep(LOOK)
+            self._change(ticket, 0)
+            ticket = 0
             yield
             if self._tickets():
                 await make_way()
         finally:
-            radio.claim(radio.claims - {f"{TICKET}{ticket}"})
+            self._change(ticket, None)
+
+    def _check(self, deadline: float) -> None:
+        if self._robot.clock.time() > deadline:
+            raise Expired(f"the turn in front of the lift did not come within {TURN_MAX:g} s")
+
+    def _change(self, old: int | None, new: int | None) -> None:
+        """Give a ticket back, or take one, or both."""
+        radio = self._robot[TrafficRadio]
+        claims = {f"{TICKET}{new}"} if new is not None else set[str]()
+        radio.claim((radio.claims - {f"{TICKET}{old}"}) | claims)
 
     def _tickets(self) -> list[int]:
         """Return the numbers that others hold."""
