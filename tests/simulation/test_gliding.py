@@ -85,3 +85,18 @@ async def test_robot_glides_until_it_comes_near_something(simulate: Simulate, mo
     await simulation.clock.advance(3.0)
     assert stepped
     assert simulation.world._physics.hulls["a"].touches
+
+
+async def test_contacts_of_standing_robots_are_not_searched(simulate: Simulate) -> None:
+    simulation = simulate("empty")
+    await settled(simulation)
+    options = simulation.world._physics._model.opt
+    assert options.disableflags & NO_CONTACTS
+    simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(0.35)), (0.2, 0.2, 0.5))
+    await simulation.clock.advance(0.02)
+    assert not options.disableflags & NO_CONTACTS
+    await simulation.clock.advance(0.1)
+    assert options.disableflags & NO_CONTACTS
+    simulation.robot[Base].set_velocity(Twist(0.3))
+    await simulation.clock.advance(0.1)
+    assert not options.disableflags & NO_CONTACTS

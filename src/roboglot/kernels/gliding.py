@@ -14,7 +14,10 @@ from roboglot.kernels.arrays import FloatArray, IntArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.layouts import (
     HULL_A,
+    HULL_DRIVE_X,
+    HULL_DRIVE_Y,
     HULL_FLOOR,
+    HULL_HELD,
     HULL_LOOKED_X,
     HULL_LOOKED_Y,
     HULL_Q,
@@ -30,6 +33,8 @@ from roboglot.kernels.layouts import (
     HULL_X,
     HULL_Y,
 )
+
+STILL = 1e-6  # m/s
 
 
 @kernel("float64(float64, float64, float64, float64, float64, float64)")
@@ -51,10 +56,12 @@ def room(walls: FloatArray, x: float, y: float, floor: int) -> float:
     return math.sqrt(least)
 
 
-@kernel("boolean(float64[:,::1], float64[::1], float64[:,::1])")
-def _meet_walls(hulls: FloatArray, reach: FloatArray, walls: FloatArray) -> bool:
-    """Return whether a hull reaches one of ``walls``: rows x, y, cosine and sine of yaw, width, depth, floor."""
+@kernel("boolean(float64[:,::1], float64[::1], float64[::1], float64[:,::1])")
+def _meet_walls(hulls: FloatArray, reach: FloatArray, rests: FloatArray, walls: FloatArray) -> bool:
+    """Return whether a hull that moves reaches one of ``walls``: rows x, y, cosine and sine of yaw, sizes, floor."""
     for i in range(hulls.shape[0]):
+        if rests[i] != 0.0:
+            continue
         x, y = hulls[i, HULL_X], hulls[i, HULL_Y]
         if hulls[i, HULL_WALLS] - abs(x - hulls[i, HULL_LOOKED_X]) - abs(y - hulls[i, HULL_LOOKED_Y]) > reach[i]:
             continue
@@ -66,19 +73,24 @@ def _meet_walls(hulls: FloatArray, reach: FloatArray, walls: FloatArray) -> bool
     return False
 
 
-@kernel("boolean(float64[:,::1], float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64)")
+@kernel(
+    "boolean(float64[:,::1], float64[::1], float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1],"
+    " float64)"
+)
 def _meet_movables(
     hulls: FloatArray,
     reach: FloatArray,
+    rests: FloatArray,
     places: FloatArray,
     turns: FloatArray,
     sizes: FloatArray,
     geoms: IntArray,
     lowest: float,
 ) -> bool:
-    """Return whether a hull reaches a person (``geoms`` below 0: -1 - geom) or a box; those below ``lowest`` are away.
+    """Return whether a hull reaches a person (``geoms`` below 0: -1 - geom), or one that moves reaches a box.
 
-    ``places`` and ``turns`` (quaternions around z) are MuJoCo's of movable bodies, ``sizes`` those of all its geoms.
+    Those below ``lowest`` are away. ``places`` and ``turns`` (quaternions around z) are MuJoCo's of movable bodies,
+    ``sizes`` those of all its geoms.
     """
     for m in range(places.shape[0]):
         if places[m, 2] < lowest:
@@ -88,6 +100,8 @@ def _meet_movables(
         w, z = turns[m, 0], turns[m, 3]
         c, s = w * w - z * z, 2.0 * w * z
         for i in range(hulls.shape[0]):
+            if rests[i] != 0.0 and not person:
+                continue
             dx, dy, room = hulls[i, HULL_X] - places[m, 0], hulls[i, HULL_Y] - places[m, 1], reach[i]
             if person:
                 room += sizes[geom, 0]
@@ -101,7 +115,7 @@ def _meet_movables(
 
 @kernel(
     "boolean(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1],"
-    " float64, float64, float64)"
+    " float64, float64, float64, boolean)"
 )
 def clear(
     hulls: FloatArray,
@@ -113,25 +127,31 @@ def clear(
     lowest: float,
     margin: float,
     seconds: float,
+    known: bool,
 ) -> bool:
     """Return whether all hulls stand on springs and come near nothing within ``seconds``. Treats floors as one.
 
-    ``margin`` (m) covers what speed may gain meanwhile, and shapes that report contacts from afar.
+    ``margin`` (m) covers what speed may gain meanwhile, and shapes that report contacts from afar. ``known``: contacts
+    were searched when all was as it is: hulls that rest touch nothing else that rests.
     """
     robots = hulls.shape[0]
-    reach = np.empty(robots)
+    reach, rests = np.empty(robots), np.empty(robots)
     for i in range(robots):
         if hulls[i, HULL_SPRUNG] == 0.0:
             return False
         vx, vy = hulls[i, HULL_VX], hulls[i, HULL_VY]
         reach[i] = hulls[i, HULL_RADIUS] + margin + seconds * math.sqrt(vx * vx + vy * vy)
+        pulls = hulls[i, HULL_HELD] == 0.0 and (hulls[i, HULL_DRIVE_X] != 0.0 or hulls[i, HULL_DRIVE_Y] != 0.0)
+        rests[i] = 1.0 if known and not pulls and abs(vx) < STILL and abs(vy) < STILL else 0.0
     for i in range(robots):
         x, y, mine = hulls[i, HULL_X], hulls[i, HULL_Y], reach[i]
         for j in range(i):
             dx, dy, room = hulls[j, HULL_X] - x, hulls[j, HULL_Y] - y, reach[j] + mine
-            if dx * dx + dy * dy <= room * room:
+            if dx * dx + dy * dy <= room * room and not (rests[i] != 0.0 and rests[j] != 0.0):
                 return False
-    return not (_meet_movables(hulls, reach, places, turns, sizes, geoms, lowest) or _meet_walls(hulls, reach, walls))
+    if _meet_movables(hulls, reach, rests, places, turns, sizes, geoms, lowest):
+        return False
+    return not _meet_walls(hulls, reach, rests, walls)
 
 
 @kernel("float64(int64, float64, float64, float64, float64[:,::1], float64[:,::1], float64[:,::1])")

@@ -82,9 +82,13 @@ class Gliding:
         """True once the kernels are in use."""
         return self._kernels is not None
 
-    def clear(self, seconds: float) -> bool:
-        """Return whether no robot can touch anything in a step of ``seconds``, and none has to be watched."""
-        return self._kernels is not None and self._kernels.clear(*self._near, seconds)
+    def clear(self, seconds: float, *, known: bool) -> bool:
+        """Return whether no robot can touch anything in a step of ``seconds``, and none has to be watched.
+
+        ``known``: contacts were searched since something was moved at once; they need not be for robots at rest.
+        """
+        known = known and not self._data.nefc
+        return self._kernels is not None and self._kernels.clear(*self._near, seconds, known)
 
     def step(self, steps: int) -> bool:
         """Move robots that are clear on by so many steps of the physics; return False if this takes MuJoCo."""

@@ -61,7 +61,8 @@ class Meetings:
         """Decide whether the physics searches for contacts in a step of ``seconds``; ``touched``: some hull is."""
         if self._gliding is None:
             return
-        if self._gliding.loaded and self._decides(self._gliding, seconds, touched=touched):
+        if self._gliding.loaded:  # looks at everything in every tick
+            self._switch(off=not touched and self._gliding.clear(seconds, known=self._is_known()))
             return
         revision = sum(self._props.revisions.values())
         if revision != self._revision or (self.off and not all(map(self._as_expected, self._hulls))):
@@ -75,24 +76,14 @@ class Meetings:
         self._wait = AGAIN if self.off else min(2.0 * self._wait, AGAIN_MAX)
         self._left = free - seconds if self.off else self._wait
 
-    def _decides(self, gliding: Gliding, seconds: float, *, touched: bool) -> bool:
-        """Return whether ``gliding``, which looks at everything in every tick, decided; else all robots stand.
-
-        A robot that stands cannot meet what stands beside it, as at a wall or in a dock: only people come to it.
-        """
-        if not touched and gliding.clear(seconds):
-            self._left = 0.0
-            self._switch(off=True)
-            return True
-        if touched or not self._stands():
-            self.forget()
-            return True
-        return False
-
-    def _stands(self) -> bool:
-        """Return whether no robot moves, nor wants to."""
-        motions = ((hull.pulls, hull.motion) for hull in self._hulls)
-        return all(not pulls and abs(vx) < STILL and abs(vy) < STILL for pulls, (vx, vy, _, _) in motions)
+    def _is_known(self) -> bool:
+        """Return whether nothing but people was moved at once since the last call."""
+        revision = sum(self._props.revisions.values())
+        known = revision == self._revision and not any(hull.disturbed for hull in self._hulls)
+        self._revision = revision
+        for hull in self._hulls if not known else ():
+            hull.disturbed = False
+        return known
 
     def _switch(self, *, off: bool) -> None:
         if off is not self.off:
