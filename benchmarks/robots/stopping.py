@@ -53,9 +53,9 @@ async def timed(socket: Path, wish: bytes) -> tuple[float, bytes]:
 async def measure(socket: Path, robots: int, times: int) -> tuple[list[float], list[float]]:
     """Drive all and stop all, so many times: s of each look and of each stop. Raises AssertionError."""
     links, looks, stops = await connect(robots), list[float](), list[float]()
-    for _ in range(times):
-        for _, writer in links:
-            writer.write(b"chassis speed x 0.1 y 0 z 20;")
+    for number in range(times):
+        for _, writer in links:  # forth and back, or some would meet others
+            writer.write(b"chassis speed x 0.1 y 0 z 20;" if number % 2 == 0 else b"chassis speed x -0.1 y 0 z -20;")
         for reader, _ in links:
             assert await reader.readuntil(b";") == b"ok;"
         await asyncio.sleep(PAUSE)
