@@ -1,5 +1,6 @@
-"""``/metrics``: figures of robots and their doors, in Prometheus's text format (docs/operation/metrics.md lists every name).
+"""``/metrics``: figures of robots and their doors, in Prometheus's text format.
 
+All names are in docs/operation/metrics.md.
 Requests are counted from the first scrape on; before, the tap costs nothing. Labels come from robots, doors and
 contracts, never from clients' data.
 """
