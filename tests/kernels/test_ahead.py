@@ -171,13 +171,17 @@ def test_changes_of_built_in_kernels_are_noticed(cache: Path, tmp_path: Path, mo
     compile_ahead(names)
     kept = tmp_path / f"kernels_{hashlib.sha1(str(sources).encode()).hexdigest()}"
     kept.mkdir()
+    python = f"py{sys.version_info.major}{sys.version_info.minor}"
     for name in names:
-        (kept / f"{name}.f-1.py311.nbi").touch()
+        for end in (f"{python}.nbi", f"{python}.1.nbc", "py39.nbi"):
+            (kept / f"{name}.f-1.{end}").touch()
     (sources / "linear.py").write_text("from roboglot.kernels.compiled import kernel\n# changed\n")
     assert missing(names) == ["linear", "graph"]
     compile_ahead(names)
     assert built == [names, ["linear", "graph"]]
-    assert [file.name for file in kept.iterdir()] == ["touring.f-1.py311.nbi"], "Numba would take the old ones"
+    left = {file.name for file in kept.iterdir() if python in file.name}
+    assert left == {f"touring.f-1.{python}.nbi", f"touring.f-1.{python}.1.nbc"}, "Numba would take the old ones"
+    assert len(list(kept.glob("*.py39.nbi"))) == len(names), "another Python has marks of its own"
     (sources / "compiled.py").write_text("# changed\n")
     assert missing(names) == names
     ahead._sources.cache_clear()

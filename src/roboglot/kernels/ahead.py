@@ -109,11 +109,14 @@ def cache_folder() -> Path:
 
 
 def _forget(names: Sequence[str]) -> None:
-    """Remove Numba's cache of ``names``: it checks only a kernel's own file, not those that it is built from."""
+    """Remove Numba's cache of ``names``: it checks only a kernel's own file, not those that it is built from.
+
+    The caches of other Pythons stay: each has marks of its own.
+    """
     beside, apart = HERE / "__pycache__", f"{HERE.name}_{hashlib.sha1(str(HERE).encode()).hexdigest()}"
-    folder = cache_folder()
+    folder, python = cache_folder(), f"py{sys.version_info.major}{sys.version_info.minor}"
     for name in names:
-        for old in (folder if folder == beside else folder / apart).glob(f"{name}.*.nb[ci]"):
+        for old in (folder if folder == beside else folder / apart).glob(f"{name}.*.{python}*nb[ci]"):
             old.unlink(missing_ok=True)
 
 
