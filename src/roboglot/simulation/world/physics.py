@@ -165,11 +165,14 @@ class Physics:
         for hull in loose:
             hull.stand(sum(wheel in touching for wheel in hull.wheels) / len(hull.wheels))
 
-    def spots(self, floor: int) -> list[tuple[float, float]]:
-        """Return the places of all robots on a floor (world, m)."""
+    def spots(self) -> dict[int, list[tuple[float, float]]]:
+        """Return the places of all robots (world, m) by floor; a floor without robots is missing."""
         rows = self._hull_rows
-        places: list[tuple[float, float]] = rows[rows[:, HULL_FLOOR] == floor, HULL_X : HULL_Y + 1].tolist()
-        return places
+        places, floors = rows[:, HULL_X : HULL_Y + 1].tolist(), rows[:, HULL_FLOOR].tolist()
+        spots: dict[int, list[tuple[float, float]]] = {}
+        for (x, y), floor in zip(places, floors, strict=True):
+            spots.setdefault(int(floor), []).append((x, y))
+        return spots
 
     def move_person(self, body: str, pose: Pose, floor: int) -> None:
         """Place a person at ``pose`` (world)."""

@@ -30,7 +30,7 @@ from roboglot.simulation.bodies.rounds import Rounds
 from roboglot.simulation.building.building import Building
 from roboglot.simulation.detectors.glance import Surroundings
 from roboglot.simulation.faults.faults import Faults
-from roboglot.simulation.people.people import Spots, Walker, keyed
+from roboglot.simulation.people.people import Walker, keyed
 from roboglot.simulation.people.routine import Clap, Say
 from roboglot.simulation.radio.gadgets import Gadgets
 from roboglot.simulation.radio.radio import Radio
@@ -269,13 +269,9 @@ class World:
     def _walk(self) -> None:
         if not self._walkers:
             return
-        robots: dict[int, Spots] = {}  # by floor
-        free = self._environment.surroundings.lines.leads
+        robots, free = self._physics.spots(), self._environment.surroundings.lines.leads
         for walker in self._walkers:
-            floor = walker.floor
-            if (there := robots.get(floor)) is None:
-                there = robots[floor] = self._physics.spots(floor)
-            if walker.walk(TICK, there, free):
+            if walker.walk(TICK, robots.get(walker.floor, ()), free):
                 self._physics.move_person(walker.body, walker.pose, walker.floor)
             if walker.aloud:
                 for step in walker.fetch():
