@@ -87,6 +87,16 @@ def test_any_object_is_a_message_or_a_violation(content: dict[str, Any]) -> None
     assert content["t"] in {"output", "call", "finished", "failed", "checked"}
 
 
+@given(st.lists(JSON, max_size=5) | JSON, st.just({}) | JSON)
+def test_plain_arguments_are_read_as_all_others(args: Any, kwargs: Any) -> None:
+    call = CallMessage(1, "x", msgspec.Raw(json.dumps(args).encode()), msgspec.Raw(json.dumps(kwargs).encode()))
+    plain = call.plain()
+    if plain is not None:
+        assert repr(plain) == repr(drained(call.values()))
+    else:
+        assert kwargs != {} or not isinstance(args, list) or any(isinstance(arg, list | dict) for arg in args)
+
+
 @given(JSON)
 def test_any_json_is_value_or_a_value_error(content: Any) -> None:
     try:
@@ -131,8 +141,10 @@ def test_what_cannot_cross_is_refused() -> None:
         unpack({"$": "dict", "v": [[number, 0] for number in range(PAIRS_MAX + 1)]})
     with pytest.raises(ValueError, match="key"):
         unpack({"$": "dict", "v": [[{"$": "dict", "v": []}, 1]]})
+    crowded = CallMessage(1, "x", msgspec.Raw(json.dumps([0] * 65).encode()), msgspec.Raw(b"{}"))
+    assert crowded.plain() is None
     with pytest.raises(ProtocolViolation, match="too many"):
-        drained(CallMessage(1, "x", msgspec.Raw(json.dumps([0] * 65).encode()), msgspec.Raw(b"{}")).values())
+        drained(crowded.values())
 
 
 def test_too_many_values_are_refused_before_making_any() -> None:

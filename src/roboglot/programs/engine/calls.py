@@ -125,11 +125,10 @@ class Calls:
         if call.name not in self._names:
             raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
         self._waiting = Call(call.id, call.name, (), {}, 0)  # its values have not been read yet
-        values = call.values()
         if size <= SHORT:
-            self._deliver(call, size, drained(values))
+            self._deliver(call, size, call.plain() or drained(call.values()))
         else:
-            self._read(call, size, values)
+            self._read(call, size, call.values())
 
     def _read(
         self, call: CallMessage, size: int, values: Generator[None, None, Values], *, in_turn: bool = False
@@ -157,16 +156,20 @@ class Calls:
     def _deliver(self, call: CallMessage, size: int, values: Values) -> None:
         """Hand a call to the reader once the call rate allows it."""
         args, kwargs = values
-        interrupted = bool(self._history) and self._history[0].body is None
-        if self._history and not self._replay(call, args, kwargs):
-            return
+        interrupted = False
+        if self._history:
+            interrupted = self._history[0].body is None
+            if not self._replay(call, args, kwargs):
+                return
         unit, line = self._position.now
         self._waiting = event = Call(call.id, call.name, args, kwargs, line, unit, interrupted)
-        delay, deliver = self._rate.delay(size), partial(self._put, event)
+        delay = self._rate.delay(size)
         if delay > 0:
-            self._loop.call_later(delay, self._account.go_on, deliver)
+            self._loop.call_later(delay, self._account.go_on, partial(self._put, event))
+        elif self._account.spent:
+            self._account.queue(partial(self._put, event))
         else:
-            self._account.go_on(deliver)
+            self._host.put(event)
 
     def _halt(self, call: CallMessage) -> None:
         """Report a halt, except during a replay."""

@@ -37,7 +37,7 @@ class Inbox:
         """Add output."""
         if not text:
             return
-        if self._size + len(text) > OUTPUT_EVENT_MAX:
+        if self._pieces and self._size + len(text) > OUTPUT_EVENT_MAX:
             self._join()
         self._pieces.append(text)
         self._size += len(text)
@@ -46,7 +46,8 @@ class Inbox:
 
     def put(self, event: Event) -> None:
         """Add any other event."""
-        self._join()
+        if self._pieces:
+            self._join()
         self._events.append(event)
         self._wake()
 
@@ -64,12 +65,13 @@ class Inbox:
     async def take(self) -> Event | None:
         """Return the next event; None when closed and empty."""
         while not self._events:
-            self._join()
-            if not self._events:
-                if self.closed:
-                    return None
-                self._reader = self._loop.create_future()
-                await self._reader
+            if self._pieces:
+                self._join()
+                break
+            if self.closed:
+                return None
+            self._reader = self._loop.create_future()
+            await self._reader
         event = self._events.popleft()
         if isinstance(event, Output):
             self._unread -= len(event.text)
@@ -80,7 +82,6 @@ class Inbox:
             self._reader.set_result(None)
 
     def _join(self) -> None:
-        if self._pieces:
-            self._events.append(Output("".join(self._pieces)))
-            self._pieces.clear()
-            self._size = 0
+        self._events.append(Output("".join(self._pieces)))
+        self._pieces.clear()
+        self._size = 0

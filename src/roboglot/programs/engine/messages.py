@@ -60,6 +60,21 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
             raise ProtocolViolation(str(error)[:200]) from None
         return tuple(args), kwargs
 
+    def plain(self) -> tuple[tuple[object, ...], dict[str, object]] | None:
+        """Return the arguments of a short call if all are positional and none contains others, which is usual.
+
+        None for all other arguments, and for what is no list: ``values`` checks them.
+        """
+        if bytes(self.kwargs) != b"{}":
+            return None
+        try:
+            packed = _list(self.args)
+        except (msgspec.MsgspecError, ValueError, RecursionError):
+            return None
+        if len(packed) > ARGUMENTS_MAX or not _PLAIN.issuperset(map(type, packed)):
+            return None
+        return tuple(packed), {}
+
     @property
     def size(self) -> int:
         """Bytes of the arguments."""
@@ -95,6 +110,7 @@ class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknow
 Message = OutputMessage | CallMessage | VariablesMessage | FinishedMessage | FailedMessage | CheckedMessage
 _decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
 _ALONE = {bool, float, str, type(None)}  # types whose values are sent unpacked
+_PLAIN = _ALONE | {int}  # a short call has no room for a number that is too large
 _list = msgspec.json.Decoder(list).decode
 _dict = msgspec.json.Decoder(dict).decode
 

@@ -167,8 +167,13 @@ class Run:
         """Take one frame of the worker; return False when no more frames matter. Raises ProtocolViolation."""
         if self._ending is not None:
             return False
-        began = time.thread_time() if len(body) > SHORT else 0.0
-        self._take_message(message := decode(body), len(body))
+        size = len(body)
+        began = time.thread_time() if size > SHORT else 0.0
+        message = decode(body)
+        if isinstance(message, CallMessage):
+            self.calls.take(message, size)
+        else:
+            self._take_message(message)
         cost = OUTPUT_COST if isinstance(message, OutputMessage) else SHORT_COST
         self.account.charge(cost + (time.thread_time() - began if began else 0.0))
         return self._ending is None
@@ -207,10 +212,8 @@ class Run:
         self._inbox.close()
         self._ended.set_result(None)
 
-    def _take_message(self, message: Message, size: int) -> None:
+    def _take_message(self, message: Message) -> None:
         match message:
-            case CallMessage():
-                self.calls.take(message, size)
             case OutputMessage(text=text):
                 self._take_output(text)
             case VariablesMessage(variables=variables):

@@ -18,6 +18,8 @@ STEP_BITS, ORDERS = 2, 64  # the order in a step is one byte
 FOUND_MAX = 4096
 """Most addresses whose places are cached: a program calls from the same few lines again and again."""
 
+_NOWHERE = (0, (0, 0))
+
 
 class Page:
     """Mapped shared memory. ``memory``: descriptor of ``places.memory()`` bytes, closed by the caller."""
@@ -27,7 +29,7 @@ class Page:
         # Aligned words: in a search by bytes, a worker could craft a pattern that matches at every second byte.
         self._words: NDArray[np.uint64] = np.frombuffer(self._memory, np.uint64, 1 + min(places.count, SEARCHED_MAX))
         self._places = places
-        self._found: dict[int, int] = {}
+        self._found: dict[int, tuple[int, tuple[int, int]]] = {}
         self._last = (0, 0)
         self._orders = 0
 
@@ -38,12 +40,13 @@ class Page:
             return self._last
         words = self._words
         address = words.item(0)
-        number = self._found.get(address, 0)
+        number, place = self._found.get(address, _NOWHERE)
         if not number or words.item(1 + number) != address:  # not written yet, or moved by a hostile worker
             number = self._search(address)
+            place = self._places.place(number)
             if len(self._found) < FOUND_MAX:
-                self._found[address] = number
-        return self._places.place(number)
+                self._found[address] = number, place
+        return place
 
     def order(self, step: Step) -> None:
         """Halt after a step from here."""

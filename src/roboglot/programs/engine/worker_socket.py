@@ -98,7 +98,7 @@ class Wire(asyncio.Protocol):
     def _take_some(self) -> int:
         taken = 0
         try:
-            while self._bodies and not (self._account.spent and taken):
+            while self._bodies and not (taken and self._account.spent):
                 taken += 1
                 if not self._listener.take(self._bodies.popleft()):
                     self.drop()
