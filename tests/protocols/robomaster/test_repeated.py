@@ -8,6 +8,7 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.system.network import Network
 from roboglot.model.inputs.fairness import LENT, Fairness
 from roboglot.protocols.robomaster import limits
+from roboglot.wire.robomaster.lines import LINE_MAX
 
 MODE = "robot mode ?;"
 
@@ -61,6 +62,14 @@ async def test_part_of_a_line_is_no_line(client) -> None:
     await repeat(client)
     client.send("nonsense ")
     await asyncio.sleep(0)
+    assert await client.ask(MODE) == "command format error: command parse error;"
+    assert await client.ask(MODE) == "chassis_lead;"
+
+
+async def test_end_of_an_overlong_line_is_no_line(client) -> None:
+    await repeat(client)
+    assert await client.ask(MODE + "x" * (LINE_MAX + 1)) == "chassis_lead;"
+    await asyncio.sleep(0.01)
     assert await client.ask(MODE) == "command format error: command parse error;"
     assert await client.ask(MODE) == "chassis_lead;"
 

@@ -38,6 +38,9 @@ async def test_commands_answers_pushes_and_events_on_one_line(robot, world, forw
         await asyncio.sleep(0.01)
         os.write(line, b"de ?;chassis push attitude on afreq 1;armor event hit on;")
         assert await heard(line) == "chassis_lead ;\nok;\nok;\n"
+        for _ in range(3):
+            os.write(line, b"robot mode ?;")
+            assert await heard(line) == "chassis_lead ;\n"
         await forward(seconds=1.001)
         assert (await heard(line)).startswith("chassis push attitude ")
         world.hands.touch_plate("a", PlatePlace.LEFT)

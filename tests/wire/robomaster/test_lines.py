@@ -34,6 +34,7 @@ def test_a_megabyte_without_end_is_not_kept() -> None:
     for _ in range(1024):
         assert list(splitter.feed(b"x" * 1024)) == []
         assert splitter.pending <= LINE_MAX
+        assert splitter.within
     assert list(splitter.feed(b";version;")) == [None, "version"]
 
 

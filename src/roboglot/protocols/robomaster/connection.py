@@ -111,7 +111,7 @@ class ControlConnection(asyncio.Protocol):
         ):
             use.left -= 1
             if type(reply) is bytes:
-                self.transport.write(reply)
+                self.transport.write(reply + self._line_end)
             else:
                 self._say(data[:-1].decode(errors="replace").strip(), cast(Answer, reply))
         else:
@@ -119,7 +119,7 @@ class ControlConnection(asyncio.Protocol):
 
     def _read(self, data: bytes) -> None:
         """Queue the lines in ``data``, and answer what can be answered now."""
-        whole = self._greeting.known and not self._splitter.pending and data.find(END) == len(data) - 1
+        whole = self._greeting.known and not self._splitter.within and data.find(END) == len(data) - 1
         self._said = NOTHING
         texts = list(self._splitter.feed(turn_away_strangers(self._greeting, self.transport, data)))
         if self._lenient and self._splitter.pending and (rest := self._splitter.flush()) != "":
@@ -233,7 +233,7 @@ class ControlConnection(asyncio.Protocol):
         self._join()
         await late(self._context.robot)
         self._say(text, result)
-        if not self._commands and not self._splitter.pending and self._writable.is_set():
+        if not self._commands and not self._splitter.within and self._writable.is_set():
             self._said = self._context.said
 
     def _say(self, text: str | None, result: Answer) -> None:

@@ -22,6 +22,11 @@ class LineSplitter:
         """Number of bytes kept until the next ``;``, at most LINE_MAX."""
         return len(self._tail)
 
+    @property
+    def within(self) -> bool:
+        """Return whether a text has begun that ends later, even one that is too long to be kept."""
+        return self._overlong or bool(self._tail)
+
     def feed(self, data: bytes) -> Iterator[str | None]:
         """Yield every text that ``data`` completes, without surrounding white space; skip empty texts.
 
