@@ -26,7 +26,7 @@ ROBOTS = "roboglot.storage.schema"  # tables of the robots' memory
 
 
 class Database:
-    """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:" for tests.
+    """Open with ``Database(path)``; close with ``close``. ``path`` may be ":memory:": nothing is kept.
 
     ``in_place``: ``run`` blocks, for a lockstep clock, which would otherwise advance meanwhile by a different amount
     each time, so that the robot's behaviour would depend on the disk's speed. A database in memory always blocks.

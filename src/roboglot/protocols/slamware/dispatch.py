@@ -169,12 +169,12 @@ class Application:
                 return None
             try:
                 answer = handler()
+                if answer is NO_CONTENT or answer is None:
+                    return None
+                headers, body = self._render(answer, scope)
             except Exception:  # noqa: BLE001 - it only read: asked once more, it is worded and logged
                 return None
-            if answer is NO_CONTENT or answer is None:
-                return None
             use.left -= 1
-            headers, body = self._render(answer, scope)
             return written([*headers, *shared], body)
 
         return reply
