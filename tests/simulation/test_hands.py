@@ -90,3 +90,15 @@ async def test_the_same_seed_gives_the_same_battle(simulate):
     first = await battle(simulate, 3)
     assert first == await battle(simulate, 3)
     assert first != await battle(simulate, 4)
+
+
+async def test_robot_put_elsewhere_has_its_weight(simulate):
+    sim = simulate("empty", start=Pose(4.0, 5.0))
+    sim.world.start()
+    hands, hull = sim.world.hands, sim.world._physics.hulls["a"]
+    hands.lift("a")
+    await sim.clock.advance(1.0)
+    hands.place("a", Pose(6.0, 5.0))
+    await sim.clock.advance(0.5)
+    assert hull.support.sprung
+    assert hull.rise == pytest.approx(0.0, abs=1e-3)
