@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import random
 
@@ -9,9 +10,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from roboglot.kernels.layouts import HULL_LOOKED_X, HULL_LOOKED_Y, HULL_WALLS
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base
-from roboglot.model.geometry import Pose, Twist
+from roboglot.model.errors import Refused
+from roboglot.model.geometry import Pose, Twist, Vector3
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.meetings import NO_CONTACTS
 from roboglot.simulation.world.world import RobotPlacement, World
@@ -100,3 +103,63 @@ async def test_contacts_of_standing_robots_are_not_searched(simulate: Simulate) 
     simulation.robot[Base].set_velocity(Twist(0.3))
     await simulation.clock.advance(0.1)
     assert not options.disableflags & NO_CONTACTS
+
+
+async def test_distance_of_walls_is_never_overrated(simulate: Simulate) -> None:
+    """Edges of the floor are looked up more often than walls: the lift's shaft is nearer."""
+    simulation = simulate("office", start=Pose(6.0, 10.0))
+    physics, dice = simulation.world._physics, random.Random(1)
+    hull = physics.hulls["a"]
+    row = physics._hull_rows[0]
+    for _ in range(30):
+        pose, way = Pose(dice.uniform(1.5, 9.0), dice.uniform(9.0, 11.0)), dice.uniform(-3.2, 3.2)
+        hull.place(pose, 0)
+        for _ in range(60):
+            physics._data.qpos[:2] += 0.02 * np.cos(way), 0.02 * np.sin(way)
+            hull.look()
+            gone = abs(hull.x - row[HULL_LOOKED_X]) + abs(hull.y - row[HULL_LOOKED_Y])
+            assert row[HULL_WALLS] - gone <= physics.walls.room(hull.x, hull.y, 0) + 1e-9
+
+
+async def story(seed: int, *, glides: bool) -> list[list[tuple[bool, float, float]]]:
+    """Return touches and places by tick and robot, while robots drive and hands do all they can."""
+    clock, dice = LockstepClock(), random.Random(seed)
+    names = {f"r{index}": dice.choice(BODIES) for index in range(dice.randint(1, 3))}
+    world = World(load_world("office"), [RobotPlacement(*one) for one in names.items()], clock=clock, seed=seed)
+    for name in names:
+        world.equip(Robot(name, world.description_of(name), clock))
+    physics, hands = world._physics, world.own_hands
+    physics.rows.load_kernels()
+    if glides:
+        physics.load_kernels()
+    else:
+        physics._gliding = physics._meetings._gliding = None
+    world.start()
+    seen = []
+    for tick in range(500):
+        for name in names if tick % 25 == 10 else ():
+            what, pose = dice.random(), world.truth.pose_of(name)
+            near = pose.compose(Pose(dice.uniform(-0.8, 0.8), dice.uniform(-0.8, 0.8)))
+            twist = Twist(dice.choice((0.0, 0.2, 0.5, 1.0, -0.3)), 0.0, dice.choice((0.0, 1.0, -1.0)))
+            with contextlib.suppress(Refused, ValueError):
+                if what < 0.7:
+                    world.robots[name][Base].set_velocity(twist)
+                elif what < 0.8:
+                    hands.push(name, Vector3(dice.uniform(-8.0, 8.0), dice.uniform(-8.0, 8.0), 0.0))
+                elif what < 0.9:
+                    hands.add_obstacle(near, (0.2, 0.3, dice.choice((0.05, 0.5))))
+                else:
+                    hands.place(name, near)
+        await clock.advance(0.02)
+        seen.append([(bool(hull.touches), hull.x, hull.y) for hull in physics.hulls.values()])
+    world.close()
+    return seen
+
+
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 15))])
+async def test_touches_are_those_of_mujoco(seed: int) -> None:
+    gliding, stepping = await story(seed, glides=True), await story(seed, glides=False)
+    assert any(touches for tick in stepping for touches, _, _ in tick)
+    for glided, stepped in zip(gliding, stepping, strict=True):
+        assert [touches for touches, _, _ in glided] == [touches for touches, _, _ in stepped]
+        assert np.allclose(glided, stepped, rtol=0.0, atol=1e-3)

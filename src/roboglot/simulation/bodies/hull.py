@@ -209,7 +209,7 @@ class Hull(HullState):
             self.support.walls(walls.near)
         self._looked, row = floor, self._row
         row[HULL_LOOKED_X], row[HULL_LOOKED_X + 1] = x, y
-        row[HULL_FLOOR], row[HULL_WALLS] = floor, walls.away
+        row[HULL_FLOOR], row[HULL_WALLS] = floor, walls.away(x, y, floor)
         row[HULL_FREE] = min(edges.left(x, y, floor), walls.left(x, y, floor))
 
     @property

@@ -56,16 +56,15 @@ class Nearness:
             return -1.0
         return self._free - abs(x - self._x) - abs(y - self._y)
 
-    @property
-    def away(self) -> float:
-        """Distance from the middle to the building at the last check, m; negative if unknown."""
-        return self._next
+    def away(self, x: float, y: float, floor: int) -> float:
+        """Return the least distance (m) from a place to the building, by the last check; negative if unknown."""
+        if floor != self._floor or self._room is None:
+            return -math.inf
+        return self._next - abs(x - self._x) - abs(y - self._y)
 
     def gap(self, x: float, y: float, floor: int) -> float:
         """Return the least free distance (m) around a robot at a place; negative if unknown."""
-        if floor != self._floor or self._room is None:
-            return -math.inf
-        return self._next - self._radius - abs(x - self._x) - abs(y - self._y)
+        return self.away(x, y, floor) - self._radius
 
     def look(self, x: float, y: float, floor: int) -> bool:
         """Update by the robot's place; return whether ``near`` changed."""
