@@ -84,3 +84,16 @@ async def test_robot_in_its_dock_sleeps(simulate: Simulate, *, compiled: bool) -
     await simulation.clock.advance(2.0)
     assert physics._meetings.off
     assert physics._sleep.lasts
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+async def test_robot_at_rest_feels_obstacles(simulate: Simulate, *, compiled: bool) -> None:
+    simulation = simulate("empty", start=Pose(4.0, 5.0))
+    if compiled:
+        simulation.world._physics.load_kernels()
+    simulation.world.start()
+    await simulation.clock.advance(1.0)
+    assert simulation.world._physics._meetings.off
+    simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(0.25)), (0.2, 0.2, 0.5))
+    await simulation.clock.advance(0.04)
+    assert simulation.world._physics.hulls["a"].touches

@@ -68,6 +68,7 @@ class Meetings:
         if revision != self._revision or (self.off and not all(map(self._as_expected, self._hulls))):
             self._revision = revision
             self.forget()
+            self._left = seconds  # search once: robots that rest may have been reached
         self._left -= seconds
         if self._left >= 0.0 or not self._hulls:  # real and recorded robots are not in any world
             return
