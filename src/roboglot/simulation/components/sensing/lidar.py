@@ -86,10 +86,10 @@ class SimulatedLidar(Lidar):
         """Take a scan at the end of a turn."""
         if self.turns is not None:
             self.turns.expect(self)
+        ranges, self.taken, section = self.taken, None, self._section
         if self.silent:
             self._scan = None
             return
-        ranges, self.taken, section = self.taken, None, self._section
         if ranges is None:
             ranges = self._measure()
         if section.dropouts or section.sector_every:
