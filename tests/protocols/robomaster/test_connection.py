@@ -244,6 +244,14 @@ async def test_flood_waits_for_turns_and_is_answered(connect, robot) -> None:
     await greedy.close()
 
 
+async def test_each_of_many_stops_counts_once(connect, robot) -> None:
+    fairness, client = held(robot), await connect()
+    await client.ask("command;")
+    fairness.on = True
+    for number in range(10):
+        assert await client.ask(f"chassis speed x 0 y 0 z 0 seq {number};") == f"ok seq {number} ;"
+
+
 async def test_stop_waits_for_no_other_client(connect, robot) -> None:
     fairness, greedy = held(robot), await connect()
     assert await greedy.ask("command;") == "ok;"

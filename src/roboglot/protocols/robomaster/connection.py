@@ -203,7 +203,7 @@ class ControlConnection(asyncio.Protocol):
             fairness.lend(use, fairness.now() - begun)
 
     def _hurries(self, fairness: Fairness, use: Use) -> bool:
-        return any(map(stops, self._commands)) and fairness.hurries(use, BATCH_MAX)
+        return any(map(stops, self._commands)) and fairness.hurries(use, min(len(self._commands), BATCH_MAX))
 
     def _take_turn(self) -> None:
         self._turn = None
