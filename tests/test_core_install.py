@@ -110,9 +110,10 @@ def test_version_says_what_is_there(core: Path) -> None:
     assert "numba" in lines["kernels"]
 
 
-def test_command_without_its_extra_names_the_remedy(core: Path) -> None:
+def test_command_without_its_extra_names_the_remedy(core: Path, tmp_path: Path) -> None:
+    certs = "--export", str(tmp_path / "certs"), "--data", str(tmp_path / "data")
     for command, extra in (("up", "up"), ("demo", "demo"), ("coverage", "up"), ("certs", "cyberdog")):
-        done = run(core, "-m", "roboglot", command, *(["DIR"] if command == "certs" else []))
+        done = run(core, "-m", "roboglot", command, *(certs if command == "certs" else ()))
         assert done.returncode == 1
         (line,) = done.stderr.splitlines()
         assert f"roboglot {command} needs " in line

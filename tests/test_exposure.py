@@ -68,6 +68,9 @@ def test_what_is_open_is_said_in_red(capsys: pytest.CaptureFixture[str], monkeyp
     assert "robot a is open to everyone on every network" in said
     assert "robot b" not in said
     assert "block programs, Foxglove; CyberDog 2 gRPC asks for a certificate" in said
+    monkeypatch.setenv("NO_COLOR", "1")
     robots = (RobotConfig("a", "universal", "0.0.0.0"),)
     warn_if_open(Config(robots=robots, doors={"ros2": Ros2Config(enabled=True), "foxglove": FoxgloveConfig(False)}))
-    assert "block programs, ROS 2; CyberDog" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "block programs, ROS 2; CyberDog" in said
+    assert "\x1b[" not in said

@@ -25,6 +25,7 @@ from roboglot.protocols.foxglove.table import TABLE as VIEWER
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.robomaster.table import TABLE as TEXT
 from roboglot.protocols.slamware.table import TABLE as REST
+from roboglot.protocols.vda5050.config import Vda5050Config
 from roboglot.protocols.vda5050.dispatch import answer
 from roboglot.protocols.vda5050.order_book import ActionState
 from roboglot.protocols.vda5050.server import Vda5050Door
@@ -153,7 +154,7 @@ async def test_viewers_do_what_the_right_allows(runtime: Runtime, reached: set[o
 
 
 async def test_fleet_control_does_what_its_right_allows(runtime: Runtime, reached: set[object]) -> None:
-    [door] = [door for door in runtime.doors["a"]._doors if isinstance(door, Vda5050Door)]
+    door = Vda5050Door(runtime.fleet.robots["a"], Vda5050Config())
     keys = {operation.key for operation in FLEET}
     messages = {"order", "instantActions"}  # sent unprompted; all others are actions within
 

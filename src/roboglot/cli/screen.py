@@ -66,5 +66,6 @@ def _dim(text: str) -> str:
 
 
 def _print(text: str, *, to_errors: bool = False) -> None:
-    """Print a line, with its styles only on a terminal whose user has not set NO_COLOR."""
-    typer.echo(text, err=to_errors, color=False if os.environ.get("NO_COLOR") else None)
+    """Print a line, with its styles on a terminal; NO_COLOR and FORCE_COLOR override that, in this order."""
+    styled = False if os.environ.get("NO_COLOR") else True if os.environ.get("FORCE_COLOR") else None
+    typer.echo(text, err=to_errors, color=styled)
