@@ -1,6 +1,7 @@
 """The door as an HTTP server: routes, errors in the vendor's form, hostile clients. No robot moves here."""
 
 import asyncio
+import sys
 from urllib.parse import quote
 
 import httpx
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from roboglot.extras import MissingExtra
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable
 from roboglot.protocols.slamware import parameters
@@ -31,6 +33,12 @@ def test_every_handler_is_in_the_contract() -> None:
     assert implemented() < {row.key for row in ROWS}
     others = [operation for operation in TABLE if operation.key not in implemented() | beyond]
     assert all(operation.partial for operation in others)
+
+
+async def test_a_door_without_its_library_does_not_open(bare: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "uvicorn", None)  # as if not installed
+    with pytest.raises(MissingExtra, match=r"needs uvicorn, .* pip install 'roboglot\[slamware\]'"):
+        await SlamwareDoor(bare, "127.0.0.1", SlamwareConfig(port=0)).start()
 
 
 async def test_missing_things_are_reported_by_name(

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from roboglot.extras import MissingExtra, in_words, is_there
 from roboglot.model.components.mapping.storeys import Storeys
 from roboglot.model.components.system.firmware import Module
 from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, ShuttingDown
@@ -75,7 +76,9 @@ class SlamwareDoor:
         self._opening: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Listen. Raises OSError naming an address that is taken."""
+        """Listen. Raises MissingExtra without uvicorn, OSError naming an address that is taken."""
+        if not is_there("uvicorn"):  # it is loaded for the first client
+            raise MissingExtra(in_words("the Slamware door", ["uvicorn"], "slamware"), name="uvicorn")
         self._browsers.warn_if_open()
         await self._listen()
         context, listen = self._context, self._robot.events.listen
