@@ -9,13 +9,16 @@ import random
 import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from roboglot.kernels.layouts import HULL_LOOKED_X, HULL_LOOKED_Y, HULL_WALLS
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.legs import Legs
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Pose, Twist, Vector3
 from roboglot.model.robot import Robot
+from roboglot.simulation.world.description import Box
 from roboglot.simulation.world.meetings import NO_CONTACTS
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
@@ -163,3 +166,24 @@ async def test_touches_are_those_of_mujoco(seed: int) -> None:
     for glided, stepped in zip(gliding, stepping, strict=True):
         assert [touches for touches, _, _ in glided] == [touches for touches, _, _ in stepped]
         assert np.allclose(glided, stepped, rtol=0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+async def test_rising_robot_meets_what_hangs_above(simulate: Simulate, *, compiled: bool) -> None:
+    world = load_world("empty")
+    board = Box(at=(4.0, 5.0), size=(0.6, 0.6, 0.05), base=0.3)
+    room = replace(world.floors[0], furniture=(board,))
+    simulation = simulate(replace(world, floors=(room,)), start=Pose(6.0, 5.0), body="cyberdog2")
+    if compiled:
+        simulation.world._physics.load_kernels()
+    simulation.world.start()
+    simulation.robot[Legs].lie_down()
+    await simulation.clock.advance(5.0)
+    simulation.world.hands.place("a", Pose(4.0, 5.0))
+    await simulation.clock.advance(1.0)
+    hull = simulation.world._physics.hulls["a"]
+    assert not hull.touches
+    simulation.robot[Legs].stand()
+    await simulation.clock.advance(5.0)
+    assert hull.touches
+    assert hull.belly + hull.body.hull.torso_height < 0.32

@@ -29,6 +29,7 @@ from roboglot.kernels.layouts import (
     HULL_V,
     HULL_VX,
     HULL_VY,
+    HULL_VZ,
     HULL_WALLS,
     HULL_X,
     HULL_Y,
@@ -142,7 +143,8 @@ def clear(
         vx, vy = hulls[i, HULL_VX], hulls[i, HULL_VY]
         reach[i] = hulls[i, HULL_RADIUS] + margin + seconds * math.sqrt(vx * vx + vy * vy)
         pulls = hulls[i, HULL_HELD] == 0.0 and (hulls[i, HULL_DRIVE_X] != 0.0 or hulls[i, HULL_DRIVE_Y] != 0.0)
-        rests[i] = 1.0 if known and not pulls and abs(vx) < STILL and abs(vy) < STILL else 0.0
+        still = max(abs(vx), abs(vy), abs(hulls[i, HULL_VZ])) < STILL
+        rests[i] = 1.0 if known and still and not pulls else 0.0
     for i in range(robots):
         x, y, mine = hulls[i, HULL_X], hulls[i, HULL_Y], reach[i]
         for j in range(i):

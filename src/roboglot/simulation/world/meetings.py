@@ -93,14 +93,12 @@ class Meetings:
             self._model.opt.disableflags = flags | NO_CONTACTS if off else flags & ~NO_CONTACTS
 
     def _as_expected(self, hull: Hull) -> bool:
-        return hull.support.sprung and not (hull.disturbed or (hull.rests and hull.pulls))
+        return hull.support.sprung and not (hull.disturbed or (hull.rests and not _rests(hull)))
 
     def _is_calm(self) -> bool:
         """Return whether all robots stand on springs without contact forces; note which of them rest."""
         for hull in self._hulls:
-            vx, vy, _, _ = hull.motion
-            hull.rests = not hull.pulls and abs(vx) < STILL and abs(vy) < STILL
-            hull.disturbed = False
+            hull.rests, hull.disturbed = _rests(hull), False
         return not self._data.nefc and all(hull.support.sprung and not hull.touches for hull in self._hulls)
 
     def _there(self) -> tuple[NDArray[np.int64], list[float], list[float]]:
@@ -148,6 +146,12 @@ class Meetings:
         ways = speed + np.sqrt(speed * speed + 2.0 * pull * gap)
         times = np.where((speed > 0.0) | (pull > 0.0), 2.0 * gap / np.maximum(ways, 1e-9), HORIZON)
         return min(HORIZON, float(times.min()))
+
+
+def _rests(hull: Hull) -> bool:
+    """Return whether a robot neither drives nor moves, its torso included."""
+    vx, vy, vz, _ = hull.motion
+    return not hull.pulls and max(abs(vx), abs(vy), abs(vz)) < STILL
 
 
 def _soonest(gap: float, speed: float, pull: float) -> float:
