@@ -15,7 +15,7 @@ from roboglot.kernels.layouts import HULL_LOOKED_X, HULL_LOOKED_Y, HULL_WALLS
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.legs import Legs
-from roboglot.model.errors import Refused
+from roboglot.model.errors import Collided, Refused
 from roboglot.model.geometry import Pose, Twist, Vector3
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.description import Box
@@ -144,7 +144,7 @@ async def story(seed: int, *, glides: bool) -> list[list[tuple[bool, float, floa
             what, pose = dice.random(), world.truth.pose_of(name)
             near = pose.compose(Pose(dice.uniform(-0.8, 0.8), dice.uniform(-0.8, 0.8)))
             twist = Twist(dice.choice((0.0, 0.2, 0.5, 1.0, -0.3)), 0.0, dice.choice((0.0, 1.0, -1.0)))
-            with contextlib.suppress(Refused, ValueError):
+            with contextlib.suppress(Collided, Refused, ValueError):
                 if what < 0.7:
                     world.robots[name][Base].set_velocity(twist)
                 elif what < 0.8:
