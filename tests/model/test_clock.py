@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import math
 from collections.abc import Callable, Iterator
 from contextvars import Context, ContextVar
@@ -137,6 +138,35 @@ async def test_no_step_after_an_error_or_a_cancellation(clock: LockstepClock | R
     with pytest.raises(ValueError, match="no further"):
         await task
     assert calls == 2
+
+
+@pytest.mark.parametrize("before", [True, False])
+@pytest.mark.parametrize("failing", [True, False])
+async def test_last_step_may_cancel_its_task(before: bool, failing: bool) -> None:
+    clock, calls = LockstepClock(), 0
+    reported: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: reported.append(context))
+
+    def step() -> float | None:
+        nonlocal calls
+        calls += 1
+        if calls < 3:
+            return 0.1
+        task.cancel() if before else asyncio.get_running_loop().call_soon(task.cancel)
+        if failing:
+            raise ValueError("no further")
+        return None
+
+    task = asyncio.ensure_future(clock.keep_calling(step))
+    await clock.advance(1.0)
+    await asyncio.wait([task])
+    assert calls == 3
+    if before:
+        assert task.cancelled()
+    elif not task.cancelled():
+        task.exception()
+    gc.collect()
+    assert not reported
 
 
 async def test_wait_for_gives_up_in_robot_time() -> None:

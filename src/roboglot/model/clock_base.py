@@ -127,12 +127,14 @@ class Clock(ABC):
             try:
                 later = context.run(step)
             except Exception as error:  # noqa: BLE001 - it is the waiting task's
-                ended.set_exception(error)
+                if not ended.done():
+                    ended.set_exception(error)
+                    ended.exception()  # known, also if the task is cancelled before it wakes
             else:
-                if later is None:
-                    ended.set_result(None)
-                else:
+                if later is not None:
                     timer = self.call_later(later, again)
+                elif not ended.done():  # the step may have cancelled the task
+                    ended.set_result(None)
 
         timer = self.call_later(seconds, again)
         try:
