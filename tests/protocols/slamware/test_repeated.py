@@ -79,13 +79,13 @@ async def test_answer_is_what_is_true_now(wire: Client, bare: Robot, monkeypatch
     assert (await wire.ask(get())).endswith(b"[]")
 
 
-async def test_answer_that_cannot_be_written_is_an_error(wire: Client, bare_door: SlamwareDoor) -> None:
+async def test_answer_that_cannot_be_written_is_an_error(
+    wire: Client, bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for _ in range(3):
         await wire.ask(get())
-    application = bare_door._application
-    encode, application._encode = application._encode, lambda _: 1 / 0  # type: ignore[assignment, return-value]
+    monkeypatch.setattr(bare_door._application, "_encode", lambda _: 1 / 0)
     assert (await wire.ask(get())).startswith(b"HTTP/1.1 500")
-    application._encode = encode
 
 
 async def test_follower_sees_requests_made_before_it_came(wire: Client, bare: Robot) -> None:
