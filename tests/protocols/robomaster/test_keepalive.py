@@ -12,6 +12,7 @@ from typing import Any, cast
 import pytest
 
 from roboglot.protocols.robomaster.keepalive import LOOK_PERIOD, probe_for_life, unanswered
+from roboglot.protocols.robomaster.limits import VIGIL_PERIOD
 from tests.protocols.robomaster.text_client import ADDRESS
 
 DEAD = 5000  # ms
@@ -31,7 +32,8 @@ class Line:
     def get_extra_info(self, name: str) -> Any:
         return self if name == "socket" else (self.peer, 4711)
 
-    def setsockopt(self, level: int, option: int, _value: int) -> None:
+    def setsockopt(self, level: int, option: int, value: int) -> None:
+        assert option != socket.TCP_KEEPCNT or value > 5.0 / VIGIL_PERIOD, "the kernel would end it in the vigil"
         assert (level, option) != (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT), "it would end those who do not read"
 
     def getsockopt(self, *_: int) -> bytes:
@@ -62,6 +64,7 @@ async def looks(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         (Line(segments=3, silent=DEAD), True),
         (Line(probes=1, silent=60_000), False),  # it does not read; the last probe is on its way
         (Line(probes=4, silent=60_000), True),
+        (Line(probes=60, silent=DEAD - 1), False),  # it drives, and is probed many times a second
     ],
 )
 async def test_only_dead_peers_are_disconnected(line: Line, dead: bool, looks: list[Any]) -> None:
