@@ -1,8 +1,7 @@
 """``/metrics``: figures of robots and their doors, in Prometheus's text format.
 
-All names are in docs/operation/metrics.md.
 Requests are counted from the first scrape on; before, the tap costs nothing. Labels come from robots, doors and
-contracts, never from clients' data.
+contracts, never from clients' data. All names are listed in docs/operation/metrics.md.
 """
 
 from __future__ import annotations

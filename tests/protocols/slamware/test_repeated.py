@@ -20,7 +20,7 @@ API = "/api/core/artifact/v1/pois"
 
 
 class Client:
-    """A connection that sends what it is told to."""
+    """A connection that sends given bytes."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader, self.writer = reader, writer

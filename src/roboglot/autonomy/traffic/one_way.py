@@ -47,7 +47,7 @@ class OneWay:
     ) -> Meeting | None:
         """Return the first stretch of ``path`` (dense) that must stay free for now.
 
-        ``narrow`` tells where two cannot pass, and is called only if others come. The robot drives at ``speed`` m/s.
+        ``narrow`` finds where two cannot pass, and is called only if others come. The robot drives at ``speed`` m/s.
         """
         coming = [way for way in ways if len(way.points) >= 2 and stamp - self._moved.get(way.name, stamp) < GIVEN_UP]
         if not coming:
