@@ -143,3 +143,20 @@ def test_window_takes_back_what_it_lent(machine: Machine) -> None:
     machine.ask(GREEDY, 0.001)
     assert (use.left, use.owed) == (0, 3)
     assert use.last == pytest.approx(machine.time - 0.001), "it asked in that window"
+
+
+def test_first_request_of_a_window_is_timed(machine: Machine) -> None:
+    use = machine.fairness.of(MODEST)
+    assert machine.fairness.timed(use, lambda: "answer") == "answer"
+    assert use.left == LENT
+    use.settle()
+    assert machine.fairness.timed(use, lambda: None) is None, "nothing was done"
+    assert use.left == 0
+
+
+def test_greedy_client_is_not_answered_at_once(machine: Machine) -> None:
+    machine.ask(MODEST, 0.001)
+    for _ in range(3):
+        machine.ask(GREEDY, 0.02)
+    assert machine.fairness.timed(machine.fairness.of(GREEDY), lambda: 1 / 0) is None
+    assert machine.fairness.timed(machine.fairness.of(MODEST), lambda: "answer") == "answer"

@@ -89,3 +89,14 @@ async def test_repeated_lines_count_in_the_share(connect, robot) -> None:
     assert use.left == 0
     await client.ask(MODE)  # this one is timed
     assert (use.left, use.lent) == (LENT, LENT)
+
+
+async def test_line_of_each_window_is_not_read_anew(connect, robot, door, monkeypatch) -> None:
+    robot.fairness = Fairness(lambda: 0.0, lambda: 0.0)
+    client = await connect()
+    await client.ask("command;")
+    await repeat(client)
+    robot.fairness.of(":".join(str(part) for part in client.writer.get_extra_info("sockname"))).settle()
+    (connection,) = door._connections
+    monkeypatch.setattr(connection, "_read", lambda _data: connection.transport.abort())
+    assert await client.ask(MODE) == "chassis_lead;"

@@ -136,6 +136,16 @@ async def test_repeated_requests_count_in_the_share(wire: Client, bare: Robot) -
     assert use.left == LENT
 
 
+async def test_request_of_each_window_needs_no_parser(wire: Client, bare: Robot, bare_door: SlamwareDoor) -> None:
+    bare.fairness = fairness = Fairness(lambda: 0.0, lambda: 0.0)
+    host, port = wire.writer.get_extra_info("sockname")
+    for _ in range(3):
+        await wire.ask(get())
+    fairness.of(f"{host}:{port}").settle()  # as the next window does
+    connection(bare_door).parser = None
+    assert (await wire.ask(get())).endswith(b"[]")
+
+
 async def test_client_that_repeats_itself_is_kept(wire: Client, bare_door: SlamwareDoor) -> None:
     for _ in range(3):
         await wire.ask(get())

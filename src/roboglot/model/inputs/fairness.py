@@ -8,14 +8,16 @@ hold the processor: the thread itself must have worked for that part of the wind
 request to stop passes, and so do those before it.
 
 Requests that are answered by little more than a plain call would be slowed by looking at the time. Of these a client is
-lent some, which are counted afterwards: as long as the last that was timed took.
+lent some, which are counted afterwards: as long as the last that was timed took. The first of a window is timed.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from typing import TypeVar
 
+T = TypeVar("T")
 log = logging.getLogger(__name__)
 WINDOW = 0.1  # s
 PART = 0.5  # of a window, for the requests of all clients
@@ -147,6 +149,15 @@ class Fairness:
         use.typical = seconds
         use.left = use.lent = LENT
         self._lent.add(use)
+
+    def timed(self, use: Use, answer: Callable[[], T | None]) -> T | None:
+        """Return what ``answer`` does at once, and lend the next ones; None if the client has to wait, or by itself."""
+        if self.wait(use):
+            return None
+        begun = self.now()
+        if (answered := answer()) is not None:
+            self.lend(use, self.now() - begun)
+        return answered
 
     def _take_back(self, now: float) -> None:
         """Let each client be timed at its next request, and note who has asked since the last time."""

@@ -103,19 +103,23 @@ class ControlConnection(asyncio.Protocol):
         log.info("robomaster: %s connected", self._shown)
 
     def data_received(self, data: bytes) -> None:
-        use = self._use
-        if (
-            use.left
-            and (repeated := self._said.get(data)) is not None
-            and (reply := self._variables.run(repeated)) is not None
-        ):
-            use.left -= 1
+        if (repeated := self._said.get(data)) is not None and (reply := self._repeat(repeated)) is not None:
             if type(reply) is bytes:
                 self.transport.write(reply + self._line_end)
             else:
                 self._say(data[:-1].decode(errors="replace").strip(), cast(Answer, reply))
         else:
             self._read(data)
+
+    def _repeat(self, repeated: Repeated) -> object:
+        """Return the answer to a line that was said before; None if it has to go the long way now."""
+        use = self._use
+        if not use.left:
+            fairness = self._context.robot.fairness
+            return fairness.timed(use, lambda: self._variables.run(repeated)) if fairness else None
+        if (reply := self._variables.run(repeated)) is not None:
+            use.left -= 1
+        return reply
 
     def _read(self, data: bytes) -> None:
         """Queue the lines in ``data``, and answer what can be answered now."""

@@ -161,12 +161,10 @@ class Application:
         handler = partial(copy_context().run, operation.handler, self._context, **values)
         card = robot[Network] if Network in robot else None  # noqa: SIM401 - one that comes later is real and on time
         peer = scope.get("client") or ("", 0)
-        use = robot.fairness.of(f"{peer[0]}:{peer[1]}") if robot.fairness else Use("")
-        tap = self._tap
+        fairness, tap = robot.fairness, self._tap
+        use = fairness.of(f"{peer[0]}:{peer[1]}") if fairness else Use("")
 
-        def reply() -> bytes | None:
-            if not use.left or tap.watched or (card is not None and card.delay) or log.isEnabledFor(logging.DEBUG):
-                return None
+        def read() -> bytes | None:
             try:
                 answer = handler()
                 if answer is NO_CONTENT or answer is None:
@@ -174,8 +172,16 @@ class Application:
                 headers, body = self._render(answer, scope)
             except Exception:  # noqa: BLE001 - it only read: asked once more, it is worded and logged
                 return None
-            use.left -= 1
             return written([*headers, *shared], body)
+
+        def reply() -> bytes | None:
+            if tap.watched or (card is not None and card.delay) or log.isEnabledFor(logging.DEBUG):
+                return None
+            if not use.left:
+                return fairness.timed(use, read) if fairness else None
+            if (response := read()) is not None:
+                use.left -= 1
+            return response
 
         return reply
 
