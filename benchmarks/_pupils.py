@@ -2,6 +2,7 @@
 
 REST clients ask for the pose and have their robot turn, text clients turn theirs and take pushes at 10 Hz, gRPC
 clients send frames that let the dog turn, and take its heartbeats. Some text clients film: they take the video's bytes.
+What they send is ready (for gRPC in ``_grpc_bytes.py``), as they share two cores with the robots, which are measured.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+import ssl
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -16,15 +18,13 @@ from ipaddress import IPv4Address
 from multiprocessing import get_context
 from typing import NamedTuple
 
-import grpc
+from _grpc_bytes import call, secured, serve
 
 from roboglot.clients.cyberdog import Certificates
-from roboglot.clients.cyberdog.link import PUSH_MAX
-from roboglot.wire.cyberdog.channel import HEARTBEAT_PERIOD, ROBOT_NAME, client_options
+from roboglot.wire.cyberdog.channel import HEARTBEAT_PERIOD
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
-from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 
 REST, TEXT, GRPC = "hermes", "robomaster_ep", "cyberdog2"  # the bodies that each kind of client supports
 LOOK = 0.01  # s between two checks of how late the clients' own loop is
@@ -37,8 +37,24 @@ TURN = b"POST /api/core/motion/v1/actions HTTP/1.1\r\nHost: localhost\r\nContent
     len(MOVE),
     MOVE,
 )
-FRAME = {"motion_id": int(Motion.TROT_SLOW), "cmd_type": 1, "cmd_source": 0, "vel_des": [0.0, 0.0, 0.3]}
-SERVO = json.dumps(FRAME | {"step_height": [0.05, 0.05]})
+
+
+def request_of(code: Code, fields: dict[str, object]) -> bytes:
+    """Return a request to a dog."""
+    return pb.SendRequest(nameCode=code, params=json.dumps(fields)).SerializeToString()
+
+
+FRAME: dict[str, object] = {
+    "motion_id": int(Motion.TROT_SLOW),
+    "cmd_type": 1,
+    "cmd_source": 0,
+    "vel_des": [0.0, 0.0, 0.3],
+}
+SERVO = request_of(Code.SERVO, FRAME | {"step_height": [0.05, 0.05]})
+STAND_UP = request_of(Code.MOTION, {"motion_id": int(Motion.STAND_UP), "cmd_source": 0, "duration": 0})
+PUSH = pb.SendRequest(nameCode=1).SerializeToString()[:1]  # a heartbeat begins otherwise
+NOTHING = pb.RecResponse(data="{}").SerializeToString()
+FINE = pb.Result(result="ok").SerializeToString()
 
 
 class Lesson(NamedTuple):
@@ -79,27 +95,19 @@ class Burden:
     cores: float = 0.0
 
 
-class App(service.GrpcAppServicer):
+class App:
     """The phone that all dogs call."""
 
     def __init__(self) -> None:
         self.beats: dict[str, int] = {}
 
-    async def heartbeat(self, request: pb.Ticks, _context: object) -> pb.Result:
-        self.beats[request.sn] = self.beats.get(request.sn, 0) + 1
-        return pb.Result(result="ok")
-
-    async def sendMsg(self, request: pb.SendRequest, context: grpc.aio.ServicerContext) -> None:  # noqa: N802
-        await context.write(pb.RecResponse(nameCode=request.nameCode, data="{}"))
-
-    async def serve(self, where: str, proof: Certificates) -> grpc.aio.Server:
-        """Listen where the dogs look for it."""
-        server = grpc.aio.server(options=[("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", PUSH_MAX)])
-        service.add_GrpcAppServicer_to_server(self, server)
-        pair = [(proof.key, proof.certificate)]
-        server.add_secure_port(where, grpc.ssl_server_credentials(pair, proof.ca, require_client_auth=True))
-        await server.start()
-        return server
+    def answer(self, request: bytes) -> bytes:
+        """Count a heartbeat, or acknowledge a push."""
+        if request.startswith(PUSH):
+            return request[: len(PUSH) + 4] + NOTHING
+        serial = pb.Ticks.FromString(request).sn
+        self.beats[serial] = self.beats.get(serial, 0) + 1
+        return FINE
 
 
 @dataclass(slots=True)
@@ -111,11 +119,13 @@ class Class:
     own: Burden = field(default_factory=Burden)
     ready: asyncio.Event = field(default_factory=asyncio.Event)
     began: float = 0.0
+    proof: ssl.SSLContext = field(init=False)
 
     async def run(self) -> tuple[dict[str, Seen], Burden]:
         """Have every client do its part."""
         app, lesson = App(), self.lesson
-        server = await app.serve(lesson.app, lesson.proof)
+        server = await serve(lesson.app, secured(lesson.proof, ssl.PROTOCOL_TLS_SERVER), app.answer)
+        self.proof = secured(lesson.proof, ssl.PROTOCOL_TLS_CLIENT)
         parts: dict[str, Callable[[int, str], Awaitable[None]]] = {REST: self.rest, TEXT: self.text, GRPC: self.dog}
         tasks = [asyncio.ensure_future(parts[body](n, at)) for n, (body, at) in enumerate(lesson.robots)]
         await asyncio.sleep(lesson.settle)
@@ -129,7 +139,7 @@ class Class:
         for serial, count in app.beats.items():
             self.seen[GRPC].pushes.append((count - before.get(serial, 0)) * HEARTBEAT_PERIOD / lesson.seconds)
         await asyncio.gather(*tasks)
-        await server.stop(None)
+        server.close()
         return self.seen, self.own
 
     async def beats(self, number: int, kind: str, request: Callable[[int], Awaitable[bool]]) -> None:
@@ -205,18 +215,15 @@ class Class:
 
     async def dog(self, number: int, address: str) -> None:
         """Have the dog stand up, then turn, frame by frame."""
-        proof = self.lesson.proof
-        credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
-        options = client_options(ROBOT_NAME)
-        async with grpc.aio.secure_channel(f"{address}:50052", credentials, options=options) as channel:
-            stub = service.GrpcAppStub(channel)
+        line = await call(address, self.proof)
 
-            async def tell(code: Code, text: str) -> bool:
-                answers = [answer.data async for answer in stub.sendMsg(pb.SendRequest(nameCode=code, params=text))]
-                return bool(answers) and '"error_code"' not in answers[-1]
+        async def tell(request: bytes) -> bool:
+            answer = await line.ask(request)
+            return bool(answer) and b'"error_code"' not in answer
 
-            await tell(Code.MOTION, json.dumps({"motion_id": int(Motion.STAND_UP), "cmd_source": 0, "duration": 0}))
-            await self.beats(number, GRPC, lambda _: tell(Code.SERVO, SERVO))
+        await tell(STAND_UP)
+        await self.beats(number, GRPC, lambda _: tell(SERVO))
+        line.transport.close()
 
 
 def attend(lesson: Lesson) -> tuple[dict[str, Seen], Burden]:
