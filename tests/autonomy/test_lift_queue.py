@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from roboglot.autonomy.building import lift_queue
-from roboglot.autonomy.building.lift_queue import LiftQueue
+from roboglot.autonomy.building.lift_queue import turn
 from roboglot.config import RobotConfig, StartConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import ActionStatus
@@ -45,7 +45,7 @@ async def test_each_has_its_turn(fleet: Fleet, clock: LockstepClock) -> None:
         async def make_way() -> None:
             seen.append(f"{name} makes way")
 
-        async with LiftQueue(fleet.robots[name]).turn(make_way):
+        async with turn(fleet.robots[name], make_way):
             seen.append(f"{name} rides")
             await clock.sleep(3.0)
 
@@ -75,7 +75,7 @@ async def test_queue_never_runs_out_of_tickets(
     async def ride(name: str) -> None:
         nonlocal most, rides
         for _ in range(4):
-            async with LiftQueue(fleet.robots[name]).turn(make_way):
+            async with turn(fleet.robots[name], make_way):
                 riding.append(name)
                 most, rides = max(most, len(riding)), rides + 1
                 await clock.sleep(0.3)
@@ -85,6 +85,66 @@ async def test_queue_never_runs_out_of_tickets(
     await clock.advance(12.0)
     await asyncio.gather(*turns)
     assert (most, rides) == (1, 12)
+
+
+async def test_robot_that_stands_still_loses_its_turn(
+    fleet: Fleet, clock: LockstepClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It gets the next one when it is under way again, and keeps that while it rides."""
+    monkeypatch.setattr(lift_queue, "STILL_MAX", 12.0)
+    seen, goes = list[str](), asyncio.Event()
+
+    async def make_way() -> None:
+        seen.append("way")
+
+    async def stand() -> None:
+        async with turn(fleet.robots["a"], make_way) as mine:
+            await goes.wait()
+            seen.append(f"a boards: {await mine.may_board()}")
+            seen.append(f"a boards: {await mine.may_board()}")
+            await clock.sleep(lift_queue.STILL_MAX + 5.0)
+            seen.append("a was aboard")
+
+    async def ride() -> None:
+        async with turn(fleet.robots["b"], make_way) as mine:
+            seen.append(f"b boards: {await mine.may_board()}")
+            await clock.sleep(10.0)
+
+    rides = [asyncio.ensure_future(stand()), asyncio.ensure_future(ride())]
+    await clock.advance(lift_queue.STILL_MAX - 5.0)
+    assert seen == ["way"]
+    await clock.advance(10.0)
+    assert seen == ["way", "b boards: True"]
+    goes.set()
+    await clock.advance(10.0)
+    assert seen[2:] == ["way", "way", "a boards: False", "a boards: True"]
+    last = asyncio.ensure_future(ride())
+    await clock.advance(lift_queue.STILL_MAX + 10.0)
+    assert seen[6:] == ["way", "a was aboard", "way", "b boards: True"]
+    await clock.advance(11.0)
+    await asyncio.gather(*rides, last)
+
+
+async def test_ride_from_within_the_car_comes_first(fleet: Fleet, clock: LockstepClock) -> None:
+    """A robot that was restarted in the car occupies it: whose turn it was waits."""
+    seen = list[str]()
+
+    async def make_way() -> None:
+        pass
+
+    async def ride(name: str, *, aboard: bool) -> None:
+        async with turn(fleet.robots[name], make_way, aboard=aboard) as mine:
+            await clock.sleep(2.0)  # the lift comes
+            while not mine.aboard:
+                await mine.may_board()
+            seen.append(f"{name} rides")
+            await clock.sleep(3.0)
+            seen.append(f"{name} rode")
+
+    rides = [asyncio.ensure_future(ride("a", aboard=False)), asyncio.ensure_future(ride("b", aboard=True))]
+    await clock.advance(10.0)
+    assert seen == ["b rides", "b rode", "a rides", "a rode"]
+    await asyncio.gather(*rides)
 
 
 @pytest.mark.slow  # two minutes of three robots; the order: test_each_has_its_turn

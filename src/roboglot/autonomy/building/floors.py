@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
-from roboglot.autonomy.building.lift_queue import LiftQueue
+from roboglot.autonomy.building.lift_queue import Turn, turn
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
@@ -50,7 +50,7 @@ class LiftFloors(Floors):
 
     def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
         self.robot, self.belief, self.navigation = robot, course.belief, navigation
-        self._course, self._queue = course, LiftQueue(robot)
+        self._course = course
         self._others = StoreyShelf(robot)
         self._current = 0
         self._places: tuple[Pose, Pose] | None = None  # the waiting place, and the place inside the car
@@ -89,12 +89,11 @@ class LiftFloors(Floors):
             return
         waiting, inside = self._places
         aboard = self.belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2  # still there from the last try
-        if aboard:
-            await self._go(action, floor, redraw, aboard=True)
-        elif floor != self._current:
-            action.report(RideStage.APPROACHING)
-            async with self._queue.turn(partial(self._make_way, action)):
-                await self._go(action, floor, redraw, aboard=False)
+        if aboard or floor != self._current:
+            if not aboard:
+                action.report(RideStage.APPROACHING)
+            async with turn(self.robot, partial(self._make_way, action), aboard=aboard) as mine:
+                await self._go(action, floor, redraw, mine)
 
     async def _make_way(self, action: Action) -> None:
         """Leave the way between the car and the floor in front of it, if the robot is in it and there is room."""
@@ -116,16 +115,17 @@ class LiftFloors(Floors):
             with contextlib.suppress(Blocked, Unreachable):
                 await self.navigation.drive(action, Goal((place,), NavigationOptions(tolerance=0.2)), _unheard)
 
-    async def _go(self, action: Action, floor: int, redraw: bool, *, aboard: bool) -> None:
+    async def _go(self, action: Action, floor: int, redraw: bool, mine: Turn) -> None:
         """Ride to ``floor`` from the floor here, or from the car. Raises what its steps do."""
         assert self._places is not None
         waiting, inside = self._places
         lift, belief = self.robot[LiftClient], self.belief
-        if not aboard:
+        while not mine.aboard:
             action.report(RideStage.APPROACHING)
             await self.navigation.drive(action, Goal((waiting.point,), NavigationOptions(yaw=waiting.yaw)), _unheard)
             action.report(RideStage.CALLING)
             await self._comes(self._current)
+            await mine.may_board()
         mapped = belief.mapping
         belief.mapping = False  # doors open and close, and the car belongs to no floor
         try:
