@@ -172,7 +172,6 @@ class RecordConfig:
 class Config:
     """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until it is advanced.
 
-    ``patient``: on a slow machine, time waits for the world instead of running ahead of it.
     ``doors``: the doors' own sections by name; missing ones have their defaults.
     ``database``: URL of a PostgreSQL server for the robots' stored data, for a fleet on several machines; without it,
     they are in a file of the data folder.
@@ -185,7 +184,6 @@ class Config:
     robots: tuple[RobotConfig, ...] = (RobotConfig(),)
     speed: float = 1.0
     lockstep: bool = False
-    patient: bool = False
     seed: int = 1
     data: Path = field(default_factory=lambda: default_data_folder(os.environ))
     database: str = ""

@@ -21,7 +21,7 @@ from roboglot.drivers.driver import Driver
 from roboglot.drivers.urls import Drivers
 from roboglot.media.streams import add_streams
 from roboglot.model.client_context import concerning
-from roboglot.model.clock import Clock, LockstepClock
+from roboglot.model.clock import Clock, LockstepClock, PatientClock, RealClock
 from roboglot.model.components.interaction.input_device import InputDevice
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.logistics.traffic_radio import TrafficRadio
@@ -108,6 +108,15 @@ async def _settled(clock: Clock, *endings: Awaitable[object]) -> None:
         await clock.advance(STEP)
         await asyncio.wait((together,), timeout=BREATH)
     await together
+
+
+def clock_of(config: Config) -> Clock:
+    """Return the clock of the configuration's robots: on a slow machine it waits, if it has no real robots."""
+    if config.lockstep:
+        return LockstepClock()
+    if any(robot.is_real for robot in config.robots):
+        return RealClock(config.speed)
+    return PatientClock(config.speed)
 
 
 def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed: int, database: Transactions) -> Fleet:

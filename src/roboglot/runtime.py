@@ -23,10 +23,9 @@ from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.recordings import Recordings
 from roboglot.console.server import Console
 from roboglot.console.studio.programs import FOLDER, ClassHome, Programs, Studio
-from roboglot.fleet import build_fleet, origin_of
+from roboglot.fleet import build_fleet, clock_of, origin_of
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
-from roboglot.model.clock import Clock, LockstepClock, PatientClock, RealClock
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import RobotError
 from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
@@ -138,8 +137,7 @@ class Runtime:
         refuse_unguarded(config)
         self.config, self._class_home = config, class_home
         self._lock = lock_folder(config.data)
-        running = PatientClock if config.patient else RealClock
-        self.clock: Clock = LockstepClock() if config.lockstep else running(config.speed)
+        self.clock = clock_of(config)
         file, names = config.data / "roboglot.db", [robot.name for robot in config.robots]
         self._remembers = file.exists() or bool(config.database)
         self._database = open_database(file, config.database, names, in_place=config.lockstep)

@@ -225,10 +225,10 @@ async def test_world_clock_pauses_steps_and_speeds_up(tmp_path: Path) -> None:
     await desk.change_world("step_clock", {"seconds": 0.05})
     await clock.sleep_until(now + 0.05)
     assert clock.time() == now + 0.05
-    assert desk.pace == {"lockstep": False, "speed": 1.0, "paused": True, "seed": 1}
+    assert desk.pace == {"lockstep": False, "speed": 1.0, "paused": True, "seed": 1, "behind": 0.0}
     await desk.change_world("resume_clock", {})
     await desk.change_world("set_clock_speed", {"speed": 5})
-    assert desk.pace == {"lockstep": False, "speed": 5.0, "paused": False, "seed": 1}
+    assert desk.pace == {"lockstep": False, "speed": 5.0, "paused": False, "seed": 1, "behind": 0.0}
     with pytest.raises(BadParameters):
         await desk.change_world("set_clock_speed", {"speed": 0})
     await runtime.close()

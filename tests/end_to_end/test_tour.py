@@ -14,6 +14,7 @@ from roboglot.testing.addresses import free_addresses
 DEPOT = Path(__file__).parents[1] / "data" / "maps" / "depot.yaml"
 
 
+@pytest.mark.timeout(1000)
 @pytest.mark.slow  # a long story; tests/docs has the first call of each client
 @pytest.mark.parametrize("world", ["office", str(DEPOT)], ids=["office", "depot"])
 def test_four_clients_drive_one_robot(world: str, tmp_path: Path, vendor_ports: None) -> None:
@@ -23,7 +24,7 @@ def test_four_clients_drive_one_robot(world: str, tmp_path: Path, vendor_ports: 
         [*command, "--address", free_addresses(1), "--out", str(out)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=900,  # a hang; robot and clients are patient, however busy the machine is
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr

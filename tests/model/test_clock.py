@@ -13,7 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.model.clock import LEAD, LOCKSTEP_EPOCH, SLICE, LockstepClock, PatientClock, RealClock
+from roboglot.model.clock import LOCKSTEP_EPOCH, SLICE, LockstepClock, RealClock
+from tests.slow_machine import Hours
 
 
 async def test_nothing_happens_until_time_passes() -> None:
@@ -240,14 +241,6 @@ def test_a_clock_needs_a_speed(speed: float) -> None:
         RealClock(speed)
 
 
-class Hours:
-    """Real time that passes only by hand."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now = 1000.0
-        monkeypatch.setattr("roboglot.model.clock.time.monotonic", lambda: self.now)
-
-
 @given(steps=st.lists(st.tuples(st.sampled_from(["pass", "pause", "resume", "speed", "step"]), st.floats(0.01, 50.0))))
 def test_steered_time_is_the_sum_of_running_time(steps: list[tuple[str, float]]) -> None:
     with pytest.MonkeyPatch.context() as monkeypatch:
@@ -275,44 +268,6 @@ def test_steered_time_is_the_sum_of_running_time(steps: list[tuple[str, float]])
             assert clock.time() == pytest.approx(expected, abs=1e-6)
             if what in ("pause", "resume"):
                 assert clock.paused == (what == "pause")
-
-
-async def test_patient_clock_goes_no_further_than_world(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    hours = Hours(monkeypatch)
-    clock = PatientClock(speed=2.0)
-    hours.now += 50.0
-    assert clock.time() == pytest.approx(100.0)  # no world has begun yet
-    clock.reached(100.0)
-    hours.now += LEAD / 4
-    assert clock.time() == pytest.approx(100.0 + LEAD / 2)
-    hours.now += 1000.0
-    assert clock.time() == pytest.approx(100.0 + LEAD)
-    clock.reached(100.05)
-    assert clock.time() == pytest.approx(100.0 + LEAD)  # it resumes where it stood
-    hours.now += 0.01
-    assert clock.time() == pytest.approx(100.0 + LEAD + 0.02)
-    clock.pause()
-    hours.now += 1.0
-    assert clock.time() == pytest.approx(100.0 + LEAD + 0.02)
-    clock.resume()
-    clock.reached(math.inf)
-    hours.now += 10.0
-    assert clock.time() == pytest.approx(100.0 + LEAD + 20.02)
-
-
-async def test_timers_of_a_patient_clock_wait_with_it() -> None:
-    clock = PatientClock(speed=1000.0)
-    start = clock.time()
-    clock.reached(start)
-    sleeper = asyncio.ensure_future(clock.sleep_until(start + 2.5 * LEAD))
-    for step in range(1, 3):
-        await asyncio.sleep(0.01)  # ten robot seconds
-        assert not sleeper.done()
-        clock.reached(start + step * LEAD)
-    await asyncio.wait_for(sleeper, 60)
-    assert start + 2.5 * LEAD <= clock.time() <= start + 3 * LEAD + 1e-9
 
 
 async def test_paused_clock_holds_sleepers_until_a_step() -> None:

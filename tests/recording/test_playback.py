@@ -40,9 +40,7 @@ def whole_closing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def config(folder: Path, body: str, record: str, **doors: dict[str, object]) -> Config:
-    # Patient: else robot time runs on while a busy machine simulates nothing, and a drive gives up.
-    clock = {"speed": SPEED, "patient": True}
-    base = load_config(None, {"data": str(folder / "data"), "world": "empty", **clock, **doors}, sections())
+    base = load_config(None, {"data": str(folder / "data"), "world": "empty", "speed": SPEED, **doors}, sections())
     robots = (RobotConfig("a", body, ADDRESS),)
     return dataclasses.replace(
         base, robots=robots, record=RecordConfig(to=record), console=ConsoleConfig(enabled=False)

@@ -1,4 +1,4 @@
-"""Long computations: in place in lockstep, so that runs repeat exactly; otherwise in a thread."""
+"""Long computations: in place in lockstep, so that runs repeat exactly; otherwise in a thread, while time may wait."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ async def computed(clock: Clock, work: Callable[[], T]) -> T:
     """Return or raise the result of ``work``."""
     if isinstance(clock, LockstepClock):
         return work()
-    return await asyncio.to_thread(work)
+    with clock.thinking():
+        return await asyncio.to_thread(work)
 
 
 def compute_soon(clock: Clock, work: Callable[[], T], then: Callable[[T], None]) -> asyncio.Task[None] | None:
@@ -25,6 +26,6 @@ def compute_soon(clock: Clock, work: Callable[[], T], then: Callable[[T], None])
         return None
 
     async def run() -> None:
-        then(await asyncio.to_thread(work))
+        then(await computed(clock, work))
 
     return asyncio.get_running_loop().create_task(run())

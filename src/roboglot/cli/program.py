@@ -336,7 +336,7 @@ def _figures(run: TaskFrame | None) -> list[str]:
 async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
     """Start a robot in this process with only the programs' WebSocket, on a free port; yield its address."""
     from roboglot.fleet import build_fleet
-    from roboglot.model.clock import RealClock
+    from roboglot.model.clock import PatientClock
     from roboglot.programs.engine.engine import Engine
     from roboglot.programs.tasks.service import ProgramService
     from roboglot.protocols.visual.server import VisualDoor
@@ -347,7 +347,7 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
     engine.open_soon()
     await asyncio.sleep(0)  # its process loads while we build the world
     robots = (RobotConfig(body=body),)
-    fleet = build_fleet(world, robots, clock=RealClock(speed), seed=1, database=database)
+    fleet = build_fleet(world, robots, clock=PatientClock(speed), seed=1, database=database)
     robot = fleet.robots[robots[0].name]
     service = ProgramService(robot, engine, program_stores(database, robot.id))
     door = VisualDoor(service, "127.0.0.1", VisualConfig(port=0))

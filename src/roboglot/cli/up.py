@@ -53,10 +53,6 @@ def command(
         bool | None,
         typer.Option("--lockstep", help="Advance time only by the seconds in each line of standard input."),
     ] = None,
-    patient: Annotated[
-        bool | None,
-        typer.Option("--patient", envvar="ROBOGLOT_PATIENT", help="On a slow machine, time waits for the world."),
-    ] = None,
     seed: Annotated[
         int | None, typer.Option(envvar="ROBOGLOT_SEED", help="Seed of all random numbers in the world.")
     ] = None,
@@ -117,7 +113,6 @@ def command(
                 "address": address,
                 "speed": speed,
                 "lockstep": lockstep or None,
-                "patient": patient,
                 "seed": seed,
                 "data": str(data) if data else None,
                 "database": database,

@@ -101,11 +101,15 @@ class Desk:
 
     @property
     def pace(self) -> dict[str, object]:
-        """Pace of time: ``speed``, ``paused``, ``lockstep`` (True if a program advances the clock), and ``seed``."""
+        """Pace of time: ``speed``, ``paused``, ``lockstep`` (True if a program advances the clock), and ``seed``.
+
+        ``behind``: s by which robot time fell behind on a machine that is too slow.
+        """
         clock, seed = self.world.clock, self.stage.seed
         if not isinstance(clock, RealClock):
-            return {"lockstep": True, "speed": 1.0, "paused": False, "seed": seed}
-        return {"lockstep": False, "speed": clock.speed, "paused": clock.paused, "seed": seed}
+            return {"lockstep": True, "speed": 1.0, "paused": False, "seed": seed, "behind": 0.0}
+        pace: dict[str, object] = {"lockstep": False, "speed": clock.speed, "paused": clock.paused, "seed": seed}
+        return pace | {"behind": round(clock.behind, 1)}
 
     def hello(self) -> dict[str, object]:
         """First message to a page."""

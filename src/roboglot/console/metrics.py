@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, disable_created_metrics, generate_latest
-from prometheus_client.core import GaugeMetricFamily, InfoMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily, Metric
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 from prometheus_client.registry import Collector
 
@@ -119,6 +119,9 @@ class _Now(Collector):
         yield InfoMetricFamily("roboglot", "This program.", {"version": world.version, "world": world.name})
         yield GaugeMetricFamily(
             "roboglot_real_time_factor", "Robot seconds per real second, since the last scrape.", self._pace()
+        )
+        yield CounterMetricFamily(
+            "roboglot_behind_seconds", "Robot seconds lost by a machine that is too slow.", world.clock.behind
         )
         yield GaugeMetricFamily("roboglot_programs_running", "Block programs that run now.", self._desk.running())
         running = GaugeMetricFamily("roboglot_actions_running", "Actions under way.", labels=("robot",))

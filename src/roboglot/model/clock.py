@@ -13,15 +13,20 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sized
+from contextlib import contextmanager
 from contextvars import copy_context
 from functools import partial
 
 from roboglot.model.clock_base import HOLD_MAX, Clock, RealTimers, Timer
 
-__all__ = ["LEAD", "LOCKSTEP_EPOCH", "Clock", "LockstepClock", "PatientClock", "RealClock", "Timer"]
+__all__ = ["LOCKSTEP_EPOCH", "Clock", "LockstepClock", "PatientClock", "RealClock", "Timer"]
 YIELD_AFTER = 0.5  # s of lockstep time
 ROUNDS_MAX = 200  # of the event loop
-LEAD = 0.1  # s by which a patient clock may be ahead of the world
+LEAD, LEAD_MAX = 0.03, 0.1  # robot s by which a patient clock may be ahead of the world, at 1 x and at great speeds
+LEAD_REAL = 0.002  # real s that the lead must last: timers are no finer than half of that
+THOUGHT, THOUGHT_MAX = 0.5, 60.0  # robot s that a robot's computation takes at most, real s that time waits for it
+HASTE = 0.25  # share by which a patient clock that stood runs faster than asked
+OWED_MAX = 0.5  # real s that it makes up for
 STANDING = 0.002  # real s between two checks of a patient clock that stands still
 SLICE = 0.0015  # real s of jobs after which the loop sees to its sockets
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces contain no real date
@@ -137,26 +142,75 @@ class RealClock(Clock):
 
 
 class PatientClock(RealClock):
-    """A real clock that waits for the world: on a slow machine robot time falls behind instead of being lost.
+    """A real clock that waits for the world and for what robots compute: on a slow machine robot time falls behind.
 
-    It leads the world by LEAD at most. Before the first call of ``reached`` it waits for nothing.
+    It leads the world by LEAD to LEAD_MAX, and a computation under way by THOUGHT. For the time that it stood it then
+    runs faster by HASTE; what it stood longer than OWED_MAX is lost, and counted in ``behind``. Before the first call
+    of ``reached`` it does not wait for the world.
     """
 
     def __init__(self, speed: float = 1.0) -> None:
-        self._reach = math.inf
+        self._reach = self._limit = math.inf  # robot time that the world allows; at which the clock stands
+        self._thoughts: dict[object, float] = {}  # robot time until which each may take
+        self._owed = 0.0  # robot s at the anchor
         super().__init__(speed)
 
     def time(self) -> float:
-        return min(super().time(), self._reach)
+        now = self._wanted(time.monotonic())
+        return now if now < self._limit else self._limit
+
+    def _wanted(self, real: float) -> float:
+        """Return robot time, but for what the clock waits for."""
+        (anchor, robot), owed = self._anchor, self._owed
+        passed = (real - anchor) * self._speed
+        now = robot + passed
+        if owed:
+            now += min(owed, passed * HASTE)
+        return now if now < self._until else self._until
 
     def reached(self, stamp: float) -> None:
-        if super().time() > self._reach:  # it stood there and continues from there
-            self._anchor = time.monotonic(), self._reach
-        self._reach = stamp + LEAD
+        self._reach = stamp + min(max(LEAD, self._speed * LEAD_REAL), LEAD_MAX)
+        self._wait_anew()
+
+    @contextmanager
+    def thinking(self) -> Iterator[None]:
+        thought = object()
+        self._thoughts[thought] = self.time() + THOUGHT
+        self._wait_anew()
+        hung = asyncio.get_running_loop().call_later(THOUGHT_MAX, self._forget, thought)
+        try:
+            yield
+        finally:
+            hung.cancel()
+            self._forget(thought)
+
+    def _forget(self, thought: object) -> None:
+        if self._thoughts.pop(thought, None) is not None:
+            self._wait_anew()
+
+    def _wait_anew(self) -> None:
+        """Note the time that the clock stood at its limit, and set the next one."""
+        now, (real, robot) = time.monotonic(), self._anchor
+        if self._wanted(now) > self._limit:
+            owed = min(robot + (now - real) * self._speed + self._owed, self._until) - self._limit
+            self._anchor, self._owed = (now, self._limit), min(owed, OWED_MAX * self._speed)
+            self.behind += owed - self._owed
+        self._limit = min(self._reach, *self._thoughts.values(), math.inf)
 
     def real_seconds_until(self, when: float) -> float | None:
-        seconds = super().real_seconds_until(when)
-        return None if seconds is None else max(seconds, STANDING if self.time() >= self._reach < when else 0.0)
+        if when > self._until:
+            return None
+        (real, _), now = self._anchor, self.time()
+        if now >= self._limit < when:
+            return STANDING
+        wait = max(0.0, when - now)
+        owed = max(0.0, self._owed - (time.monotonic() - real) * self._speed * HASTE)
+        return max(wait - owed, wait / (1.0 + HASTE)) / self._speed
+
+    def _change(self, speed: float, until: float) -> None:
+        self._wait_anew()
+        super()._change(speed, until)
+        self._owed = 0.0
 
 
 class _LockstepTimer:

@@ -27,10 +27,12 @@ class Timer(Protocol):
 class Clock(ABC):
     """Reads and waits for robot time, in seconds.
 
-    ``repeats``: the same inputs give the same trace, independent of chance and of the machine's speed.
+    ``repeats``: the same inputs give the same trace, independent of chance and of the machine's speed. ``behind``:
+    robot seconds that a machine that is too slow has cost since the start.
     """
 
     repeats = False
+    behind = 0.0
 
     @abstractmethod
     def time(self) -> float:
@@ -76,6 +78,11 @@ class Clock(ABC):
 
     def reached(self, stamp: float) -> None:  # noqa: B027 - most clocks wait for no world
         """Report that the world has been simulated up to ``stamp``; inf: the world is gone."""
+
+    @contextmanager
+    def thinking(self) -> Iterator[None]:
+        """Compute in a thread inside ``with`` for a robot: time that depends on the machine's speed waits for it."""
+        yield
 
     @contextmanager
     def holding(self) -> Iterator[None]:

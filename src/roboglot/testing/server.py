@@ -110,7 +110,7 @@ class RobotServer:
         wanted = self.wanted
         doors = {"cyberdog": {"app": f"127.0.0.1:{self.app_port}"}} | dict(wanted.doors)
         values = {"data": str(self.data), "world": wanted.world, "seed": wanted.seed, **doors}
-        values |= {"lockstep": True} if wanted.lockstep else {"speed": wanted.speed, "patient": True}
+        values |= {"lockstep": True} if wanted.lockstep else {"speed": wanted.speed}
         config = dataclasses.replace(
             config_of(values, doors=sections()),
             robots=configs,

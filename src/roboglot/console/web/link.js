@@ -16,7 +16,7 @@ export const path = signal(/** @type {Float32Array} */ (new Float32Array()));
 export const grid = signal(/** @type {any} */ (null));
 export const exchanges = signal(/** @type {any[][]} */ ([]));
 export const seen = signal(/** @type {any[][]} */ ([])); // what the camera makes out
-export const pace = signal({ paused: false, speed: 1, lockstep: false, seed: 1 });
+export const pace = signal({ paused: false, speed: 1, lockstep: false, seed: 1, behind: 0 });
 export const missed = signal(0);
 export const recording = signal(false);
 export const padRefused = signal("");
@@ -137,7 +137,7 @@ export function drive(x, y, yaw) {
 
 /** @param {typeof pace.value} now */
 function steer(now) {
-  if (now.paused !== pace.value.paused || now.speed !== pace.value.speed || now.seed !== pace.value.seed) pace.value = now;
+  if (JSON.stringify(now) !== JSON.stringify(pace.value)) pace.value = now;
 }
 
 /** @param {any} message */

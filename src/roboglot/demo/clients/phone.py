@@ -14,7 +14,7 @@ import grpc
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2_grpc as service
 
-PATIENCE = 60.0
+PATIENCE = 300.0  # s: the machine may be busy
 TASK, STOP, POSE, FRAME_DOWN, FRAME_UP = 6004, 6009, 6005, 2002, 2001
 NAVIGATE, RELOCALISE = 1, 7
 

@@ -6,8 +6,8 @@ import asyncio
 import math
 from typing import Any
 
-STILL = 5  # equal positions in a row that mean standstill
-PATIENCE = 60.0
+PATIENCE = 300.0  # s per move: the machine may be busy
+NEAR, NEAR_YAW = 0.1, 5.0  # m, degrees from the end of a move
 
 
 class RoboMasterClient:
@@ -36,12 +36,17 @@ class RoboMasterClient:
         await self._move(x=distance)
 
     async def _move(self, x: float = 0, z: float = 0) -> None:
-        """Send a move: the SDK answers at once, and the position shows the end."""
+        """Send a move: the SDK answers at once; position and status show the end."""
+        began = await self.position()
         await asyncio.to_thread(lambda: self._commander.chassis_move(x=x, z=z))
-        same, last = 0, await self.position()
         async with asyncio.timeout(PATIENCE):
-            while same < STILL:
+            while not await self._has_moved(began, abs(x), z):  # noqa: ASYNC110 - only polling
                 await asyncio.sleep(0.2)
-                now = await self.position()
-                same = same + 1 if math.dist(now, last) < 0.02 else 0
-                last = now
+
+    async def _has_moved(self, began: tuple[float, float, float], way: float, turn: float) -> bool:
+        """Return whether the robot stands ``way`` m and ``turn`` degrees from where it ``began``."""
+        if not (await asyncio.to_thread(self._commander.get_chassis_status)).static:
+            return False
+        now = await self.position()
+        left = math.remainder(now[2] - began[2] - turn, 360.0)
+        return abs(math.dist(now[:2], began[:2]) - way) < NEAR and abs(left) < NEAR_YAW

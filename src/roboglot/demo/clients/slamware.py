@@ -11,7 +11,7 @@ MOTION = "/api/core/motion/v1"
 SLAM = "/api/core/slam/v1"
 DONE = 4
 MAP_HEADER = 36  # bytes before the cells
-PATIENCE = 60.0  # s per move
+PATIENCE = 300.0  # s per move: the machine may be busy
 
 
 class SlamwareClient:

@@ -6,56 +6,55 @@ import logging
 from collections.abc import Callable
 
 log = logging.getLogger(__name__)
-WINDOW = 5.0  # s of the clock per judgement
+WINDOW = 5.0  # s of asked robot time per judgement
+FULL = 0.95  # of the wanted pace: less is too slow
 WORSE = 0.1  # of the wanted pace: the further loss that justifies another warning
 CALM = 6  # windows without a loss after which it is over
 
 
 class Pace:
-    """Sum of the skipped robot time. ``speed``: the wanted pace, robot seconds per real second."""
+    """Pace of robot time. ``speed``: the wanted one, robot seconds per real second; ``skips``: lost time is skipped."""
 
-    def __init__(self, speed: Callable[[], float]) -> None:
+    def __init__(self, speed: Callable[[], float], *, skips: bool) -> None:
         self._speed = speed
-        self._began: float | None = None  # start of the window
-        self._lost = self._total = 0.0  # s lost in the window, and since the machine became too slow
+        self._lost_by = "%.1f s of robot time skipped" if skips else "robot time fell behind by %.1f s"
+        self._window: tuple[float, float] | None = None  # what was simulated and lost at its start
+        self._full = 0.0  # s lost before the machine became too slow
         self._warned: float | None = None  # the share of the wanted pace in the last warning; None: no warning
         self._calm = 0
 
-    def skip(self, seconds: float) -> None:
-        """Note ``seconds`` of robot time that were not simulated."""
-        self._lost += seconds
-        self._total += seconds
-
-    def look(self, now: float) -> None:
-        """Judge the pace at the end of a window of the clock; cheap otherwise."""
-        if self._began is None:
-            self._began = now
-        if now - self._began < WINDOW:
+    def look(self, simulated: float, lost: float) -> None:
+        """Judge the pace at the end of a window, by the robot s that were ``simulated`` and ``lost`` until now."""
+        if self._window is None:
+            self._window = simulated, lost
+        done, missed = simulated - self._window[0], lost - self._window[1]
+        if done + missed < WINDOW:
             return
-        share, lost = max(0.0, 1.0 - self._lost / (now - self._began)), self._lost
-        self._began, self._lost = now, 0.0
-        if lost:
-            self._slow(share, lost)
+        self._window = simulated, lost
+        if (share := max(0.0, done / (done + missed))) < FULL:
+            self._slow(share, missed, lost)
         elif self._warned is not None:
-            self._recover()
+            self._recover(lost)
+        else:
+            self._full = lost
 
-    def _slow(self, share: float, lost: float) -> None:
+    def _slow(self, share: float, missed: float, lost: float) -> None:
         self._calm = 0
         if self._warned is not None and share > self._warned - WORSE:
             return
         how = "still slower" if self._warned is not None else "too slow for the world"
         self._warned = share
         log.warning(
-            "this machine is %s: real-time factor %.2f of %g, %.1f s of robot time lost just now, %.1f s in all",
-            how, share * self._speed(), self._speed(), lost, self._total,
+            f"this machine is %s: real-time factor %.2f of %g, {self._lost_by} just now, %.1f s in all",
+            how, share * self._speed(), self._speed(), missed, lost - self._full,
         )  # fmt: skip
 
-    def _recover(self) -> None:
+    def _recover(self, lost: float) -> None:
         self._calm += 1
         if self._calm >= CALM:
             log.info(
-                "this machine keeps up again: real-time factor %g; %.1f s of robot time were lost",
+                f"this machine keeps up again: real-time factor %g; {self._lost_by} in all",
                 self._speed(),
-                self._total,
+                lost - self._full,
             )
-            self._warned, self._total, self._calm = None, 0.0, 0
+            self._warned, self._full, self._calm = None, lost, 0

@@ -17,7 +17,7 @@ import numpy as np
 
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
 from roboglot.model.background import load
-from roboglot.model.clock import Clock, RealClock, Timer
+from roboglot.model.clock import Clock, PatientClock, RealClock, Timer
 from roboglot.model.geometry import Pose
 from roboglot.model.inputs.noted_stage import noted
 from roboglot.model.inputs.outside import Outside
@@ -53,7 +53,7 @@ from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
-BEHIND_MAX = 25  # ticks by which a slow machine may lag before time is skipped
+BEHIND_MAX = 25  # ticks by which a slow machine may lag before time is skipped, if the clock does not wait
 ROBOTS_MAX = 200
 
 
@@ -118,7 +118,8 @@ class World:
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
-        self._pace = Pace(lambda: clock.speed if isinstance(clock, RealClock) else 1.0)
+        speed = lambda: clock.speed if isinstance(clock, RealClock) else 1.0  # noqa: E731
+        self._pace = Pace(speed, skips=not isinstance(clock, PatientClock))
 
     def _make_environment(self, seed: int) -> Environment:
         """Make the objects that the robots' parts share."""
@@ -228,16 +229,16 @@ class World:
     def _advance(self, fired: Timer | None) -> None:
         """Do a tick that is due; other tasks get their turn before the next one, even if it is due as well.
 
-        A machine that is too slow skips robot time instead of catching up.
+        On a machine that is too slow, a patient clock waits; beside real robots, whose time does not, time is skipped.
         """
         if self._timer is None or self._timer is not fired:
             return  # closed, and perhaps started again
         due = int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
         if due > BEHIND_MAX:
             self._origin += (due - 1) * TICK
-            self._pace.skip((due - 1) * TICK)
+            self._clock.behind += (due - 1) * TICK
             due = 1
-        self._pace.look(self._clock.time())
+        self._pace.look(self.simulated, self._clock.behind)
         self._clock.in_steps(self._steps(due > 0, fired))
 
     def _steps(self, due: bool, fired: Timer) -> Iterator[None]:

@@ -14,7 +14,7 @@ function Seed() {
 }
 
 export function Clock() {
-  const { paused, speed, lockstep } = pace.value;
+  const { paused, speed, lockstep, behind } = pace.value;
   if (lockstep) return html`<div class="card"><h3>${t("clock")}</h3><p>${t("clock.lockstep")}</p></div>`;
   return html`<div class="card"><h3>${t("clock")}</h3>
       <p class="time" aria-live="off">${t("clock.is", { time: clock.value.toFixed(1), speed })}</p>
@@ -22,7 +22,7 @@ export function Clock() {
         ${STEPS.map((seconds) => html`<${Button} label=${t("clock.step", { seconds })} verb="step_clock" onClick=${() => changeWorld("step_clock", { seconds })} />`)}</div>
       <h3>${t("clock.speed")}</h3>
       <div class="buttons">${SPEEDS.map((each) => html`<${Button} label=${`× ${each}`} on=${each === speed} verb="set_clock_speed" onClick=${() => changeWorld("set_clock_speed", { speed: each })} />`)}</div>
-      <p class="muted">${t("clock.hint")}</p></div>
+      <p class="muted">${t(behind > 1 ? "clock.behind" : "clock.hint", { behind: behind | 0 })}</p></div>
     <div class="card"><h3>${t("world.file")}</h3><p>${t("world.named", { world: hello.value.world, seed: pace.value.seed })}</p>
       <div class="buttons"><a class="button" href="/api/world.toml" download="world.toml">${t("world.save")}</a></div>
       <p class="muted">${t("world.hint")}</p></div>
