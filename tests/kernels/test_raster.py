@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from roboglot.kernels.lanes import MARGIN
 from roboglot.kernels.layouts import COEFFICIENTS, FIRST
 from roboglot.kernels.raster import CORNERS_MAX, fill, project
 
@@ -37,9 +38,9 @@ def picture(*quads, eye=(0.0, 0.0, 0.0), visible=None, planes_max=50, band=HEIGH
     depth, seen = np.empty((HEIGHT, WIDTH), np.float32), np.empty((HEIGHT, WIDTH), np.uint16)
     for top in range(0, HEIGHT, band):
         rows = min(band, HEIGHT - top)
-        some, numbered = np.full((band, WIDTH), 9.0, np.float32), np.full((band, WIDTH), 9, np.uint16)
+        some, numbered = np.full((band, WIDTH + MARGIN), 9.0, np.float32), np.full((band, WIDTH + MARGIN), 9, np.uint16)
         fill(outlines, spans, planes, FIRST + drawn, top, rows, np.empty((band, 2)), some, numbered)
-        depth[top : top + rows], seen[top : top + rows] = some[:rows], numbered[:rows]
+        depth[top : top + rows], seen[top : top + rows] = some[:rows, :WIDTH], numbered[:rows, :WIDTH]
     return seen, depth, planes, sources, drawn
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from roboglot.kernels.lanes import MARGIN
 from roboglot.kernels.layouts import COEFFICIENTS, FIRST
 from roboglot.kernels.raster import CORNERS_MAX, project
 from roboglot.kernels.raster_shading import BAND, DARKEST, HAZE, LINE, OFFSETS, SAMPLES, STRIP, shade
@@ -55,7 +56,7 @@ def picture(corners, mappings, mask, texture=0):
     shade(
         outlines, spans, FIRST + drawn, planes, sources, np.array([PAINT] * count, np.float32),
         np.full(count, texture, np.int32), copies(mask), cells, cells, np.array((0.0, 0.0, 1.0)), 1.0,
-        np.empty((BAND, 2)), np.empty((BAND, WIDTH), np.float32), np.empty((BAND, WIDTH), np.uint16),
+        np.empty((BAND, 2)), np.empty((BAND, WIDTH + MARGIN), np.float32), np.empty((BAND, WIDTH + MARGIN), np.uint16),
         np.zeros(SAMPLES, np.int32), np.zeros((3, WIDTH + LINE), np.uint8), luma, blue, red,
     )  # fmt: skip
     return luma, blue, red

@@ -1,8 +1,9 @@
 """Sixteen pixels at once: what kernels do with whole vectors, written as LLVM's own instructions.
 
 Numba widens whole numbers to 64 bits, and LLVM does not turn look-ups into vectors: loops over pixels in Python took
-four times as long. Each function here is one step of ``raster_shading`` for LANES neighbours; LLVM makes of it whatever
-the processor has. Numbers are 32 bits and wrap; fractions of brightness and colour have 16 bits behind the point.
+four times as long. Each function here is one step of ``raster`` or ``raster_shading`` for LANES neighbours; LLVM makes
+of it whatever the processor has. Numbers are 32 bits and wrap; fractions of brightness and colour have 16 bits behind
+the point, fractions of a texel 8.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
 LANES = 16
-BYTE, INT, LONG, BIT = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.IntType(1)
-INTS, LONGS, BITS, POINTERS = (ir.VectorType(kind, LANES) for kind in (INT, LONG, BIT, ir.PointerType(INT)))
+MARGIN = 2 * LANES  # elements that rows have behind their end, because vectors reach beyond it
+BYTE, SHORT, INT, LONG, BIT, FLOAT = (*(ir.IntType(bits) for bits in (8, 16, 32, 64, 1)), ir.FloatType())
+INTS, LONGS, BITS, FLOATS = (ir.VectorType(kind, LANES) for kind in (INT, LONG, BIT, FLOAT))
+POINTERS = ir.VectorType(ir.PointerType(INT), LANES)
+FAR = 80.0  # m beyond which distances are not told apart
 Values = tuple[ir.Value, ...]
 Lowered = tuple[Signature, Callable[[Context, ir.IRBuilder, Signature, Values], ir.Value]]
 
@@ -34,13 +38,15 @@ class Lanes:
         self._builder, self.value = builder, value
 
     def __add__(self, other: Lanes) -> Lanes:
-        return Lanes(self._builder, self._builder.add(self.value, other.value))
+        add = self._builder.fadd if self._broken else self._builder.add
+        return Lanes(self._builder, add(self.value, other.value))
 
     def __sub__(self, other: Lanes) -> Lanes:
         return Lanes(self._builder, self._builder.sub(self.value, other.value))
 
     def __mul__(self, other: Lanes) -> Lanes:
-        return Lanes(self._builder, self._builder.mul(self.value, other.value))
+        multiply = self._builder.fmul if self._broken else self._builder.mul
+        return Lanes(self._builder, multiply(self.value, other.value))
 
     def __and__(self, other: Lanes | int) -> Lanes:
         return Lanes(self._builder, self._builder.and_(self.value, self._like(other)))
@@ -48,6 +54,9 @@ class Lanes:
     def __rshift__(self, bits: int) -> Lanes:
         """Shift in zeros."""
         return Lanes(self._builder, self._builder.lshr(self.value, self._like(bits)))
+
+    def __lshift__(self, bits: Lanes) -> Lanes:
+        return Lanes(self._builder, self._builder.shl(self.value, bits.value))
 
     def complement(self, whole: int) -> Lanes:
         """Return ``whole`` less these numbers."""
@@ -62,11 +71,26 @@ class Lanes:
         below = self._builder.icmp_signed("<", self.value, limit.value)
         return Lanes(self._builder, self._builder.select(below, self.value, limit.value))
 
+    def inverse(self, least: float) -> Lanes:
+        """Return 1 / each, or 1 / ``least`` for those below it."""
+        builder, limit = self._builder, self._like(least)
+        number = builder.select(builder.fcmp_ordered(">", self.value, limit), self.value, limit)
+        return Lanes(builder, builder.fdiv(self._like(1.0), number))
+
+    def whole(self) -> Lanes:
+        """Return fractions without what is behind the point."""
+        return Lanes(self._builder, self._builder.fptosi(self.value, INTS))
+
     def bytes(self) -> ir.Value:
         """Return the lowest 8 bits of each."""
         return self._builder.trunc(self.value, ir.VectorType(BYTE, LANES))
 
-    def _like(self, other: Lanes | int) -> ir.Value:
+    @property
+    def _broken(self) -> bool:
+        """True for fractions in the processor's own form."""
+        return bool(self.value.type == FLOATS)
+
+    def _like(self, other: Lanes | float) -> ir.Value:
         return other.value if isinstance(other, Lanes) else ir.Constant(self.value.type, [other] * LANES)
 
 
@@ -80,7 +104,7 @@ def _all(builder: ir.IRBuilder, number: ir.Value) -> Lanes:
 
 def _ramp(builder: ir.IRBuilder, first: ir.Value, step: ir.Value) -> Lanes:
     """Return ``first``, and in each further lane ``step`` more."""
-    numbers = Lanes(builder, ir.Constant(INTS, list(range(LANES))))
+    numbers = Lanes(builder, ir.Constant(ir.VectorType(first.type, LANES), list(range(LANES))))
     return _all(builder, first) + _all(builder, step) * numbers
 
 
@@ -90,22 +114,23 @@ class _Row:
     def __init__(self, context: Context, builder: ir.IRBuilder, kind: Type, array: ir.Value) -> None:
         self._builder, self._start = builder, make_array(kind)(context, builder, array).data
 
-    def load(self, at: ir.Value, count: int = LANES) -> ir.Value:
-        """Return ``count`` numbers of 32 bits from element ``at`` on."""
-        place = self._builder.bitcast(self._builder.gep(self._start, [at]), ir.PointerType(ir.VectorType(INT, count)))
-        return self._builder.load(place, align=4)
+    def load(self, at: ir.Value, count: int = LANES, kind: ir.Type = INT) -> ir.Value:
+        """Return ``count`` numbers of this kind from element ``at`` on."""
+        vector = ir.VectorType(kind, count)
+        place = self._builder.bitcast(self._builder.gep(self._start, [at]), ir.PointerType(vector))
+        return self._builder.load(place, align=2 if kind == SHORT else 4)
 
     def store(self, at: ir.Value, vector: ir.Value) -> None:
         """Write a vector from element ``at`` on."""
         place = self._builder.bitcast(self._builder.gep(self._start, [at]), ir.PointerType(vector.type))
-        self._builder.store(vector, place, align=vector.type.element.width // 8)
+        kind = vector.type.element
+        self._builder.store(vector, place, align=4 if kind == FLOAT else kind.width // 8)
 
     def look_up(self, base: ir.Value, places: Lanes) -> Lanes:
         """Return the numbers of 32 bits at ``base`` + ``places``, which are not negative."""
         builder = self._builder
-        first = builder.ptrtoint(builder.gep(self._start, [base]), LONG)
-        off = builder.shl(builder.zext(places.value, LONGS), ir.Constant(LONGS, [2] * LANES))
-        pointers = builder.inttoptr(builder.add(_all(builder, first).value, off), POINTERS)
+        pointers = builder.gep(builder.gep(self._start, [base]), [places.value], source_etype=INT)
+        pointers.type = POINTERS  # one for each lane, of which llvmlite does not know
         kind = ir.FunctionType(INTS, [POINTERS, INT, BITS, INTS])
         gather = cgutils.get_or_insert_function(builder.module, kind, f"llvm.masked.gather.v{LANES}i32.v{LANES}p0")
         blank = ir.Constant(INTS, ir.Undefined)
@@ -114,30 +139,90 @@ class _Row:
 
 
 @intrinsic
-def sample(
-    _typing: Context, texels: Type, base: Type, column: Type, columns: Type, row: Type, rows: Type, within: Type,
-    above: Type, fraction: Type, samples: Type, at: Type,
-) -> Lowered:  # fmt: skip
-    """Write LANES samples of a texture, 0 to 255, to ``samples`` from ``at`` on.
+def cover(
+    _typing: Context, depth: Type, seen: Type, at: Type, near: Type, step: Type, number: Type, count: Type
+) -> Lowered:
+    """Write ``number`` to ``seen`` where it is nearer than ``depth`` (1/m), for the first ``count`` of LANES pixels."""
 
-    ``texels``, from ``base`` on: each with its right, upper and upper right neighbour in its four bytes. ``column``,
-    and ``row`` times the texture's width, have 16 bits behind the point, ``columns`` and ``rows`` are their steps from
-    lane to lane; ``within`` and ``above`` are the bits that name a column and a row. ``fraction``: 255 mixes
-    neighbours, 0 takes the texel alone.
+    def write(context: Context, b: ir.IRBuilder, signature: Signature, values: Values) -> ir.Value:
+        _, _, at, near, step, number, count = values
+        depths, numbers = (_Row(context, b, signature.args[i], values[i]) for i in (0, 1))
+        here, before = _ramp(b, near, step).value, depths.load(at, kind=FLOAT)
+        within = b.icmp_signed("<", ir.Constant(INTS, list(range(LANES))), _all(b, count).value)
+        nearer = b.and_(b.fcmp_ordered(">", here, before), within)
+        depths.store(at, b.select(nearer, here, before))
+        numbers.store(at, b.select(nearer, _all(b, number).value, numbers.load(at, kind=SHORT)))
+        return context.get_dummy_value()
+
+    return types.void(depth, seen, at, near, step, number, count), write
+
+
+@intrinsic
+def equals(_typing: Context, seen: Type, at: Type, number: Type) -> Lowered:
+    """Return how many of 2 LANES elements of ``seen`` from ``at`` on equal ``number`` before the first other one."""
+
+    def write(context: Context, b: ir.IRBuilder, signature: Signature, values: Values) -> ir.Value:
+        _, at, number = values
+        row = _Row(context, b, signature.args[0], values[0])
+        wide = ir.VectorType(SHORT, 2 * LANES)
+        blank = ir.Constant(wide, ir.Undefined)
+        first = b.insert_element(blank, number, ir.Constant(INT, 0))
+        same = b.shuffle_vector(first, blank, ir.Constant(ir.VectorType(INT, 2 * LANES), [0] * (2 * LANES)))
+        others = b.icmp_unsigned("!=", row.load(at, 2 * LANES, SHORT), same)
+        return b.zext(b.cttz(b.bitcast(others, INT), ir.Constant(BIT, 0)), LONG)
+
+    return types.int64(seen, at, number), write
+
+
+@intrinsic
+def sample(
+    _typing: Context, texels: Type, base: Type, near: Type, nears: Type, across: Type, acrosses: Type, up: Type,
+    ups: Type, column: Type, row: Type, bits: Type, samples: Type, at: Type,
+) -> Lowered:  # fmt: skip
+    """Write LANES samples of a texture, 0 to 255, to ``samples`` from ``at`` on, each of one texel.
+
+    ``texels``, from ``base`` on: each with its right, upper and upper right neighbour in its four bytes, 2 ** ``bits``
+    in a row. ``near`` is 1/z (1/m), ``across`` / ``near`` + ``column`` a column and ``up`` / ``near`` + ``row`` a row,
+    in 256ths of a texel; ``nears``, ``acrosses`` and ``ups`` are their steps from lane to lane.
     """
 
     def write(context: Context, b: ir.IRBuilder, signature: Signature, values: Values) -> ir.Value:
-        _, base, column, columns, row, rows, within, above, fraction, _, at = values
-        source, target = (_Row(context, b, signature.args[i], values[i]) for i in (0, 9))
-        u, v = _ramp(b, column, columns), _ramp(b, row, rows)
-        four = source.look_up(base, ((u >> 16) & _all(b, within)) + ((v >> 16) & _all(b, above)))
-        right, up = (u >> 8) & _all(b, fraction), (v >> 16) & _all(b, fraction)
-        two = (four & 0xFF00FF) * right.complement(256) + ((four >> 8) & 0xFF00FF) * right
-        target.store(at, (((two & 0xFFFF) * up.complement(256) + (two >> 16) * up) >> 16).value)
+        found, _, _ = _texels(context, b, signature, values)
+        _Row(context, b, signature.args[11], values[11]).store(values[12], (found & 0xFF).value)
         return context.get_dummy_value()
 
-    arguments = (texels, base, column, columns, row, rows, within, above, fraction, samples, at)
+    arguments = (texels, base, near, nears, across, acrosses, up, ups, column, row, bits, samples, at)
     return types.void(*arguments), write
+
+
+@intrinsic
+def sample_between(
+    _typing: Context, texels: Type, base: Type, near: Type, nears: Type, across: Type, acrosses: Type, up: Type,
+    ups: Type, column: Type, row: Type, bits: Type, samples: Type, at: Type,
+) -> Lowered:  # fmt: skip
+    """Do what ``sample`` does with texels mixed with their neighbours."""
+
+    def write(context: Context, b: ir.IRBuilder, signature: Signature, values: Values) -> ir.Value:
+        four, u, v = _texels(context, b, signature, values)
+        right, above = u & 0xFF, v & 0xFF
+        two = (four & 0xFF00FF) * right.complement(256) + ((four >> 8) & 0xFF00FF) * right
+        mixed = ((two & 0xFFFF) * above.complement(256) + (two >> 16) * above) >> 16
+        _Row(context, b, signature.args[11], values[11]).store(values[12], mixed.value)
+        return context.get_dummy_value()
+
+    arguments = (texels, base, near, nears, across, acrosses, up, ups, column, row, bits, samples, at)
+    return types.void(*arguments), write
+
+
+def _texels(context: Context, b: ir.IRBuilder, signature: Signature, values: Values) -> tuple[Lanes, Lanes, Lanes]:
+    """Return texels with their neighbours, and the places in them, for the arguments of ``sample``."""
+    texels, base, near, nears, across, acrosses, up, ups, column, row, bits, _, _ = values
+    away, shift = _ramp(b, near, nears).inverse(1.0 / FAR), _all(b, bits)
+    u = (_ramp(b, across, acrosses) * away).whole() + _all(b, column)
+    v = (_ramp(b, up, ups) * away).whole() + _all(b, row)
+    within = _all(b, b.sub(b.shl(ir.Constant(INT, 1), bits), ir.Constant(INT, 1)))
+    places = ((u >> 8) & within) + (((v >> 8) & within) << shift)
+    return _Row(context, b, signature.args[0], texels).look_up(base, places), u, v
 
 
 @intrinsic

@@ -11,6 +11,7 @@ import numpy as np
 
 from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, SingleArray, Uint16Array
 from roboglot.kernels.compiled import kernel
+from roboglot.kernels.lanes import LANES, MARGIN, cover
 from roboglot.kernels.layouts import FIRST
 
 NEAR = 0.03  # m in front of the eye
@@ -143,7 +144,7 @@ def _fill(
     seen: Uint16Array,
 ) -> None:
     """Write ``number`` wherever that polygon is the nearest so far; row 0 of ``depth`` is ``top`` of the picture."""
-    width = depth.shape[1]
+    width = depth.shape[1] - MARGIN
     first, last = max(spans[number, 1], top), min(spans[number, 2], top + rows)
     for y in range(first, last):
         ends[y - top, 0], ends[y - top, 1] = 1e9, -1e9
@@ -168,11 +169,10 @@ def _fill(
         left = int(np.ceil(min(max(ends[y - top, 0] - 0.5, 0.0), float(width))))
         right = int(np.ceil(min(max(ends[y - top, 1] - 0.5, 0.0), float(width))))
         start = np.float32(across * (left + 0.5) + down * (y + 0.5) + base)
-        for x in range(left, right):
-            near = start + step * np.float32(x - left)
-            if near > depth[np.uintp(y - top), np.uintp(x)]:
-                depth[np.uintp(y - top), np.uintp(x)] = near
-                seen[np.uintp(y - top), np.uintp(x)] = value
+        at = (y - top) * depth.shape[1]
+        for x in range(left, right, LANES):
+            near = np.float32(start + step * np.float32(x - left))
+            cover(depth, seen, at + x, near, step, value, np.int32(right - x))
 
 
 @kernel(
@@ -193,12 +193,11 @@ def fill(
 ) -> None:
     """Draw the polygons FIRST up to ``last``, without it, into ``rows`` rows of a picture from ``top`` on.
 
-    ``depth`` (1/m) and ``seen`` (numbers of polygons, 0: none) get these rows; ``ends`` (rows, 2) is scratch space. A
-    band of a few rows stays in the processor's cache.
+    ``depth`` (1/m) and ``seen`` (numbers of polygons, 0: none) get these rows, which are MARGIN longer than the
+    picture's; ``ends`` (rows, 2) is scratch space. A band of a few rows stays in the processor's cache.
     """
-    width = depth.shape[1]
     for y in range(rows):
-        for x in range(width):
+        for x in range(depth.shape[1]):
             depth[np.uintp(y), np.uintp(x)] = np.float32(0.0)
             seen[np.uintp(y), np.uintp(x)] = np.uint16(0)
     for number in range(FIRST, last):

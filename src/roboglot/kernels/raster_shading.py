@@ -1,9 +1,9 @@
 """Colours of a picture with a polygon number for each pixel, written as YUV 4:2:0 (BT.601, limited range).
 
 A texture is a mask that mixes two colours: 256 x 256 texels and its smaller copies behind it, each texel (8 bits) with
-its right, upper and upper right neighbour in one number. Coordinates, light and distance are exact at the ends of short
-strips and linear in between; where a texture changes slowly, every second pixel of a strip is sampled. Pixels are
-painted LANES at a time, over the end of a strip: what lies behind it is painted next. ``_nrt``: see ``raster``.
+its right, upper and upper right neighbour in one number. Coordinates are exact for each pixel; light is exact at the
+ends of short strips and linear in between; where a texture changes slowly, every second pixel of a strip is sampled.
+Pixels are painted LANES at a time, over the end of a strip: what lies behind it is painted next.
 """
 
 from __future__ import annotations
@@ -12,49 +12,39 @@ import numpy as np
 
 from roboglot.kernels.arrays import ByteArray, FloatArray, Int32Array, SingleArray, Uint16Array, Uint32Array
 from roboglot.kernels.compiled import kernel
-from roboglot.kernels.lanes import LANES, paint, paint_twice, sample, tint
+from roboglot.kernels.lanes import FAR, LANES, MARGIN, equals, paint, paint_twice, sample, sample_between, tint
 from roboglot.kernels.layouts import FIRST
 from roboglot.kernels.raster import fill
 
-STRIP = 120  # pixels: their samples fill whole lanes; strips begin at multiples, whatever stands before a surface
-LEVEL = 60  # pixels of a strip of the floor or ceiling
+STRIP = 128  # pixels: their samples fill whole lanes; strips begin at multiples, whatever stands before a surface
+LEVEL = 64  # pixels of a strip of the floor or ceiling
 SPARSE = 0.4  # texels between two pixels up to which every second pixel is sampled
-BENT = 2.0  # pixels of a textured strip times the relative change of distance within
-RUN = 32
+BENT = 1.25  # most that the distance of one end of a strip is of the other's
 BAND = 48  # rows that are drawn at a time: they fit into a processor's cache
 SAMPLES, LINE = 160, 64  # samples along a strip; pixels that may be written behind a row's end
 LEVELS = 8  # 256, 128 ... 2 texels per side
 OFFSETS = np.concatenate(([0], np.cumsum([4 ** (8 - level) for level in range(LEVELS)]))).astype(np.int64)
-U, S = np.uint32, np.int32
+S, F = np.int32, np.float32
 ALL = S(LANES)
 POINT = 65536.0  # 16 bits behind the point
 WHITE = S(235)
 BLACK, GREY = S(16 << 16), S((128 << 16) + (1 << 15))
-FAR = 80.0  # m
 HAZE = 0.045  # 1/m: how fast light fades with distance
 DARKEST = 0.35
 
 
 @kernel(inline="always", _nrt=False)
-def _at(planes: FloatArray, k: int, x: float, y: float) -> tuple[float, float, float]:
-    """Distance ahead and texture coordinates at a pixel."""
-    near = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2]
-    z = 1.0 / max(near, 1.0 / FAR)
-    u = (planes[k, 3] * x + planes[k, 4] * y + planes[k, 5]) * z + planes[k, 6]
-    v = (planes[k, 7] * x + planes[k, 8] * y + planes[k, 9]) * z + planes[k, 10]
-    return z, u, v
+def _near(planes: FloatArray, k: int, x: float, y: float) -> float:
+    """Return 1/z at a pixel."""
+    return float(max(planes[k, 0] * x + planes[k, 1] * y + planes[k, 2], 1.0 / FAR))
 
 
 @kernel(inline="always", _nrt=False)
-def _texels(planes: FloatArray, k: int, z: float, u: float, v: float) -> float:
-    """Return how many of a texture's 256 texels lie between two pixels there, between sharp and calm."""
-    across = abs(planes[k, 3] - (u - planes[k, 6]) * planes[k, 0]) + abs(
-        planes[k, 7] - (v - planes[k, 10]) * planes[k, 0]
-    )
-    along = abs(planes[k, 4] - (u - planes[k, 6]) * planes[k, 1]) + abs(
-        planes[k, 8] - (v - planes[k, 10]) * planes[k, 1]
-    )
-    return float(256.0 * z * max(0.5 * max(across, along), min(across, along)))
+def _place(planes: FloatArray, k: int, x: float, y: float, near: float) -> tuple[float, float]:
+    """Return the texture coordinates at a pixel."""
+    u = (planes[k, 3] * x + planes[k, 4] * y + planes[k, 5]) / near + planes[k, 6]
+    v = (planes[k, 7] * x + planes[k, 8] * y + planes[k, 9]) / near + planes[k, 10]
+    return u, v
 
 
 @kernel(inline="always", _nrt=False)
@@ -68,29 +58,47 @@ def _level(texels: float) -> int:
 
 
 @kernel(inline="always", _nrt=False)
-def _light(paints: SingleArray, k: int, z: float, gain: float) -> float:
-    """Brightness of a surface z metres ahead."""
-    fade = DARKEST + (1.0 - DARKEST) / (1.0 + HAZE * z)
+def _light(paints: SingleArray, k: int, near: float, gain: float) -> float:
+    """Brightness of a surface 1 / ``near`` metres ahead."""
+    fade = DARKEST + (1.0 - DARKEST) * near / (near + HAZE)
     return float(gain * paints[k, 6] * (1.0 + paints[k, 7] * (fade - 1.0)))
 
 
 @kernel(inline="always", _nrt=False)
+def _detail(planes: FloatArray, k: int, x: float, y: float) -> tuple[int, int]:
+    """Return the level of the texture for a strip around a pixel, and how many pixels there are to a sample."""
+    z = 1.0 / _near(planes, k, x, y)
+    u = (planes[k, 3] * x + planes[k, 4] * y + planes[k, 5]) * z
+    v = (planes[k, 7] * x + planes[k, 8] * y + planes[k, 9]) * z
+    z *= 256.0
+    du, dv = z * abs(planes[k, 3] - u * planes[k, 0]), z * abs(planes[k, 7] - v * planes[k, 0])
+    across, along = du + dv, z * (abs(planes[k, 4] - u * planes[k, 1]) + abs(planes[k, 8] - v * planes[k, 1]))
+    level = _level(max(0.5 * max(across, along), min(across, along)))  # between sharp and calm
+    return level, 2 if max(du, dv) <= SPARSE * (1 << level) else 1
+
+
+@kernel(inline="always", _nrt=False)
 def _sample(
-    samples: Int32Array, count: int, masks: Uint32Array, texture: int, level: int,
-    u: float, v: float, du: float, dv: float,
-) -> None:  # fmt: skip
-    """Write ``count`` samples or a few more, from (u, v) on; ``du``, ``dv``: from one to the next, in textures."""
+    samples: Int32Array, x0: int, x1: int, y: float, masks: Uint32Array, texture: int, planes: FloatArray, k: int
+) -> int:
+    """Sample a texture for the pixels from ``x0`` to ``x1``; return the pixels from one sample to the next."""
+    level, step = _detail(planes, k, 0.5 * (x0 + x1), y)
+    x = x0 - (step - 1) * (x0 & 1) + 0.5  # with a step of 2, samples are of even pixels
+    count = x1 - x0 if step == 1 else ((x1 + 1) >> 1) - (x0 >> 1) + 1
     bits = 8 - level
-    size = POINT * (1 << bits)
-    column, columns = U(np.int64(u * size)), U(np.int64(du * size))
-    size *= 1 << bits
-    row, rows = U(np.int64(v * size)), U(np.int64(dv * size))
-    within = U((1 << bits) - 1)
-    above, fraction = U(within << U(bits)), U(255 if level == 0 else 0)  # smaller copies are smooth enough
+    size = 256.0 * (1 << bits)
+    near, nears = F(planes[k, 0] * x + planes[k, 1] * y + planes[k, 2]), F(step * planes[k, 0])
+    across, acrosses = F(size * (planes[k, 3] * x + planes[k, 4] * y + planes[k, 5])), F(size * step * planes[k, 3])
+    up, ups = F(size * (planes[k, 7] * x + planes[k, 8] * y + planes[k, 9])), F(size * step * planes[k, 7])
+    column, row = S(np.int64(size * planes[k, 6])), S(np.int64(size * planes[k, 10]))
     base = texture * masks.shape[1] + OFFSETS[level]
     for at in range(0, count, LANES):
-        sample(masks, base, column, columns, row, rows, within, above, fraction, samples, at)
-        column, row = U(column + U(U(ALL) * columns)), U(row + U(U(ALL) * rows))
+        if level:  # smaller copies are smooth enough
+            sample(masks, base, near, nears, across, acrosses, up, ups, column, row, S(bits), samples, at)
+        else:
+            sample_between(masks, base, near, nears, across, acrosses, up, ups, column, row, S(bits), samples, at)
+        near, across, up = F(near + F(LANES) * nears), F(across + F(LANES) * acrosses), F(up + F(LANES) * ups)
+    return step
 
 
 @kernel(inline="always", _nrt=False)
@@ -161,17 +169,13 @@ def _shadow(cells: ByteArray, frame: FloatArray, u: float, v: float) -> float:
 @kernel(inline="always", _nrt=False)
 def _run(seen: Uint16Array, y: int, x: int, limit: int) -> int:
     """Return the end of the run of equal numbers that begins at (x, y), at most ``limit``."""
-    number, end = seen[y, x], x
-    while end + RUN <= limit:
-        other = np.uint16(0)
-        for i in range(RUN):  # a loop without an exit compiles to a few vector instructions
-            other |= np.uint16(seen[np.uintp(y), np.uintp(end + i)] ^ number)
-        if other:
+    number, end, row = seen[y, x], x, y * seen.shape[1]
+    while end < limit:
+        more = equals(seen, row + end, number)
+        end += more
+        if more < 2 * LANES:
             break
-        end += RUN
-    while end < limit and seen[np.uintp(y), np.uintp(end)] == number:
-        end += 1
-    return end
+    return min(end, limit)
 
 
 @kernel(inline="always", _nrt=False)
@@ -194,10 +198,8 @@ def _shade_row(
     reds: ByteArray,
 ) -> None:
     """Colour one row into ``line``, ``blues`` and ``reds``."""
-    width = seen.shape[1]
-    middle = y + 0.5
-    x, last = 0, -1
-    z_end, u_end, v_end = 0.0, 0.0, 0.0
+    width = seen.shape[1] - MARGIN
+    middle, x = y + 0.5, 0
     while x < width:
         here = int(seen[band_row, x])
         end = _run(seen, band_row, x, min(width, x - x % STRIP + STRIP))
@@ -206,31 +208,25 @@ def _shade_row(
             half = 0.5 * (x + end)
             here = 0 if planes[0, 0] * half + planes[0, 1] * middle + planes[0, 2] > 0.0 else 1
         source = sources[here]
-        z, u, v = z_end, u_end, v_end
-        if here != last:
-            z, u, v = _at(planes, here, x + 0.5, middle)
-        z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
-        while textures[source] >= 0 and end > x + 16 and abs(z_end - z) * (end - x) > BENT * min(z, z_end):
+        near, near_end = _near(planes, here, x + 0.5, middle), _near(planes, here, end + 0.5, middle)
+        while end > x + 16 and max(near, near_end) > BENT * min(near, near_end):
             end = (x + end) >> 1
-            z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
+            near_end = _near(planes, here, end + 0.5, middle)
         dark, dark_end = 1.0, 1.0
         if here == 0:
+            u, v = _place(planes, here, x + 0.5, middle, near)
+            u_end, v_end = _place(planes, here, end + 0.5, middle, near_end)
             ground = _cell(grounds, frame, u, v)
             while end > x + 1 and _cell(grounds, frame, u_end, v_end) != ground:
                 end = (x + end) >> 1
-                z_end, u_end, v_end = _at(planes, here, end + 0.5, middle)
+                near_end = _near(planes, here, end + 0.5, middle)
+                u_end, v_end = _place(planes, here, end + 0.5, middle, near_end)
             source += ground
             dark, dark_end = _shadow(shadows, frame, u, v), _shadow(shadows, frame, u_end, v_end)
-        last = here
         texture, step = textures[source], 0
         if texture >= 0:
-            level = _level(_texels(planes, here, z, u, v))
-            du, dv = (u_end - u) / (end - x), (v_end - v) / (end - x)
-            step = 2 if 256.0 * max(abs(du), abs(dv)) <= SPARSE * (1 << level) else 1
-            lead = (x & 1) * (step - 1)
-            count = end - x if step == 1 else ((end - x + lead + 1) >> 1) + 1
-            _sample(samples, count, masks, texture, level, u - lead * du, v - lead * dv, step * du, step * dv)
-        light, light_end = _light(paints, source, z, gain) * dark, _light(paints, source, z_end, gain) * dark_end
+            step = _sample(samples, x, end, middle, masks, texture, planes, here)
+        light, light_end = dark * _light(paints, source, near, gain), dark_end * _light(paints, source, near_end, gain)
         _paint(line, x, end, samples, step, light, light_end, paints, source)
         if y & 1 == 0:
             _tint(blues, reds, x, end, samples, step, light, paints, source)
@@ -272,8 +268,8 @@ def shade(
     ``frame``: texture coordinates of the cells' corner, cells per texture. A paint: Y, U, V of one colour; steps to the
     other per mask unit; light; whether distance dims it.
 
-    Scratch space: ``ends``, ``depth`` and ``seen`` of as many rows as are drawn at a time, an even number; ``samples``
-    (SAMPLES); ``lines`` (3, LINE more than a row).
+    Scratch space: ``ends``, ``depth`` and ``seen`` of as many rows as are drawn at a time, an even number, the last two
+    MARGIN longer than a row; ``samples`` (SAMPLES); ``lines`` (3, LINE more than a row).
     """
     height, width = luma.shape
     line, blues, reds = lines[0], lines[1], lines[2]

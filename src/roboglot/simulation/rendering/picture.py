@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.kernels.lanes import MARGIN
 from roboglot.kernels.layouts import COEFFICIENTS, FIRST
 from roboglot.kernels.raster import CORNERS_MAX, project
 from roboglot.kernels.raster_shading import BAND, LINE, SAMPLES, shade
@@ -31,8 +32,8 @@ class Renderer:
         self._spans = np.empty((FIRST + POLYGONS_MAX, 3), dtype=np.int32)
         self._band = (
             np.empty((BAND, 2)),
-            np.empty((BAND, width), dtype=np.float32),
-            np.empty((BAND, width), dtype=np.uint16),
+            np.empty((BAND, width + MARGIN), dtype=np.float32),
+            np.empty((BAND, width + MARGIN), dtype=np.uint16),
             np.zeros(SAMPLES, dtype=np.int32),
             np.zeros((3, width + LINE), dtype=np.uint8),
         )
