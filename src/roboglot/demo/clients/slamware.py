@@ -11,14 +11,14 @@ MOTION = "/api/core/motion/v1"
 SLAM = "/api/core/slam/v1"
 DONE = 4
 MAP_HEADER = 36  # bytes before the cells
-PATIENCE = 300.0  # s per move: the machine may be busy
+PATIENCE = 300.0  # s per request and move: the machine may be busy
 
 
 class SlamwareClient:
     """Asks and moves the robot at ``address`` over REST."""
 
     def __init__(self, address: str, port: int = 1448) -> None:
-        self._http = httpx.AsyncClient(base_url=f"http://{address}:{port}", timeout=10)
+        self._http = httpx.AsyncClient(base_url=f"http://{address}:{port}", timeout=PATIENCE)
 
     async def close(self) -> None:
         """Hang up."""
