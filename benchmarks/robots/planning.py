@@ -17,8 +17,7 @@ import numpy as np
 from _claim import Claims
 from numpy.typing import NDArray
 
-from roboglot.kernels.obstacles import inflated_cost
-from roboglot.kernels.search import shortest_path
+from roboglot.kernels.search import inflated_cost, shortest_path
 
 CELLS, ROOM, REPEATS = 2000, 120, 7
 DOOR = 24  # cells

@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.kernels.matching import match, surface_near
-from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, remember
+from roboglot.kernels.obstacles import free_way, remember
 from roboglot.kernels.occupancy import integrate
 from roboglot.kernels.placing import correlate, likelihood_field
+from roboglot.kernels.search import inflated_cost, nearest_open
 
 RESOLUTION = 0.05
 ROOM = (1.013, 1.021, 7.032, 5.017)  # walls at x0, y0, x1, y1, beside the cells' borders

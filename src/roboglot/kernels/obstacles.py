@@ -1,4 +1,4 @@
-"""Obstacles of the lidar and the robot's way: memory, inflation, free way along a path."""
+"""Obstacles of the lidar and the robot's way: memory of them; the way ahead, and how far it is free."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, Int32Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
-from roboglot.kernels.distance import distances
 
 CELL_SQUARE = 0.5001  # squared distance from a cell's centre to its corner, in cells, with a margin
 CELL_HALF = 0.7072  # its root
@@ -178,42 +177,31 @@ def remember(
     return _note(evidence, seen, ends, hits, now, resolution, noted, left if count >= 0 else -1)
 
 
-@kernel(
-    "float32[:,::1](int16[:,::1], float32[:,::1], float64, float64, float64, float64, float64, float64)",
-)
-def inflated_cost(
-    evidence: Int16Array,
-    seen: SingleArray,
-    since: float,
-    resolution: float,
-    radius: float,
-    reach: float,
-    near_cost: float,
-    unknown_cost: float,
-) -> SingleArray:
-    """Cost per cell for a robot of ``radius`` m: inf where it would touch, 1 + ``near_cost`` beside that, falling to 1
-    at ``reach`` m from obstacles; ``unknown_cost`` more where nothing is known. Obstacles: evidence above 0, or
-    ``seen`` not before ``since``.
-    """
-    height, width = evidence.shape
-    marked = np.zeros((height, width), np.uint8)
-    for row in range(height):
-        for col in range(width):
-            if evidence[row, col] > 0 or (seen[row, col] > 0 and seen[row, col] >= since):
-                marked[row, col] = 1
-    cost = distances(marked, reach / resolution)
-    for row in range(height):
-        for col in range(width):
-            away = cost[row, col] * resolution
-            if away < radius:
-                cost[row, col] = np.inf
-                continue
-            share = (reach - away) / (reach - radius)
-            value = 1.0 + near_cost * max(0.0, share) ** 2
-            if evidence[row, col] == 0:
-                value += unknown_cost
-            cost[row, col] = value
-    return cost
+@kernel("Tuple((int64, float64))(float64[:,::1], int64, int64, float64, float64)")
+def nearest_point(points: FloatArray, first: int, end: int, x: float, y: float) -> tuple[int, float]:
+    """Return the number of the nearest of ``points`` (n, 2; m) from ``first`` to ``end``, exclusive; its distance."""
+    nearest, best = first, np.inf
+    for i in range(first, end):
+        dx, dy = points[i, 0] - x, points[i, 1] - y
+        away = dx * dx + dy * dy
+        if away < best:
+            nearest, best = i, away
+    return nearest, np.sqrt(best)
+
+
+@kernel("float64[:,::1](float64[:,::1], int64, int64, float64, float64, float64, float64, int64)")
+def way_ahead(
+    points: FloatArray, first: int, end: int, x: float, y: float, carrot_x: float, carrot_y: float, count: int
+) -> FloatArray:
+    """Return a way (n, 2; m): ``count`` steps straight from (x, y) to the carrot, then the ``points`` up to ``end``."""
+    way, dx, dy = np.empty((count + 1 + max(0, end - first), 2)), carrot_x - x, carrot_y - y
+    for k in range(count + 1):
+        share = k / max(1, count)
+        way[k, 0], way[k, 1] = x + share * dx, y + share * dy
+    for i in range(first, end):
+        k = count + 1 + i - first
+        way[k, 0], way[k, 1] = points[i, 0], points[i, 1]
+    return way
 
 
 @kernel("float64(float64[:,::1], float64[:,::1], float64, float64, float64)")
@@ -259,23 +247,6 @@ def unexplained(evidence: Int16Array, points: FloatArray, x: float, y: float, re
     return found[:count]
 
 
-@kernel("int64[::1](float32[:,::1], float64, float64, float64)")
-def nearest_open(cost: SingleArray, row: float, col: float, reach: float) -> IntArray:
-    """(row, column) of the open cell whose centre is nearest to a place and within ``reach`` of it, all in cells.
-
-    ``row`` and ``col`` count from the grid's corner, so that a cell's centre lies at halves. Empty: all are closed.
-    """
-    height, width = cost.shape
-    best, found = reach * reach, np.empty(0, np.int64)
-    for r in range(max(0, int(np.floor(row - reach))), min(height, int(np.ceil(row + reach)))):
-        for c in range(max(0, int(np.floor(col - reach))), min(width, int(np.ceil(col + reach)))):
-            away = (r + 0.5 - row) ** 2 + (c + 0.5 - col) ** 2
-            if away <= best and np.isfinite(cost[r, c]) and (len(found) == 0 or away < best):
-                best = away
-                found = np.array([r, c], np.int64)
-    return found
-
-
 @kernel("int16[:,::1](int16[:,::1], int64)")
 def without_things(evidence: Int16Array, size: int) -> Int16Array:
     """Return a copy without occupied things that are at most ``size`` cells long and wide and touch nothing else.
@@ -308,38 +279,6 @@ def without_things(evidence: Int16Array, size: int) -> Int16Array:
                 for k in range(count):
                     kept[cells[k, 0], cells[k, 1]] = -1
     return kept
-
-
-@kernel(
-    "void(float32[:,::1], int16[:,::1], float32[:,::1], float64, uint8[:,::1], float64, float64)",
-)
-def reopen(
-    cost: SingleArray,
-    evidence: Int16Array,
-    seen: SingleArray,
-    since: float,
-    trodden: ByteArray,
-    reach: float,
-    value: float,
-) -> None:
-    """Open the cells of ``cost`` that are ``trodden`` and have no obstacle within ``reach`` cells.
-
-    They cost ``value``, and more by the square of the cells that something is closer than ``reach`` + 3. Obstacles as
-    for ``inflated_cost``.
-    """
-    height, width = cost.shape
-    around = int(np.ceil(reach)) + 3
-    for row in range(height):
-        for col in range(width):
-            if trodden[row, col] == 0 or np.isfinite(cost[row, col]):
-                continue
-            nearest = (reach + 3.0) ** 2
-            for r in range(max(0, row - around), min(height, row + around + 1)):
-                for c in range(max(0, col - around), min(width, col + around + 1)):
-                    if evidence[r, c] > 0 or (seen[r, c] > 0 and seen[r, c] >= since):
-                        nearest = min(nearest, (r - row) ** 2 + (c - col) ** 2)
-            if nearest >= reach * reach:
-                cost[row, col] = value * (1.0 + (reach + 3.0 - np.sqrt(nearest)) ** 2)
 
 
 @kernel("float64(float64[:,::1], float64, int64)")
@@ -398,3 +337,45 @@ def sides(
                 upper[i] = min(upper[i], left - reach)
             else:
                 lower[i] = max(lower[i], left + reach)
+
+
+@kernel("Tuple((float64[:,::1], float64))(float64[:,::1], float64[:,::1], float64, float64, int64, int64, int64)")
+def centring(
+    way: FloatArray, echoes: FloatArray, clearance: float, most: float, tangent: int, plateau: int, ramp: int
+) -> tuple[FloatArray, float]:
+    """Return the offset (n, 2; m) of each point of ``way`` (n, 2; m, dense) to the middle of its gap, and its width.
+
+    A gap has less than ``clearance`` on both sides; the narrowest width is returned, inf without one. Offsets above
+    ``most`` are left out. The way's direction is that between the points ``tangent`` before and behind. ``plateau``
+    points around a gap move as much as it, and over ``ramp`` points the offset fades.
+    """
+    count = way.shape[0]
+    along, offset = np.empty((count, 2)), np.zeros((count, 2))
+    upper, lower, middle, widest = np.empty(count), np.empty(count), np.zeros(count), np.zeros(count)
+    for i in range(count):
+        before, behind = max(i - tangent, 0), min(i + tangent, count - 1)
+        x, y = way[behind, 0] - way[before, 0], way[behind, 1] - way[before, 1]
+        length = max(np.hypot(x, y), 1e-9)
+        along[i, 0], along[i, 1] = x / length, y / length
+    sides(way, along, echoes, clearance, upper, lower)
+    width = np.inf
+    for i in range(count):
+        stands = along[i, 0] == 0.0 and along[i, 1] == 0.0
+        if stands or not (np.isfinite(upper[i]) and np.isfinite(lower[i]) and lower[i] > upper[i]):
+            continue
+        width = min(width, 2.0 * clearance + (upper[i] - lower[i]))
+        middle[i] = (upper[i] + lower[i]) / 2.0
+        if abs(middle[i]) > most:
+            middle[i] = 0.0
+    if width == np.inf:
+        return offset, width
+    for i in range(count):
+        for k in range(max(0, i - plateau), min(count, i + plateau + 1)):
+            if abs(middle[k]) > abs(widest[i]):
+                widest[i] = middle[k]
+    for i in range(count):
+        shift = 0.0
+        for k in range(i - ramp // 2, i - ramp // 2 + ramp):
+            shift += widest[min(max(k, 0), count - 1)] * (1.0 / ramp)
+        offset[i, 0], offset[i, 1] = shift * -along[i, 1], shift * along[i, 0]
+    return offset, width

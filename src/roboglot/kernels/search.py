@@ -1,4 +1,4 @@
-"""Shortest paths on a cost grid: A*, 8-connected, optimal, the same result every time; their corners.
+"""Costs of cells by what stands around them; shortest paths: A*, 8-connected, optimal, always the same; their corners.
 
 The open cells wait in buckets of nearly equal estimates instead of a heap, last in first out. A cell may be taken up
 again when a cheaper way to it turns up within its bucket; the search ends when no bucket can beat the goal's cost.
@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import Int8Array, Int32Array, SingleArray
+from roboglot.kernels.arrays import ByteArray, Int8Array, Int16Array, Int32Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
+from roboglot.kernels.distance import distances
 
 DIAGONAL = np.sqrt(2.0)
 BUCKET = 0.05  # of cost per bucket: cells are rarely expanded twice
@@ -174,3 +175,90 @@ def corners(cost: SingleArray, path: Int32Array, slack: float) -> Int32Array:
         number += 1
         at = following
     return kept[:number].copy()
+
+
+@kernel("int64[::1](float32[:,::1], float64, float64, float64)")
+def nearest_open(cost: SingleArray, row: float, col: float, reach: float) -> IntArray:
+    """(row, column) of the open cell whose centre is nearest to a place and within ``reach`` of it, all in cells.
+
+    ``row`` and ``col`` count from the grid's corner, so that a cell's centre lies at halves. Empty: all are closed.
+    """
+    height, width = cost.shape
+    best, found = reach * reach, np.empty(0, np.int64)
+    for r in range(max(0, int(np.floor(row - reach))), min(height, int(np.ceil(row + reach)))):
+        for c in range(max(0, int(np.floor(col - reach))), min(width, int(np.ceil(col + reach)))):
+            away = (r + 0.5 - row) ** 2 + (c + 0.5 - col) ** 2
+            if away <= best and np.isfinite(cost[r, c]) and (len(found) == 0 or away < best):
+                best = away
+                found = np.array([r, c], np.int64)
+    return found
+
+
+@kernel(
+    "float32[:,::1](int16[:,::1], float32[:,::1], float64, float64, float64, float64, float64, float64)",
+)
+def inflated_cost(
+    evidence: Int16Array,
+    seen: SingleArray,
+    since: float,
+    resolution: float,
+    radius: float,
+    reach: float,
+    near_cost: float,
+    unknown_cost: float,
+) -> SingleArray:
+    """Cost per cell for a robot of ``radius`` m: inf where it would touch, 1 + ``near_cost`` beside that, falling to 1
+    at ``reach`` m from obstacles; ``unknown_cost`` more where nothing is known. Obstacles: evidence above 0, or
+    ``seen`` not before ``since``.
+    """
+    height, width = evidence.shape
+    marked = np.zeros((height, width), np.uint8)
+    for row in range(height):
+        for col in range(width):
+            if evidence[row, col] > 0 or (seen[row, col] > 0 and seen[row, col] >= since):
+                marked[row, col] = 1
+    cost = distances(marked, reach / resolution)
+    for row in range(height):
+        for col in range(width):
+            away = cost[row, col] * resolution
+            if away < radius:
+                cost[row, col] = np.inf
+                continue
+            share = (reach - away) / (reach - radius)
+            value = 1.0 + near_cost * max(0.0, share) ** 2
+            if evidence[row, col] == 0:
+                value += unknown_cost
+            cost[row, col] = value
+    return cost
+
+
+@kernel(
+    "void(float32[:,::1], int16[:,::1], float32[:,::1], float64, uint8[:,::1], float64, float64)",
+)
+def reopen(
+    cost: SingleArray,
+    evidence: Int16Array,
+    seen: SingleArray,
+    since: float,
+    trodden: ByteArray,
+    reach: float,
+    value: float,
+) -> None:
+    """Open the cells of ``cost`` that are ``trodden`` and have no obstacle within ``reach`` cells.
+
+    They cost ``value``, and more by the square of the cells that something is closer than ``reach`` + 3. Obstacles as
+    for ``inflated_cost``.
+    """
+    height, width = cost.shape
+    around = int(np.ceil(reach)) + 3
+    for row in range(height):
+        for col in range(width):
+            if trodden[row, col] == 0 or np.isfinite(cost[row, col]):
+                continue
+            nearest = (reach + 3.0) ** 2
+            for r in range(max(0, row - around), min(height, row + around + 1)):
+                for c in range(max(0, col - around), min(width, col + around + 1)):
+                    if evidence[r, c] > 0 or (seen[r, c] > 0 and seen[r, c] >= since):
+                        nearest = min(nearest, (r - row) ** 2 + (c - col) ** 2)
+            if nearest >= reach * reach:
+                cost[row, col] = value * (1.0 + (reach + 3.0 - np.sqrt(nearest)) ** 2)

@@ -21,27 +21,7 @@ def sideways(way: Points, echoes: Points, clearance: float) -> tuple[Points, flo
     ``clearance``: m wanted around each point. A point with less on both sides moves to the middle.
     The width is inf where no gap is narrower than twice that.
     """
-    from roboglot.kernels.obstacles import sides  # it needs Numba
+    from roboglot.kernels.obstacles import centring  # it needs Numba
 
-    count = np.arange(len(way))
-    along = way[np.minimum(count + TANGENT, len(way) - 1)] - way[np.maximum(count - TANGENT, 0)]
-    length = np.hypot(along[:, 0], along[:, 1])
-    along /= np.maximum(length, 1e-9)[:, None]
-    upper, lower = np.empty(len(way)), np.empty(len(way))
-    sides(way, along, np.ascontiguousarray(echoes), clearance, upper, lower)
-    gap = np.isfinite(upper) & np.isfinite(lower) & (lower > upper) & (length > 0.0)
-    if not gap.any():
-        return np.zeros_like(way), np.inf
-    width = 2.0 * clearance + float((upper - lower)[gap].min())
-    middle = (np.where(gap, upper, 0.0) + np.where(gap, lower, 0.0)) / 2.0
-    shift = _spread(np.where(np.abs(middle) <= SHIFT_MAX, middle, 0.0))
-    return shift[:, None] * np.stack([-along[:, 1], along[:, 0]], axis=1), width
-
-
-def _spread(shift: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the shifts, extended before and behind each gap, so that the way bends gently."""
-    window = 2 * PLATEAU + 1
-    views = np.lib.stride_tricks.sliding_window_view(np.pad(shift, PLATEAU), window)
-    widest = views[np.arange(len(shift)), np.abs(views).argmax(axis=1)]
-    spread: NDArray[np.float64] = np.convolve(np.pad(widest, RAMP // 2, mode="edge"), np.ones(RAMP) / RAMP, "valid")
-    return spread
+    offset, width = centring(way, np.ascontiguousarray(echoes), clearance, SHIFT_MAX, TANGENT, PLATEAU, RAMP)
+    return offset, width

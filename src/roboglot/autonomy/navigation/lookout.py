@@ -88,17 +88,19 @@ class Lookout:
         self, follower: Follower, pose: Pose, seen: NDArray[np.float64], remembered: NDArray[np.float64]
     ) -> None:
         """Find obstacles on the route among the points ``seen`` now and ``remembered`` as cells (map)."""
-        tuning, planner = self._tuning, self._planner
-        path, points = self._path(follower, pose), np.concatenate((seen, remembered)) if len(remembered) else seen
+        tuning, planner, aim = self._tuning, self._planner, follower.carrot()
+        path = follower.route.ahead(pose, *aim, tuning.horizon)
+        points = np.concatenate((seen, remembered)) if len(remembered) else seen
         tight = planner.free_way(path, points, pose, tuning.slow_margin)
         if math.isfinite(tight):
             self.gap = follower.route.centre(seen, planner.radius + tuning.slow_margin)
-            path = self._path(follower, pose)
+            aim = follower.carrot()  # it may have moved
+            path = follower.route.ahead(pose, *aim, tuning.horizon)
             tight = planner.free_way(path, points, pose, tuning.slow_margin)
         follower.slow_at = follower.along + tight
         free = planner.free_way(path, points, pose, tuning.touch_margin) if math.isfinite(tight) else tight
         follower.stop_at, blocked = follower.along + free, math.isfinite(free)
-        self._mind_others(follower, pose, path)
+        self._mind_others(follower, pose, path, aim)
         if blocked:
             self.blocked_place = Point(*path[min(int(free / SPACING), len(path) - 1)].tolist())
         if blocked and not self.blocked:
@@ -106,11 +108,10 @@ class Lookout:
             self._robot.events.publish(PathBlocked(stamp=self.blocked_at, action=self._action, at=self.blocked_place))
         self.blocked = blocked
 
-    def _mind_others(self, follower: Follower, pose: Pose, path: NDArray[np.float64]) -> None:
+    def _mind_others(self, follower: Follower, pose: Pose, path: NDArray[np.float64], aim: tuple[Point, float]) -> None:
         """Stop for moving objects and robots with right of way, and announce this robot's route."""
         traffic = self._traffic
-        carrot, beyond = follower.carrot()
-        way = follower.route.ahead(pose, carrot, beyond, ANNOUNCED_MAX)
+        way = follower.route.ahead(pose, *aim, ANNOUNCED_MAX) if traffic.asks_for_way else path
         free = follower.along + traffic.free(path, way, pose, follower.speed, self._planner.radius)
         follower.stop_at = min(follower.stop_at, free)
         traffic.follow(way)
@@ -119,7 +120,3 @@ class Lookout:
     def meets(self) -> bool:
         """True if another robot or object is about to cross the route, or has right of way."""
         return self._traffic.meets
-
-    def _path(self, follower: Follower, pose: Pose) -> NDArray[np.float64]:
-        carrot, beyond = follower.carrot()
-        return follower.route.ahead(pose, carrot, beyond, self._tuning.horizon)

@@ -21,8 +21,8 @@ from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.traffic.doubtful import without_doubtful, without_gone
 from roboglot.autonomy.traffic.waiting_place import shun, waiting_place
 from roboglot.kernels.distance import distances
-from roboglot.kernels.obstacles import free_way, inflated_cost, nearest_open, reopen
-from roboglot.kernels.search import corners, line_cost, shortest_path, ways_from
+from roboglot.kernels.obstacles import free_way
+from roboglot.kernels.search import corners, inflated_cost, line_cost, nearest_open, reopen, shortest_path, ways_from
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.errors import Unreachable

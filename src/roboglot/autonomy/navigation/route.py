@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ CENTRED = 30  # points ahead that are centred in gaps
 GOAL_KEPT = 0.2  # m around a goal that are not centred
 SEARCH_AHEAD = 40  # points among which the nearest is searched
 
+Points = NDArray[np.float64]
+
 
 class Route:
     """``points`` (n, 2; map, m), ``along`` (n): m from the start, ``speeds`` (n): limits, m/s.
@@ -37,6 +39,10 @@ class Route:
         ``wanted``: the goals themselves, as a leg may end a little beside an occupied one. Half of ``tolerance`` (m) is
         kept for the uncertainty of the pose.
         """
+        from roboglot.kernels.obstacles import nearest_point, way_ahead  # they need Numba
+
+        self._nearest_point: Callable[[Points, int, int, float, float], tuple[int, float]] = nearest_point
+        self._way_ahead: Callable[[Points, int, int, float, float, float, float, int], Points] = way_ahead
         self.vertices = np.concatenate(legs)
         self.points, self.along, places = _densified(self.vertices)
         ends = np.cumsum([len(leg) for leg in legs]) - 1
@@ -55,7 +61,6 @@ class Route:
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
         self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
         self._spots: list[list[float]] = self.points.tolist()
-        self._columns = np.ascontiguousarray(self.points.T)
         self._at = 0
         self._planned = self.points.copy()
 
@@ -97,7 +102,6 @@ class Route:
             shift[np.hypot(way[:, 0] - goal.x, way[:, 1] - goal.y) < GOAL_KEPT] = 0.0
         self.points[stretch] = way + shift
         self._spots[stretch] = self.points[stretch].tolist()
-        self._columns[:, stretch] = self.points[stretch].T
         return width
 
     def _bend(self, place: int) -> float:
@@ -113,11 +117,8 @@ class Route:
         Never goes back, and never past ``goal`` (a number), as the way after it may cross the way to it.
         """
         end = min(self._at + SEARCH_AHEAD, self._goals_at[goal] + 1)
-        x, y = self._columns[:, self._at : end]
-        away = (x - pose.x) ** 2 + (y - pose.y) ** 2
-        nearest = int(away.argmin())
-        self._at += nearest
-        return self._marks[self._at], math.sqrt(float(away[nearest]))
+        self._at, away = self._nearest_point(self.points, self._at, end, pose.x, pose.y)
+        return self._marks[self._at], away
 
     @property
     def speed_here(self) -> float:
@@ -137,11 +138,9 @@ class Route:
     def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> NDArray[np.float64]:
         """Return the way ahead (dense; map): straight to ``carrot``, then ``horizon`` m of route from ``beyond`` m."""
         first = bisect_left(self._marks, beyond)
-        last = bisect_left(self._marks, beyond + horizon) + 1
+        last = min(bisect_left(self._marks, beyond + horizon) + 1, len(self._marks))
         count = math.ceil(math.hypot(carrot.x - pose.x, carrot.y - pose.y) / SPACING)
-        start, way = np.array((pose.x, pose.y)), np.array((carrot.x - pose.x, carrot.y - pose.y))
-        straight = start + (np.arange(count + 1) / max(1, count))[:, None] * way
-        return np.concatenate([straight, self.points[first:last]])
+        return self._way_ahead(self.points, first, last, pose.x, pose.y, carrot.x, carrot.y, count)
 
     def remaining(self, pose: Pose, along: float) -> Path:
         """Return the remaining vertices, beginning with ``pose``."""

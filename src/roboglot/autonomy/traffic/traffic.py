@@ -141,6 +141,11 @@ class Traffic:
         """True if other robots or things that are under way are near."""
         return any(way.lively and way.is_within(AROUND, pose) for way in self._ways)
 
+    @property
+    def asks_for_way(self) -> bool:
+        """True if more than the next metres of the robot's way matter: there are others, or they listen."""
+        return bool(self._ways or self._announcer.frame)
+
     def free(self, path: Points, way: Points, pose: Pose, speed: float, radius: float) -> float:
         """Return the distance along ``path`` (dense) free of movers and of others' right of way, m; inf: all.
 
