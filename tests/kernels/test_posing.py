@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.posing import SUN, darken, pose
+from roboglot.kernels.posing import SIDES, SUN, darken, pose
+from roboglot.model.perception import JOINTS
 from roboglot.simulation.bodies.hull import rotation
+from roboglot.simulation.rendering.figures import HAIR, HEAD, LIMBS, QUADS, TORSO, person
+
+STANDING = {"nose": (0.1, 0, 1.6), "eye": (0.09, 0.03, 1.63), "ear": (0, 0.08, 1.6), "shoulder": (0, 0.2, 1.4),
+            "elbow": (0.1, 0.25, 1.1), "wrist": (0.3, 0.25, 1.0), "hip": (0, 0.1, 0.9), "knee": (0.1, 0.1, 0.5),
+            "ankle": (0, 0.1, 0.08)}  # the left ones  # fmt: skip
 
 
 def test_quads_follow_their_owners_and_are_lit():
@@ -42,3 +48,69 @@ def test_shadows_lie_under_discs():
         wanted = (wanted * (1.0 - dark)).astype(np.uint8)
     assert np.abs(shadows.astype(int) - wanted).max() <= 1
     assert shadows.min() < 90
+
+
+def someone(rng):
+    """Joints of a person in some posture, by their names."""
+    places = {}
+    for name in JOINTS:
+        x, y, z = STANDING[name.removeprefix("left_").removeprefix("right_")]
+        places[name] = np.array((x, -y if name.startswith("right_") else y, z)) + rng.normal(0, 0.05, 3)
+    return places
+
+
+def ring(quads, upper):
+    """The corners of a ring, from the quads around a piece."""
+    return quads[:, 3] if upper else quads[:, 0]
+
+
+def test_limbs_are_round_between_their_joints():
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        joints = someone(rng)
+        mesh = person(0, np.array([*joints.values()]))
+        assert [len(part) for part in (mesh.corners, mesh.paints, mesh.mappings)] == [QUADS] * 3
+        number = 0
+        for from_, to, low, high, _cloth in LIMBS:
+            for side in ("left_", "right_"):
+                start, end = joints[side + from_], joints[side + to]
+                piece = mesh.corners[SIDES * (3 * number + 1) :][:SIDES]  # between both ends, which are closed
+                for upper, middle, radius in ((False, start, low), (True, end, high)):
+                    np.testing.assert_allclose(np.linalg.norm(ring(piece, upper) - middle, axis=1), radius)
+                    np.testing.assert_allclose((ring(piece, upper) - middle) @ (end - start), 0.0, atol=1e-12)
+                number += 1
+        for side in ("left_", "right_"):  # hands reach on where the lower arm points
+            wrist, elbow = joints[side + "wrist"], joints[side + "elbow"]
+            tip = ring(mesh.corners[SIDES * (3 * number + 1) :][:SIDES], upper=True).mean(axis=0)
+            np.testing.assert_allclose(tip, wrist + 0.08 * (wrist - elbow) / np.linalg.norm(wrist - elbow))
+            number += 1
+
+
+def test_trunk_head_and_hair_follow_spine_and_face():
+    rng = np.random.default_rng(6)
+    joints = someone(rng)
+    corners = person(0, np.array([*joints.values()])).corners
+    hips, shoulders, ears = (
+        (joints[f"left_{part}"] + joints[f"right_{part}"]) / 2 for part in ("hip", "shoulder", "ear")
+    )
+    face, ear = joints["nose"] - ears, joints["left_ear"] - joints["right_ear"]
+    up = np.cross(face, ear) / np.linalg.norm(np.cross(face, ear))
+    first = SIDES * 3 * 13
+    for profile, foot, axis in ((TORSO, hips, shoulders - hips), (HEAD, ears, up), (HAIR, ears - 0.18 * face, up)):
+        for number, (share, width, depth) in enumerate(profile[:-1]):
+            piece = ring(corners[first + SIDES * number :][:SIDES], upper=False)
+            np.testing.assert_allclose(piece.mean(axis=0), foot + share * axis)
+            sizes = np.linalg.norm(piece - piece.mean(axis=0), axis=1)
+            np.testing.assert_allclose(sizes[[0, 2, 4, 6]], [depth, width] * 2)
+        first += SIDES * (len(profile) - 1)
+    for side, eye in zip(("left", "right"), corners[first:], strict=True):
+        np.testing.assert_allclose(eye.mean(axis=0), joints[f"{side}_eye"] + 0.016 * face / np.linalg.norm(face))
+
+
+def test_people_are_seen_from_outside():
+    rng = np.random.default_rng(7)
+    corners = person(0, np.array([*someone(rng).values()])).corners
+    pieces = corners[:-2].reshape(-1, SIDES, 4, 3)
+    normals = np.cross(pieces[:, :, 1] - pieces[:, :, 0], pieces[:, :, 2] - pieces[:, :, 0])
+    out = pieces.mean(axis=2) - pieces.mean(axis=(1, 2))[:, None]
+    assert ((normals * out).sum(axis=-1) > 0).all()

@@ -111,12 +111,6 @@ def unit(vectors: Floats) -> Floats:
     return scaled
 
 
-def cross(a: Floats, b: Floats) -> Floats:
-    """Return the cross product; numpy's takes three times as long for a few vectors."""
-    product: Floats = a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
-    return product
-
-
 def box(size: Sequence[float], side: Paint, top: Paint, base: float = 0.0, room: int = EVERYWHERE) -> Mesh:
     """Return an upright box around the origin: width along x, depth along y, height."""
     half_x, half_y, low, high = size[0] / 2, size[1] / 2, base, base + size[2]
