@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from roboglot.kernels.distance import NEAR_MAX, distances
+from roboglot.kernels.distance import NEAR_MAX, distances, gaps
 
 
 @settings(max_examples=100, deadline=None)
@@ -28,3 +28,33 @@ def test_near_and_far_agree_to_the_bit(marked: np.ndarray) -> None:
     near, far = distances(marked, NEAR_MAX), distances(marked, NEAR_MAX + 1.0)
     assert (near[near < NEAR_MAX] == far[near < NEAR_MAX]).all()
     assert (far[near == NEAR_MAX] >= NEAR_MAX).all()
+
+
+def free(occupied: np.ndarray, row: int, col: int, down: int, along: int, far: int) -> int:
+    """Return how many cells that way are free, ``far`` at most."""
+    for count in range(far):
+        r, c = row + (count + 1) * down, col + (count + 1) * along
+        if 0 <= r < occupied.shape[0] and 0 <= c < occupied.shape[1] and occupied[r, c]:
+            return count
+    return far
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    arrays(np.uint8, st.tuples(st.integers(1, 9), st.integers(1, 9)), elements=st.integers(0, 1), fill=st.just(0)),
+    st.tuples(st.integers(0, 2), st.integers(0, 2)).filter(any),
+    st.floats(1, 8),
+    st.floats(1, 6),
+)
+def test_gaps_are_narrow_and_lead_through(
+    occupied: np.ndarray, axis: tuple[int, int], wide: float, deep: float
+) -> None:
+    (down, along), step = axis, np.hypot(*axis)
+    far = int(np.ceil(wide / step))
+    found = gaps(occupied, np.array([axis]), wide, deep)
+    for row, col in np.ndindex(occupied.shape):
+        ways = [(down, along), (-down, -along), (along, -down), (-along, down)]
+        one, other, left, right = (free(occupied, row, col, *way, far) for way in ways)
+        is_gap = (one + other + 1) * step < wide and min(left, right) * step >= deep
+        is_gap |= (left + right + 1) * step < wide and min(one, other) * step >= deep
+        assert found[row, col] == is_gap

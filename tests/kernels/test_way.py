@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from roboglot.kernels.obstacles import centring, nearest_point, sides, way_ahead
+from roboglot.kernels.obstacles import centring, nearest_point, sides, things, way_ahead
+from roboglot.kernels.occupancy import placed
 
 CLEARANCE, MOST = 0.37, 0.08  # m
 TANGENT, PLATEAU, RAMP = 3, 4, 5  # points
@@ -58,3 +59,24 @@ def test_way_goes_straight_to_the_carrot() -> None:
     way = way_ahead(points, 2, 4, 1.0, 1.0, 1.0, 0.0, 2)
     assert way.tolist() == [[1.0, 1.0], [1.0, 0.5], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]
     assert way_ahead(points, 4, 4, 1.0, 1.0, 1.0, 1.0, 0).tolist() == [[1.0, 1.0]]
+
+
+def test_things_are_close_echoes_off_the_map() -> None:
+    evidence = np.full((100, 100), -500, np.int16)
+    evidence[:, 80] = 500
+    leg = np.array([(1.0, 1.0), (1.1, 1.0), (1.2, 1.0)])
+    wall, lone = np.array([(4.02, 2.0), (4.02, 2.1), (4.02, 2.2)]), np.array([(3.0, 3.0)])
+    wide = np.array([(2.0 + 0.2 * number, 4.0) for number in range(6)])
+    around = np.concatenate([leg[1:], wall, lone, wide, leg[:1]])  # the scan begins in the midst of the leg
+    found = things(evidence, around, 0.0, 0.0, 0.05, 0.25, 0.9, 3)
+    assert found == pytest.approx(np.array([(1.1, 1.0)]))
+    assert not len(things(evidence, around[:0], 0.0, 0.0, 0.05, 0.25, 0.9, 3))
+    assert len(things(evidence, leg, 0.0, 0.0, 0.05, 0.25, 0.9, 3)) == 1
+
+
+def test_placed_ends_have_their_bounds() -> None:
+    ends = np.random.default_rng(1).normal(0.0, 3.0, (50, 2))
+    found, low_x, high_x, low_y, high_y = placed(ends, 1.0, 2.0, 0.7)
+    turn = np.array([[np.cos(0.7), np.sin(0.7)], [-np.sin(0.7), np.cos(0.7)]])
+    assert found == pytest.approx(ends @ turn + (1.0, 2.0))
+    assert ((low_x, low_y), (high_x, high_y)) == (tuple(found.min(axis=0)), tuple(found.max(axis=0)))

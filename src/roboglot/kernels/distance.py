@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import ByteArray, Int16Array, IntArray, SingleArray
+from roboglot.kernels.arrays import ByteArray, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
 
 NEAR_MAX = 24  # cells of a cap up to which comparing one by one is quicker
@@ -113,24 +113,63 @@ def distances(marked: ByteArray, cap: float) -> SingleArray:
     return away
 
 
-@kernel("void(uint8[:,::1], int64, int64, int64, int16[:,::1])")
-def free_cells(occupied: ByteArray, down: int, along: int, far: int, found: Int16Array) -> None:
+@kernel("void(uint8[::1], float32[::1], float32[::1], float32)")
+def _one_farther(occupied: ByteArray, there: SingleArray, found: SingleArray, far: np.float32) -> None:
+    """Fill one row with a cell more than ``there``, or 0 where that is occupied: in wide instructions."""
+    for col in range(found.shape[0]):
+        found[col] = np.float32(0.0) if occupied[col] != 0 else min(far, there[col] + np.float32(1.0))
+
+
+@kernel("void(uint8[:,::1], int64, int64, int64, float32[:,::1])")
+def free_cells(occupied: ByteArray, down: int, along: int, far: int, found: SingleArray) -> None:
     """Fill in how many cells, ``far`` at most, lie between each cell and the next occupied one that way.
 
     Nothing is occupied outside of the grid.
     """
-    height, width = occupied.shape
+    (height, width), most = occupied.shape, np.float32(far)
+    first, end = min(width, max(0, -along)), max(0, min(width, width - along))  # columns with a neighbour that way
     for i in range(height):
         row = height - 1 - i if down > 0 else i
-        for j in range(width):
-            col = width - 1 - j if along > 0 else j
-            r, c = row + down, col + along
-            if not (0 <= r < height and 0 <= c < width):
-                found[row, col] = far
-            elif occupied[r, c] != 0:
-                found[row, col] = 0
-            else:
-                found[row, col] = min(far, found[r, c] + 1)
+        r = row + down
+        inside = 0 <= r < height and first < end
+        for col in range(first if inside else width):
+            found[row, col] = most
+        if not inside:
+            continue
+        for col in range(end, width):
+            found[row, col] = most
+        if down != 0:
+            _one_farther(
+                occupied[r, first + along : end + along],
+                found[r, first + along : end + along],
+                found[row, first:end],
+                most,
+            )
+            continue
+        for j in range(end - first):
+            col = end - 1 - j if along > 0 else first + j
+            free = min(most, found[r, col + along] + np.float32(1.0))
+            found[row, col] = np.float32(0.0) if occupied[r, col + along] != 0 else free
+
+
+@kernel("void(float32[::1], float32[::1], float32[::1], float32[::1], float64, float64, float64, uint8[::1])")
+def _mark_gaps(
+    ahead: SingleArray,
+    behind: SingleArray,
+    aside: SingleArray,
+    beside: SingleArray,
+    step: float,
+    wide: float,
+    deep: float,
+    found: ByteArray,
+) -> None:
+    """Mark the cells of one row that lie in a gap along an axis, or across it: in wide instructions."""
+    for col in range(found.shape[0]):
+        narrow = (np.float64(ahead[col] + behind[col]) + 1.0) * step < wide
+        narrow_across = (np.float64(aside[col] + beside[col]) + 1.0) * step < wide
+        through = np.float64(min(aside[col], beside[col])) * step >= deep
+        through_across = np.float64(min(ahead[col], behind[col])) * step >= deep
+        found[col] |= (narrow & through) | (narrow_across & through_across)
 
 
 @kernel("uint8[:,::1](uint8[:,::1], int64[:,::1], float64, float64)")
@@ -141,8 +180,8 @@ def gaps(occupied: ByteArray, axes: IntArray, wide: float, deep: float) -> ByteA
     """
     height, width = occupied.shape
     found = np.zeros((height, width), np.uint8)
-    one, other = np.empty((height, width), np.int16), np.empty((height, width), np.int16)
-    left, right = np.empty((height, width), np.int16), np.empty((height, width), np.int16)
+    one, other = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    left, right = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
     for k in range(len(axes)):
         down, along = axes[k, 0], axes[k, 1]
         step = np.sqrt(np.float64(down * down + along * along))
@@ -152,10 +191,5 @@ def gaps(occupied: ByteArray, axes: IntArray, wide: float, deep: float) -> ByteA
         free_cells(occupied, along, -down, far, left)
         free_cells(occupied, -along, down, far, right)
         for row in range(height):
-            for col in range(width):
-                ahead, behind, aside, beside = one[row, col], other[row, col], left[row, col], right[row, col]
-                if (ahead + behind + 1) * step < wide and min(aside, beside) * step >= deep:
-                    found[row, col] = 1
-                if (aside + beside + 1) * step < wide and min(ahead, behind) * step >= deep:
-                    found[row, col] = 1
+            _mark_gaps(one[row], other[row], left[row], right[row], step, wide, deep, found[row])
     return found

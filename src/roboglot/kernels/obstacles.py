@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, Int32Array, IntArray, SingleArray
+from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, Int32Array, SingleArray
 from roboglot.kernels.compiled import kernel
 
 CELL_SQUARE = 0.5001  # squared distance from a cell's centre to its corner, in cells, with a margin
@@ -234,51 +234,61 @@ def free_way(path: FloatArray, points: FloatArray, x: float, y: float, radius: f
     return np.inf
 
 
-@kernel("int64[::1](int16[:,::1], float64[:,::1], float64, float64, float64)")
-def unexplained(evidence: Int16Array, points: FloatArray, x: float, y: float, resolution: float) -> IntArray:
-    """The numbers of ``points`` (n, 2; m) inside the grid with its corner at (x, y) that lie a cell off all it has."""
-    height, width = evidence.shape
-    found, count = np.empty(points.shape[0], np.int64), 0
+@kernel("int64(int16[:,::1], float64[:,::1], float64, float64, float64, float64[:,::1])")
+def _unexplained(
+    evidence: Int16Array, points: FloatArray, x: float, y: float, resolution: float, odd: FloatArray
+) -> int:
+    """Fill ``odd`` with those points that lie a cell off all the grid has; return how many there are."""
+    (height, width), count = evidence.shape, 0
     for i in range(points.shape[0]):
         row, col = int(np.floor((points[i, 1] - y) / resolution)), int(np.floor((points[i, 0] - x) / resolution))
         if 0 <= row < height and 0 <= col < width and not beside_occupied(evidence, row, col):
-            found[count] = i
+            odd[count, 0], odd[count, 1] = points[i, 0], points[i, 1]
             count += 1
-    return found[:count]
+    return count
 
 
-@kernel("int16[:,::1](int16[:,::1], int64)")
-def without_things(evidence: Int16Array, size: int) -> Int16Array:
-    """Return a copy without occupied things that are at most ``size`` cells long and wide and touch nothing else.
+@kernel("float64[:,::1](int16[:,::1], float64[:,::1], float64, float64, float64, float64, float64, int64)")
+def things(
+    evidence: Int16Array,
+    points: FloatArray,
+    x: float,
+    y: float,
+    resolution: float,
+    link: float,
+    size: float,
+    least: int,
+) -> FloatArray:
+    """Return the means (k, 2; m) of the things that a scan's ``points`` (n, 2; m; in its order) show off the map.
 
-    What touches: cells with at most one free cell between them belong together, as an echo's neighbours do.
+    A thing has ``least`` points or more, each within ``link`` m of the last one, and fits into ``size`` m. The grid has
+    its corner at (x, y).
     """
-    height, width = evidence.shape
-    kept = evidence.copy()
-    visited = np.zeros((height, width), np.uint8)
-    cells = np.empty((height * width, 2), np.int32)
-    for row in range(height):
-        for col in range(width):
-            if evidence[row, col] <= 0 or visited[row, col]:
-                continue
-            count, at = 1, 0
-            cells[0, 0], cells[0, 1] = row, col
-            visited[row, col] = 1
-            top, bottom, left, right = row, row, col, col
-            while at < count:
-                r0, c0 = cells[at, 0], cells[at, 1]
-                at += 1
-                top, bottom, left, right = min(top, r0), max(bottom, r0), min(left, c0), max(right, c0)
-                for r in range(max(0, r0 - 2), min(height, r0 + 3)):
-                    for c in range(max(0, c0 - 2), min(width, c0 + 3)):
-                        if evidence[r, c] > 0 and not visited[r, c]:
-                            visited[r, c] = 1
-                            cells[count, 0], cells[count, 1] = r, c
-                            count += 1
-            if bottom - top < size and right - left < size:
-                for k in range(count):
-                    kept[cells[k, 0], cells[k, 1]] = -1
-    return kept
+    odd = np.empty((points.shape[0], 2))
+    count, found, met = _unexplained(evidence, points, x, y, resolution, odd), np.empty((points.shape[0], 2)), 0
+    first = 0  # where a thing begins
+    for i in range(count):
+        k = i - 1 if i > 0 else count - 1
+        if np.hypot(odd[i, 0] - odd[k, 0], odd[i, 1] - odd[k, 1]) > link:
+            first = i
+            break
+    begin = 0
+    for i in range(1, count + 1 if count >= least else 0):
+        here, last = (first + i) % count, (first + i - 1) % count
+        if i < count and np.hypot(odd[here, 0] - odd[last, 0], odd[here, 1] - odd[last, 1]) <= link:
+            continue
+        low_x = low_y = np.inf
+        high_x = high_y = -np.inf
+        sum_x = sum_y = 0.0
+        for j in range(begin, i):
+            at_x, at_y = odd[(first + j) % count, 0], odd[(first + j) % count, 1]
+            low_x, high_x, sum_x = min(low_x, at_x), max(high_x, at_x), sum_x + at_x
+            low_y, high_y, sum_y = min(low_y, at_y), max(high_y, at_y), sum_y + at_y
+        if i - begin >= least and np.hypot(high_x - low_x, high_y - low_y) <= size:
+            found[met, 0], found[met, 1] = sum_x / (i - begin), sum_y / (i - begin)
+            met += 1
+        begin = i
+    return found[:met].copy()
 
 
 @kernel("float64(float64[:,::1], float64, int64)")

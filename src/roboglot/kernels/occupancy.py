@@ -317,3 +317,49 @@ def rays_of(
             met += 1
         at += 1
     return ends, hit, points
+
+
+@kernel("int16[:,::1](int16[:,::1], int64)")
+def without_things(evidence: Int16Array, size: int) -> Int16Array:
+    """Return a copy without occupied things that are at most ``size`` cells long and wide and touch nothing else.
+
+    What touches: cells with at most one free cell between them belong together, as an echo's neighbours do.
+    """
+    height, width = evidence.shape
+    kept = evidence.copy()
+    visited = np.zeros((height, width), np.uint8)
+    cells = np.empty((height * width, 2), np.int32)
+    for row in range(height):
+        for col in range(width):
+            if evidence[row, col] <= 0 or visited[row, col]:
+                continue
+            count, at = 1, 0
+            cells[0, 0], cells[0, 1] = row, col
+            visited[row, col] = 1
+            top, bottom, left, right = row, row, col, col
+            while at < count:
+                r0, c0 = cells[at, 0], cells[at, 1]
+                at += 1
+                top, bottom, left, right = min(top, r0), max(bottom, r0), min(left, c0), max(right, c0)
+                for r in range(max(0, r0 - 2), min(height, r0 + 3)):
+                    for c in range(max(0, c0 - 2), min(width, c0 + 3)):
+                        if evidence[r, c] > 0 and not visited[r, c]:
+                            visited[r, c] = 1
+                            cells[count, 0], cells[count, 1] = r, c
+                            count += 1
+            if bottom - top < size and right - left < size:
+                for k in range(count):
+                    kept[cells[k, 0], cells[k, 1]] = -1
+    return kept
+
+
+@kernel("Tuple((float64[:,::1], float64, float64, float64, float64))(float64[:,::1], float64, float64, float64)")
+def placed(ends: FloatArray, x: float, y: float, yaw: float) -> tuple[FloatArray, float, float, float, float]:
+    """Return ``ends`` (n, 2) in the frame in which theirs is at (x, y, yaw), and least and greatest x, then y."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    found, low_x, high_x, low_y, high_y = np.empty(ends.shape), np.inf, -np.inf, np.inf, -np.inf
+    for i in range(ends.shape[0]):
+        at_x, at_y = ends[i, 0] * cos - ends[i, 1] * sin + x, ends[i, 0] * sin + ends[i, 1] * cos + y
+        found[i, 0], found[i, 1] = at_x, at_y
+        low_x, high_x, low_y, high_y = min(low_x, at_x), max(high_x, at_x), min(low_y, at_y), max(high_y, at_y)
+    return found, low_x, high_x, low_y, high_y

@@ -68,6 +68,9 @@ class EvidenceGrid:
         row0, column0 = math.floor(min_y / RESOLUTION), math.floor(min_x / RESOLUTION)
         row1, column1 = math.floor(max_y / RESOLUTION) + 1, math.floor(max_x / RESOLUTION) + 1
         height, width = self.evidence.shape
+        is_within = self.first_row <= row0 and row1 <= self.first_row + height
+        if is_within and self.first_column <= column0 and column1 <= self.first_column + width:
+            return
         empty = height == 0
         most = _side(row1 - row0 + 2 * GROWTH if empty else height)
         columns = _grown(self.first_column, self.first_column + width, column0, column1, empty, most)

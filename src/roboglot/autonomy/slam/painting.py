@@ -9,7 +9,7 @@ import numpy as np
 from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import ScanPoints
-from roboglot.kernels.occupancy import FROZEN, integrate
+from roboglot.kernels.occupancy import FROZEN, integrate, placed
 from roboglot.model.components.mapping.annotations import Area
 from roboglot.model.geometry import Pose
 
@@ -19,8 +19,7 @@ def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maint
 
     With ``maintained`` areas, nothing changes outside them.
     """
-    ends = scan.in_frame(pose, scan.ends)
-    (min_x, min_y), (max_x, max_y) = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
+    ends, min_x, max_x, min_y, max_y = placed(scan.ends, pose.x, pose.y, pose.yaw)
     grid.make_room(min(min_x, pose.x), min(min_y, pose.y), max(max_x, pose.x), max(max_y, pose.y))
     if maintained or grid.frozen:
         _freeze(grid, maintained)

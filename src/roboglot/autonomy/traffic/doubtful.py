@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
-from roboglot.kernels.obstacles import without_things
+from roboglot.kernels.occupancy import without_things
 from roboglot.model.geometry import Point
 
 THING_CELLS = 20  # largest single thing that may be a person or a robot

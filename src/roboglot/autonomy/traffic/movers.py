@@ -9,13 +9,12 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
-from roboglot.kernels.obstacles import unexplained
+from roboglot.kernels.obstacles import things
 from roboglot.model.geometry import Point, Pose
 from roboglot.values import dataclass
 
@@ -89,8 +88,8 @@ class MoverTracker:
         self.movers = [mover for mover in self.movers if stamp - mover.stamp <= FORGOTTEN]
         free = list(self.movers)
         corner = grid.corner
-        odd = unexplained(grid.evidence, echoes, corner.x, corner.y, RESOLUTION)
-        for x, y in _things(echoes[odd], pose):
+        found = things(grid.evidence, echoes, corner.x, corner.y, RESOLUTION, LINK, WIDE_MAX, ECHOES_MIN)
+        for x, y in (_middle(x, y, pose) for x, y in found.tolist()):
             mover = _expected(free, x, y, stamp)
             if mover is not None:
                 free.remove(mover)
@@ -114,23 +113,7 @@ def _expected(movers: Sequence[Mover], x: float, y: float, stamp: float) -> Move
     return found
 
 
-def _things(echoes: Points, pose: Pose) -> list[tuple[float, float]]:
-    """Return the middles of clusters of echoes."""
-    if len(echoes) < ECHOES_MIN:
-        return []
-    gaps = np.hypot(*(echoes - np.concatenate((echoes[-1:], echoes[:-1]))).T) > LINK
-    starts: list[int] = np.flatnonzero(gaps).tolist() or [0]
-    first = starts[0]
-    if first:
-        echoes = np.concatenate((echoes[first:], echoes[:first]))
-    found = []
-    for begin, end in pairwise([*(start - first for start in starts), len(echoes)]):
-        if end - begin < ECHOES_MIN:
-            continue
-        thing = echoes[begin:end]
-        if math.hypot(*(thing.max(axis=0) - thing.min(axis=0)).tolist()) > WIDE_MAX:
-            continue
-        x, y = thing.mean(axis=0).tolist()
-        away = max(math.hypot(x - pose.x, y - pose.y), 1e-6)
-        found.append((x + DEPTH * (x - pose.x) / away, y + DEPTH * (y - pose.y) / away))
-    return found
+def _middle(x: float, y: float, pose: Pose) -> tuple[float, float]:
+    """Return the middle of a thing whose front, seen from ``pose``, has its middle at (x, y)."""
+    away = max(math.hypot(x - pose.x, y - pose.y), 1e-6)
+    return x + DEPTH * (x - pose.x) / away, y + DEPTH * (y - pose.y) / away
