@@ -1,8 +1,9 @@
-"""The heap of a process that hosts robots: what each scan takes and frees stays there, large maps go back."""
+"""The process that hosts robots: what each scan takes and frees stays in its heap, large maps go back; its threads."""
 
 from __future__ import annotations
 
 import ctypes
+import os
 import subprocess
 import sys
 
@@ -26,6 +27,15 @@ prepare()
 print(*taken(400_000), *taken(2_000_000))
 """
 
+THREADS = """
+import os, sys
+import roboglot.cli.up
+assert "numpy" not in sys.modules
+roboglot.cli.up.prepare()
+import numpy
+print(len(os.listdir("/proc/self/task")))
+"""
+
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="only glibc, from 2.33 on, counts its blocks")
 def test_blocks_of_a_scan_stay_in_the_heap() -> None:
@@ -33,3 +43,13 @@ def test_blocks_of_a_scan_stay_in_the_heap() -> None:
     beside, given_back, large_beside, _ = map(int, ran.stdout.split())
     assert (beside, given_back) == (0, 0)
     assert large_beside == 4  # each goes back to the kernel as it is freed
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
+def test_numpy_starts_no_threads() -> None:
+    """OpenBLAS makes one for each processor, and each turns in a circle for the first tenth of a second."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("OPENBLAS_", "OMP_"))}
+    ran = subprocess.run(
+        [sys.executable, "-c", THREADS], check=True, timeout=100, capture_output=True, text=True, env=environment
+    )
+    assert ran.stdout.strip() == "1"

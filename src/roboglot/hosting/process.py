@@ -15,10 +15,11 @@ LAST_SECONDS = 10.0  # s after a signal; closing takes one or two
 
 
 def prepare() -> None:
-    """Set up heap, threads and gRPC's log for a process that serves robots."""
+    """Set up heap, threads and gRPC's log for a process that serves robots; before NumPy is imported."""
     _give_memory_back()
     sys.setswitchinterval(SWITCH_SECONDS)
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # the door logs the errors that matter
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # our matrices are small, and its threads wait without sleeping
 
 
 def end_in_any_case() -> None:
