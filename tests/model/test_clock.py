@@ -5,15 +5,15 @@ from __future__ import annotations
 import asyncio
 import gc
 import math
-from collections.abc import Callable, Iterator
-from contextvars import Context, ContextVar
+from collections.abc import Callable
+from contextvars import ContextVar
 from functools import partial
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.model.clock import LOCKSTEP_EPOCH, SLICE, LockstepClock, RealClock
+from roboglot.model.clock import LOCKSTEP_EPOCH, LockstepClock, RealClock
 from tests.slow_machine import Hours
 
 
@@ -316,36 +316,6 @@ async def test_longer_work_gives_others_their_turn() -> None:
     assert [name for name in done if len(name) == 1] == ["a", "b", "c"]
     assert done.index("after a") < done.index("c")
     assert [type(failure) for failure in failures] == [ZeroDivisionError]  # the next one had its turn all the same
-
-
-@pytest.mark.parametrize(("seconds", "turns"), [(SLICE, 4), (0.6 * SLICE, 2), (0.0, 1)])
-async def test_sockets_have_their_turn_between_slices(
-    monkeypatch: pytest.MonkeyPatch, seconds: float, turns: int
-) -> None:
-    clock, loop, done, now = RealClock(), asyncio.get_running_loop(), list[str](), [0.0]
-    armed, call_soon = list[object](), loop.call_soon
-
-    def work(name: str) -> None:
-        done.append(name)
-        now[0] += seconds
-
-    def steps() -> Iterator[None]:
-        for name in "ab":
-            work(name)
-            yield
-
-    def soon(job: Callable[..., object], *values: object, context: Context | None = None) -> asyncio.Handle:
-        armed.extend([job] * (getattr(job, "__self__", None) is clock))
-        return call_soon(job, *values, context=context)
-
-    monkeypatch.setattr("roboglot.model.clock.time.perf_counter", lambda: now[0])
-    monkeypatch.setattr(loop, "call_soon", soon)
-    for name in "cd":
-        clock.in_turn(partial(work, name))
-    clock.in_turn(partial(clock.in_steps, steps()), first=True)
-    await _until(lambda: len(done) == 4)
-    assert done == ["a", "b", "c", "d"]  # steps are taken to the end before other work
-    assert len(armed) == turns
 
 
 def test_longer_work_is_done_at_once_in_lockstep() -> None:

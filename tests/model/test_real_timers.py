@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 
-from roboglot.model.clock_base import CANCELLED_MAX, RealTimers
+from roboglot.model.clock_base import CANCELLED_MAX, STRETCH, RealTimers
 
 
 class Hours:
@@ -91,4 +92,25 @@ async def test_timers_that_were_called_off_take_no_memory() -> None:
     hours.timers.add(1.0, hours.note("soon"))
     await hours.reach(1.0)
     assert hours.rung == ["soon"]
+    assert len(hours.timers) == 0
+
+
+async def test_many_timers_leave_the_loop_its_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    hours, now = Hours(), [0.0]
+    monkeypatch.setattr("roboglot.model.clock_base.time.perf_counter", lambda: now[0])
+
+    def work(name: str) -> None:
+        hours.rung.append(name)
+        asyncio.get_running_loop().call_soon(hours.rung.append, "socket")
+        now[0] += 0.6 * STRETCH
+
+    timers = [hours.timers.add(1.0, partial(work, name)) for name in "abcde"]
+    hours.now = 1.0
+    hours.timers._ring()
+    assert hours.rung == ["a", "b"]
+    timers[3].cancel()
+    for _ in range(20):
+        await asyncio.sleep(0)
+    assert [rung for rung in hours.rung if rung != "socket"] == ["a", "b", "c", "e"]
+    assert hours.rung[2] == "socket"
     assert len(hours.timers) == 0

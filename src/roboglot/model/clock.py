@@ -18,6 +18,7 @@ from contextvars import copy_context
 from functools import partial
 
 from roboglot.model.clock_base import HOLD_MAX, Clock, RealTimers, Timer
+from roboglot.model.slices import Slices
 
 __all__ = ["LOCKSTEP_EPOCH", "Clock", "LockstepClock", "PatientClock", "RealClock", "Timer"]
 YIELD_AFTER = 0.5  # s of lockstep time
@@ -28,7 +29,6 @@ THOUGHT, THOUGHT_MAX = 0.5, 60.0  # robot s that a robot's computation takes at 
 HASTE = 0.25  # share by which a patient clock that stood runs faster than asked
 OWED_MAX = 0.5  # real s that it makes up for
 STANDING = 0.002  # real s between two checks of a patient clock that stands still
-SLICE = 0.0015  # real s of jobs after which the loop sees to its sockets
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces contain no real date
 
 
@@ -44,9 +44,7 @@ class RealClock(Clock):
         self._until = math.inf  # robot time at which the clock stops
         self._timers = RealTimers(self.real_seconds_until, self._is_due)
         self._speed = 1.0
-        self._jobs: deque[Callable[[], None]] = deque()
-        self._turn: asyncio.Handle | None = None  # of the next of them, or of the one under way
-        self._slice_ends = 0.0  # real s
+        self._slices = Slices()
         self.set_speed(speed)
 
     @property
@@ -70,36 +68,13 @@ class RealClock(Clock):
         return self._timers.add(when, callback)
 
     def in_turn(self, job: Callable[[], None], *, first: bool = False) -> None:
-        entry = partial(copy_context().run, job)
-        if first:
-            self._jobs.appendleft(entry)
-        else:
-            self._jobs.append(entry)
-        if self._turn is None:
-            self._arm()
+        self._slices.add(partial(copy_context().run, job), first=first)
 
     def in_steps(self, steps: Iterator[None]) -> None:
         for _ in steps:
-            if time.perf_counter() >= self._slice_ends:
+            if self._slices.over:
                 self.in_turn(partial(self.in_steps, steps), first=True)
                 return
-
-    def _arm(self) -> None:
-        self._turn = asyncio.get_running_loop().call_soon(self._work)
-
-    def _work(self) -> None:
-        """Run jobs for one SLICE; the loop serves its sockets before the next ones.
-
-        A request of several steps (over gRPC, five turns of the loop) waits for so many of these at most.
-        """
-        self._slice_ends = time.perf_counter() + SLICE
-        try:
-            while self._jobs and time.perf_counter() < self._slice_ends:
-                self._jobs.popleft()()
-        finally:
-            self._turn = None
-            if self._jobs:
-                self._arm()
 
     def set_speed(self, speed: float) -> None:
         """Run ``speed`` times as fast as real time from now on. Raises ValueError unless it is above 0."""
@@ -138,6 +113,7 @@ class RealClock(Clock):
     def _change(self, speed: float, until: float) -> None:
         self._anchor = time.monotonic(), self.time()
         self._speed, self._until = speed, until
+        self._slices.speed = speed
         self._timers.arm()
 
 

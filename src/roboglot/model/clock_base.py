@@ -6,6 +6,7 @@ import asyncio
 import heapq
 import itertools
 import math
+import time
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from typing import Protocol, TypeVar
 T = TypeVar("T")
 HOLD_MAX = 5.0  # s (machine clock) that lockstep time waits for work outside the event loop
 GRAIN = 0.001  # s: the loop's timers are no finer, and may ring as much too early
+STRETCH = 0.0015  # real s of timers after which the loop sees to its sockets
 CANCELLED_MAX = 64  # timers that were called off and still wait, beside as many that were not
 
 
@@ -256,23 +258,36 @@ class RealTimers:
             self._alarm = self._loop.call_later(max(seconds, least), self._ring)
 
     def _ring(self) -> None:
-        """Fire all that are due; what they add comes later, even if it is due as well."""
+        """Fire all that are due; what they add comes later, even if it is due as well.
+
+        Those that are left after a STRETCH are fired when the loop has seen to its sockets.
+        """
         self._alarm = None
-        due = list[RealTimer]()
+        due = list[tuple[float, int, RealTimer]]()
         while self._heap and self._is_due(self._heap[0][0]):
-            timer = heapq.heappop(self._heap)[2]
-            timer.waits = False
-            if timer.callback is None:
+            entry = heapq.heappop(self._heap)
+            entry[2].waits = False
+            if entry[2].callback is None:
                 self._cancelled -= 1
             else:
-                due.append(timer)
+                due.append(entry)
+        fired, ends = 0, time.perf_counter() + STRETCH
         self._ringing = True
         try:
-            for timer in due:
-                self._fire(timer)
+            for fired, entry in enumerate(due, 1):  # noqa: B007 - after the loop: the number fired
+                self._fire(entry[2])
+                if time.perf_counter() >= ends:
+                    break
         finally:
+            self._put_back(due[fired:])
             self._ringing = False
             self.arm(0.0 if due else GRAIN)
+
+    def _put_back(self, entries: list[tuple[float, int, RealTimer]]) -> None:
+        for entry in entries:
+            if entry[2].callback is not None:
+                entry[2].waits = True
+                heapq.heappush(self._heap, entry)
 
     def _fire(self, timer: RealTimer) -> None:
         """Call it, unless one before it has called it off; an error of its own affects no other."""

@@ -1,0 +1,68 @@
+"""Longer jobs in slices, between which the event loop serves its sockets. Knows no robot and no clock.
+
+A request of several steps (over gRPC, seven turns of the loop) would wait for a slice at each of them, if there were
+one in every turn. So after a slice the loop first serves what there is to serve, and the threads that bring a request's
+next step have a moment for that; but jobs that are long behind have a slice in every turn.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+
+SLICE = 0.0015  # real s of jobs after which the loop sees to its sockets
+SERVING = 0.003  # real s for which sockets may keep waiting jobs from their next slice
+IDLE = 0.00015  # real s without anything to serve after which it begins
+BEHIND_MAX = 0.2  # real s since jobs wait without end, after which sockets keep them no longer
+TURN = 0.00005  # real s of a turn of the loop in which it served something
+
+
+class Slices:
+    """Jobs that wait for their turn. ``speed``: robot s in a real one; for greater ones, sockets keep jobs less."""
+
+    def __init__(self) -> None:
+        self.speed = 1.0
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._turn: asyncio.Handle | None = None  # of the next of them, or of the one under way
+        self._ends = self._ended = -math.inf  # real s: of the slice under way, and of the last one
+        self._armed = self._served = self._behind = -math.inf  # real s: when the turn, something else, waiting began
+
+    @property
+    def over(self) -> bool:
+        """True if the slice under way, or the last one, has taken its time."""
+        return time.perf_counter() >= self._ends
+
+    def add(self, job: Callable[[], None], *, first: bool) -> None:
+        """Run ``job`` after those that wait, or ``first``."""
+        if first:
+            self._jobs.appendleft(job)
+        else:
+            self._jobs.append(job)
+        if self._turn is None:
+            self._behind = time.perf_counter()
+            self._arm(self._behind)
+
+    def _arm(self, now: float) -> None:
+        self._armed = now
+        self._turn = asyncio.get_running_loop().call_soon(self._work)
+
+    def _work(self) -> None:
+        """Run jobs for one SLICE, unless there was something to serve just now."""
+        now = time.perf_counter()
+        if now >= self._armed + TURN:
+            self._served = now
+        patience = min(1.0, 1.0 / self.speed)
+        if now < min(self._ended + patience * SERVING, self._served + patience * IDLE, self._behind + BEHIND_MAX):
+            self._arm(now)
+            return
+        self._ends = now + SLICE
+        try:
+            while self._jobs and time.perf_counter() < self._ends:
+                self._jobs.popleft()()
+        finally:
+            self._turn, self._ended = None, time.perf_counter()
+            if self._jobs:
+                self._arm(self._ended)
