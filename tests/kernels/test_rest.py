@@ -7,8 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from roboglot.kernels import loading
-from roboglot.kernels.rest import _unwritten, rest
+from roboglot.kernels import _unwritten, loading, rest
 
 MAPS = """\
 7f00-7f10 r-xp 00001000 08:01 7 /x/libllvmlite.so
@@ -69,7 +68,7 @@ def test_nothing_is_given_back_when_nothing_was_loaded(monkeypatch: pytest.Monke
     import roboglot.kernels.sweep
 
     asked = []
-    monkeypatch.setattr("roboglot.kernels.rest.rest", lambda: asked.append(True))
+    monkeypatch.setattr("roboglot.kernels.rest", lambda: asked.append(True))
     with loading():
         pass
     assert not asked

@@ -62,3 +62,18 @@ GIMBAL_WIDTH = 9
 CONTACT_DISTANCE, CONTACT_ANGLE, CONTACT_MADE = 1, 2, 3  # tolerances; flag: at a dock
 CONTACT_WIDTH = 4
 DOCK_WIDTH = 6
+
+# People. A person who does anything else than stand, wait or walk acts.
+PERSON_STATE = 0  # one of the next four
+STANDS, WAITS, WALKS, ACTS = 0.0, 1.0, 2.0, 3.0
+PERSON_X, PERSON_Y, PERSON_YAW = 1, 2, 3
+PERSON_GOAL_X, PERSON_GOAL_Y, PERSON_SPEED = 4, 5, 6  # of the present walk
+PERSON_IDLE = 7  # further ticks of a wait
+PERSON_STRIDES = 8  # flag: walked in the last tick
+PERSON_WAY, PERSON_WAITED = 9, 10  # m walked so far; s for which a robot has been in the way
+PERSON_FLOOR, PERSON_BODY = 11, 12  # place among the movable bodies of the physics
+PERSON_WIDTH = 13
+
+# Stages of a tick at which ``ticks.run`` leaves the rest to others.
+DONE, GIMBALS, DRIVE, PEOPLE, NEAR, STUCK, SETTLING, SEEN, TOUCHED, MEASURED, WATCHED, RECKONED = range(12)
+STAGE_UNIT, COUNT_UNIT, TICKS_UNIT = 2, 32, 32 * 65536  # of the parts of its answer; odd: something moved

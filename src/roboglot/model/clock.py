@@ -222,9 +222,24 @@ class LockstepClock(Clock):
         self._arrived: deque[Callable[[], None]] = deque()
         self._letting_in: asyncio.Task[None] | None = None
         self._advancing = False
+        self._ready: Sized = ()  # what the loop has ready to run
+        self._end = -math.inf  # until which the present callback may go ahead, if no other is due before
 
     def time(self) -> float:
         return self._now
+
+    @property
+    def free_until(self) -> float:
+        if self._ready or self._held or self._arrived:
+            return -math.inf
+        while self._heap and self._heap[0][2].callback is None:
+            heapq.heappop(self._heap)
+        return min(self._end, math.nextafter(self._heap[0][0], -math.inf)) if self._heap else self._end
+
+    def go_ahead(self, when: float) -> None:
+        if when > self._now:
+            self._set(when)
+            self._turn = 1
 
     @property
     def turn(self) -> int:
@@ -254,12 +269,14 @@ class LockstepClock(Clock):
             await self._settle()
             await self._fire(end, turn)
         finally:
-            self._advancing = False
+            self._advancing, self._end = False, -math.inf
         self._set(max(self._now, end))
 
     async def _fire(self, end: float, turn: int) -> None:
         yielded = self._now
-        ready, limit = _ready(), end if turn >= 0 else end + 1e-9
+        self._ready, limit = _ready(), end if turn >= 0 else end + 1e-9
+        self._end = math.nextafter(end, -math.inf) if turn >= 0 else limit
+        ready = self._ready
         while self._heap and self._heap[0][0] <= limit:
             when, _, timer = self._heap[0]
             if (callback := timer.callback) is not None and max(when, self._now) == end:

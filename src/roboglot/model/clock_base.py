@@ -53,6 +53,17 @@ class Clock(ABC):
         """Number of timers that have fired in this very instant of a lockstep clock; -1: time passes by itself."""
         return -1
 
+    @property
+    def free_until(self) -> float:
+        """Time until which nothing is due but the callback under way; -inf: time passes by itself, or it is unknown."""
+        return -math.inf
+
+    def go_ahead(self, when: float) -> None:  # noqa: B027 - time passes by itself
+        """Let time pass until ``when`` within a callback, which does in advance what it would be called for.
+
+        Not beyond ``free_until``, unless time passes by itself: then it has no effect.
+        """
+
     def arrive(self, happening: Callable[[], None]) -> None:
         """Handle an outside event; lockstep robots learn of it when they have come to rest."""
         happening()

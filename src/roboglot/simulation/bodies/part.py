@@ -21,7 +21,7 @@ from roboglot.model.components.component import Component
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.bodies.rows import Control, Rows, Sense
+from roboglot.simulation.bodies.rows import Control, Rows, Sense, SharedControl, SharedSense
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.values import dataclass
 
@@ -76,7 +76,8 @@ class Part(Generic[P]):
         nothing but these parts.
     control_together: the same for ``control``, before that of all other parts.
     ahead: makes of all robots' parts of this kind one function that computes in advance, after all that is sensed
-        together in a tick, what each part's own ``sense`` takes up in its turn.
+        together in a tick, what each part's own ``sense`` takes up in its turn. It gets the tick's number, and may be
+        left out in ticks in which none of them senses.
     duty: answers whether the part has something to do; without one ``control`` and ``sense`` are always called.
     displaced: called when the robot was lifted and put elsewhere. ``detach``: called when the world ends.
     """
@@ -90,9 +91,9 @@ class Part(Generic[P]):
     control: Callable[[P, float], None] | None = None
     control_after: tuple[str, ...] = ()
     sense: Callable[[P, float, float], None] | None = None
-    together: Callable[[Rows, Sequence[tuple[P, Sense]]], Sense] | None = None
-    control_together: Callable[[Rows, Sequence[tuple[P, Control]]], Control] | None = None
-    ahead: Callable[[Rows, Sequence[P]], Sense] | None = None
+    together: Callable[[Rows, Sequence[tuple[P, Sense]]], SharedSense] | None = None
+    control_together: Callable[[Rows, Sequence[tuple[P, Control]]], SharedControl] | None = None
+    ahead: Callable[[Rows, Sequence[P]], Callable[[int], None]] | None = None
     every: int | Callable[[P], int] = 1
     first: int = 1
     duty: Callable[[P], Duty] | None = None

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from heapq import heappop, heappush
 
 from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.part import parts
-from roboglot.simulation.bodies.rows import Control, Rows, Sense
+from roboglot.simulation.bodies.rows import Rows, SharedControl, SharedSense
 from roboglot.simulation.bodies.schedule import Schedule
 
 LAST = 1 << 60  # after all
@@ -46,6 +46,14 @@ class Agenda:
                     self._book(number, tick)
         self._at = LAST
 
+    def skip(self, tick: int) -> None:
+        """Note that the ticks up to this one have passed, in which nothing was due."""
+        self._tick = tick
+
+    def due(self, tick: int) -> bool:
+        """Return whether something may be due in a later tick."""
+        return tick in self._due
+
     def _change(self, number: int) -> None:
         """Note that a duty of a schedule began or ended."""
         if number != self._at:
@@ -63,31 +71,62 @@ class Agenda:
 
 
 class Rounds:
-    """Control and sensing of the robots of the last tick. ``tick``: s."""
+    """Control and sensing of the robots. ``tick``: s.
+
+    ``controls`` and ``senses``: what is done together for all, in every tick; that of ``senses`` by the one who calls.
+    """
 
     def __init__(self, rows: Rows, tick: float) -> None:
         self._rows, self._tick = rows, tick
         self._robots: tuple[SimulatedRobot, ...] = ()
-        self._controls: list[Control] = []
-        self._senses: list[Sense] = []
+        self.controls: list[SharedControl] = []
+        self.senses: list[SharedSense] = []
+        self._ahead: list[Callable[[int], None]] = []
         self._ticks = 0
         self._controlled = self._sensed = Agenda((), (), 0)
 
-    def control(self, robots: tuple[SimulatedRobot, ...]) -> None:
-        """Run all control of a tick, before its physics."""
+    def control(self, robots: tuple[SimulatedRobot, ...], *, lean: bool = False) -> bool:
+        """Run all control of the next tick, before its physics; if ``lean``, only if a robot has something due.
+
+        Return whether it ran.
+        """
         if robots != self._robots:
             self._gather(robots)
-        self._ticks = tick = self._ticks + 1
-        for control in self._controls:
+        tick = self._ticks + 1
+        if lean and not self._controlled.due(tick):
+            self._controlled.skip(tick)
+            return False
+        self._controlled.skip(tick - 1)
+        for control in self.controls:
             control(self._tick)
         for number in self._controlled.begin(tick):
             robots[number].control(tick)
+        return True
+
+    def free(self, most: int) -> int:
+        """Return how many ticks, at least 1 and at most so many, can pass before a robot has something due.
+
+        That is, control after the first of them, or sensing before the last.
+        """
+        tick = self._ticks
+        for ahead in range(1, most):
+            if self._sensed.due(tick + ahead) or self._controlled.due(tick + ahead + 1):
+                return ahead
+        return most
+
+    def skip(self, ticks: int) -> None:
+        """Note that so many ticks have passed; the last one is to be sensed yet."""
+        if not ticks:
+            return
+        self._ticks += ticks
+        self._controlled.skip(self._ticks)
+        self._sensed.skip(self._ticks - 1)
 
     def sense(self, robots: tuple[SimulatedRobot, ...], stamp: float) -> Iterator[None]:
-        """Run all sensing of a tick, after its physics; yield where other work may come between."""
-        for sense in self._senses:
-            sense(stamp, self._tick)
+        """Run the sensing that is due in the last tick; yield where other work may come between."""
         tick = self._ticks
+        for compute in self._ahead:
+            compute(tick)
         for number in self._sensed.begin(tick):  # one robot at a time: its data stay in the cache
             robots[number].sense(tick, stamp)
             yield
@@ -95,20 +134,19 @@ class Rounds:
     def _gather(self, robots: tuple[SimulatedRobot, ...]) -> None:
         """Make the functions of all robots' parts anew."""
         self._robots = robots
-        self._controls.clear()
-        self._senses.clear()
-        ahead: list[Sense] = []
+        self.controls.clear()
+        self.senses.clear()
+        self._ahead.clear()
         for part in parts():
             if part.control_together is not None:
                 moved = [its for robot in robots if (its := robot.control_together(part.name)) is not None]
-                self._controls.append(part.control_together(self._rows, moved))
+                self.controls.append(part.control_together(self._rows, moved))
             if part.together is not None:
                 found = [one for robot in robots if (one := robot.together(part.name)) is not None]
-                self._senses.append(part.together(self._rows, found))
+                self.senses.append(part.together(self._rows, found))
             if part.ahead is not None:
                 early = [it for robot in robots if (it := robot.ahead(part.name)) is not None]
-                ahead += [part.ahead(self._rows, early)] if early else []
-        self._senses += ahead
+                self._ahead += [part.ahead(self._rows, early)] if early else []
         for robot in robots:
             if robot.before is None:
                 robot.before = self._ticks

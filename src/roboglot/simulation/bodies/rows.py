@@ -32,6 +32,15 @@ class Kernels:
     touch: Callable[..., int]
 
 
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """Stage of a tick in ``kernels/ticks.py``, with the tables (asked for anew each time) and numbers it takes."""
+
+    stage: int
+    tables: Callable[[], tuple[FloatArray, ...]]
+    settings: tuple[float, ...] = ()
+
+
 class Rows:
     """Tables for ``robots`` robots. ``kernels``: None until they are loaded; ``others``: room for their answer."""
 
@@ -63,37 +72,19 @@ class Rows:
             self._tables[name] = np.zeros((self._robots, width))
         return self._tables[name]
 
-    def control(self, alone: Mapping[int, Control], kernel: Callable[[Kernels, float], int]) -> Control:
-        """Return a function that controls with ``kernel`` and those of ``alone``, as ``sense`` does for sensing."""
+    def control(self, alone: Mapping[int, Control], kernel: Callable[[Kernels, float], int], leg: Leg) -> SharedControl:
+        """Return what controls with ``kernel`` and those of ``alone``, as ``sense`` does for sensing."""
+        return SharedControl(self, alone, kernel, leg)
 
-        def control(seconds: float) -> None:
-            if self.kernels is None:
-                for one in alone.values():
-                    one(seconds)
-                return
-            if count := kernel(self.kernels, seconds):
-                for index in self.others[:count].tolist():
-                    alone[index](seconds)
-
-        return control
-
-    def sense(self, alone: Mapping[int, Sense], kernel: Callable[[Kernels, float, float], int]) -> Sense:
-        """Return a function that senses with one call of ``kernel``, and with those of ``alone`` that it leaves.
+    def sense(
+        self, alone: Mapping[int, Sense], kernel: Callable[[Kernels, float, float], int], leg: Leg | None = None
+    ) -> SharedSense:
+        """Return what senses with one call of ``kernel``, and with those of ``alone`` that it leaves.
 
         Without kernels with all of them. The keys of ``alone`` are rows; the kernel's answer is how many it has left.
+        ``leg``: its part in the kernel that does all in one (``kernels/ticks.py``).
         """
-
-        def sense(stamp: float, seconds: float) -> None:
-            if self.kernels is None:
-                for one in alone.values():
-                    one(stamp, seconds)
-                return
-            if count := kernel(self.kernels, stamp, seconds):
-                for index in self.others[:count].tolist():
-                    if index in alone:  # else it joined in this tick, and begins with the next
-                        alone[index](stamp, seconds)
-
-        return sense
+        return SharedSense(self, alone, kernel, leg)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,3 +99,48 @@ class Seat:
         self.rows.table(name, width)[self.index] = 0.0
         row: memoryview[float] = memoryview(self.rows.table(name, width)[self.index]).cast("B").cast("d")
         return row
+
+
+@dataclass(frozen=True, slots=True)
+class SharedControl:
+    """Control of one kind of part of all robots, see ``Rows.control``."""
+
+    rows: Rows
+    alone: Mapping[int, Control]
+    kernel: Callable[[Kernels, float], int]
+    leg: Leg
+
+    def __call__(self, seconds: float) -> None:
+        """Control all."""
+        rows = self.rows
+        if rows.kernels is None:
+            for one in self.alone.values():
+                one(seconds)
+        elif count := self.kernel(rows.kernels, seconds):
+            for index in rows.others[:count].tolist():
+                self.alone[index](seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class SharedSense:
+    """Sensing of one kind of part of all robots, see ``Rows.sense``."""
+
+    rows: Rows
+    alone: Mapping[int, Sense]
+    kernel: Callable[[Kernels, float, float], int]
+    leg: Leg | None
+
+    def __call__(self, stamp: float, seconds: float) -> None:
+        """Sense with all."""
+        rows = self.rows
+        if rows.kernels is None:
+            for one in self.alone.values():
+                one(stamp, seconds)
+        elif count := self.kernel(rows.kernels, stamp, seconds):
+            self.end(count, stamp, seconds)
+
+    def end(self, count: int, stamp: float, seconds: float) -> None:
+        """Sense with the ``count`` that the kernel has left."""
+        for index in self.rows.others[:count].tolist():
+            if index in self.alone:  # else it joined in this tick, and begins with the next
+                self.alone[index](stamp, seconds)

@@ -19,19 +19,20 @@ class Sleep:
 
     def __init__(self, model: MjModel, data: MjData) -> None:
         self._data = data
-        self._inputs = data.ctrl, data.qfrc_applied, model.actuator_gainprm, model.actuator_forcerange
-        self._state = data.qpos, data.qvel
-        self._kept: tuple[bytes, bytes, bytes, bytes] | None = None  # None: something moved
-        self._places, self._rates = data.qpos.copy(), data.qvel.copy()
-        self._there = b"", b""  # the bytes of these two
+        gains, forces = model.actuator_gainprm.ravel(), model.actuator_forcerange.ravel()
+        self.now = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, gains, forces  # views
+        self.kept = tuple(array.copy() for array in self.now)  # as they were when everything came to rest
+        self._bytes: list[bytes] = []  # of these
+        self.holds = False  # whether they count: nothing has moved since
 
     @property
     def lasts(self) -> bool:
         """True while nothing has changed since everything came to rest."""
-        if not self._kept:
-            return False
-        (qpos, qvel), (places, rates) = self._state, self._there
-        return qpos.tobytes() == places and qvel.tobytes() == rates and self._same
+        return self.holds and all(now.tobytes() == kept for now, kept in zip(self.now, self._bytes, strict=True))
+
+    def wake(self) -> None:
+        """Note that something moves."""
+        self.holds = False
 
     def settle(self, *, rests: bool) -> bool:
         """Check a step, after which no velocity is above RESTS (``rests``) or some are.
@@ -40,28 +41,21 @@ class Sleep:
         """
         data = self._data
         if not rests or data.nefc or not tiny(data.qacc.tolist()):
-            self._kept = None
+            self.holds = False
             return False
-        if self._kept and self._same and abs(data.qpos - self._places).max() <= RESTS:
-            data.qpos[:], data.qvel[:] = self._places, self._rates
+        places = self.kept[0]
+        if self.holds and self._same_inputs and abs(data.qpos - places).max() <= RESTS:
+            data.qpos[:], data.qvel[:] = self.kept[:2]
             return True
-        self._places, self._rates = data.qpos.copy(), data.qvel.copy()
-        self._there = self._places.tobytes(), self._rates.tobytes()
-        controls, applied, gains, forces = self._inputs
-        self._kept = controls.tobytes(), applied.tobytes(), gains.tobytes(), forces.tobytes()
+        for kept, now in zip(self.kept, self.now, strict=True):
+            kept[:] = now
+        self._bytes = [kept.tobytes() for kept in self.kept]
+        self.holds = True
         return False
 
     @property
-    def _same(self) -> bool:
-        if self._kept is None:
-            return False
-        (controls, applied, gains, forces), kept = self._inputs, self._kept
-        return (
-            controls.tobytes() == kept[0]
-            and applied.tobytes() == kept[1]
-            and gains.tobytes() == kept[2]
-            and forces.tobytes() == kept[3]
-        )
+    def _same_inputs(self) -> bool:
+        return all(now.tobytes() == kept for now, kept in zip(self.now[2:], self._bytes[2:], strict=True))
 
 
 def tiny(numbers: list[float]) -> bool:

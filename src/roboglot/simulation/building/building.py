@@ -48,6 +48,11 @@ class Building:
         self.docks[floor][index] = front
         self._props.put(f"dock {floor} {index}", floor, dock_solid(front))
 
+    @property
+    def rests(self) -> bool:
+        """True while no step changes anything."""
+        return self.lift is None or self.lift.rests
+
     def step(self, stamp: float, seconds: float) -> None:
         """Let ``seconds`` pass, until ``stamp``."""
         if self.lift is not None:

@@ -68,6 +68,11 @@ class LiftCar:
         return min(range(len(self._elevations)), key=lambda number: abs(self._elevations[number] - self._height))
 
     @property
+    def rests(self) -> bool:
+        """True while it waits for a call, with its door open or closed."""
+        return not self._riding and self._door in (LiftDoor.OPEN, LiftDoor.CLOSED) and not self._calls
+
+    @property
     def state(self) -> LiftState:
         """State as broadcast by radio."""
         load = self.passengers.load(self) / self.section.capacity

@@ -10,6 +10,7 @@ import heapq
 import inspect
 import itertools
 import logging
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ from roboglot.model.client_context import concerning
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
 from roboglot.model.stage import ActiveFault, FaultKind
 from roboglot.simulation.faults.fault_kinds import KINDS, FaultRecipe, FragileWorld, Target, Undo
-from roboglot.simulation.world.spelling import nearest
+from roboglot.simulation.faults.spelling import nearest
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.description import PlannedFault
@@ -84,6 +85,11 @@ class Faults:
         """Begin and end the faults that are due until ``stamp`` (robot time, s)."""
         while self._agenda and self._agenda[0][0] <= stamp + 1e-9:
             heapq.heappop(self._agenda)[2]()
+
+    @property
+    def next(self) -> float:
+        """Robot time before which no fault begins or ends by itself, s."""
+        return self._agenda[0][0] - 1e-6 if self._agenda else math.inf
 
     # ------------------------------------------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ from functools import cached_property
 from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.people import figure
 from roboglot.simulation.people.figure import Floats
+from roboglot.simulation.people.person_state import PersonState
 from roboglot.simulation.people.routine import (
     Clap,
     Exercise,
@@ -43,16 +44,16 @@ Spots = Sequence[tuple[float, float]]  # places of robots on the floor, m
 Free = Callable[["Walker", Point], bool]  # whether the person can walk straight to that place
 
 
-class Walker:
+class Walker(PersonState):
     """One person: pose, present step and emotion. ``body``: the person's name in the physics.
 
     It also names a person without a name. ``look``: number of the clothes.
     """
 
     def __init__(self, person: Person, floor: int, body: str = "", look: int = 0) -> None:
+        super().__init__(floor)
         self.person, self.floor, self.key, self.body, self.look = person, floor, person.name or body, body, look
         self.emotion = person.emotion
-        self.walking = False
         self.displaced = False  # whether they were moved since the last tick
         self.aloud: list[Say | Clap] = []  # words and claps begun since the last fetch
         self._script = person.script or tuple(_strolling(person))
@@ -60,8 +61,6 @@ class Walker:
         self._orders: deque[Step] | None = None  # None: their own routine
         self.doing: Step | None = None
         self._elapsed = 0.0
-        self._idle = 0  # further ticks of a wait, already counted in ``_elapsed``
-        self._way = self._waited = 0.0
         self._dodging: Point | None = None  # their destination while they let a robot pass
         path = [Point(*spot) for spot in person.path]
         facing = path[0].bearing_to(path[1]) if len(path) > 1 else 0.0
@@ -90,7 +89,7 @@ class Walker:
             case Exercise(sport=sport, period=period):
                 joints = figure.exercising(sport, self._elapsed / period)
             case _:
-                joints = figure.walking(self._way) if self.walking else figure.UPRIGHT
+                joints = figure.walking(self.way) if self.walking else figure.UPRIGHT
         return joints * figure.size(self.person.height, self.person.radius)
 
     @property
@@ -113,19 +112,22 @@ class Walker:
         if len(self._orders) >= ORDERS_MAX:
             raise ValueError(f"{self.key} remembers no more than {ORDERS_MAX} steps")
         self._orders.append(step)
+        self.acts()
 
     def drop(self) -> None:
         """Drop all orders, and stand."""
-        self._orders, self.doing, self._dodging, self._idle = deque(), None, None, 0
+        self._orders, self.doing, self._dodging = deque(), None, None
+        self.cease()
 
     def resume(self) -> None:
         """Continue the script."""
-        self._orders, self.doing, self._idle = None, None, 0
+        self._orders, self.doing = None, None
+        self.cease()
 
     def place(self, pose: Pose) -> None:
         """Set the pose (world) at once."""
-        self.pose = pose
-        self.displaced = True
+        self.pose, self.displaced = pose, True
+        self.acts()
 
     @property
     def follows_script(self) -> bool:
@@ -135,27 +137,39 @@ class Walker:
     # -- time ----------------------------------------------------------------------------------------------------------
 
     def walk(self, seconds: float, robots: Spots, free: Free) -> bool:
-        """Continue for ``seconds`` among the ``robots`` of the floor; return whether the pose changed."""
-        self.walking, moved, self.displaced = False, self.displaced, False
-        if self._idle:
-            self._idle -= 1
-            return moved
-        if self.doing is None and ((self._orders is None and not self._script) or not self._begin()):
-            return moved
+        """Continue for ``seconds`` among the ``robots`` of the floor; return whether the pose changed.
+
+        A kernel does the same for those who only walk or wait (``kernels/walking.py``).
+        """
+        moved, self.displaced, self.walking = self.displaced, False, False
+        before = self.pose
+        if self.idle:
+            self.idle -= 1
+        elif self.doing is not None or self._begin():
+            self._continue(robots, seconds, free)
+        self._note(seconds)
+        after = self.pose
+        return moved or (after is not before and after != before)
+
+    def _continue(self, robots: Spots, seconds: float, free: Free) -> None:
+        """Continue the present step."""
         self._elapsed += seconds
-        doing, before = self.doing, self.pose
-        if isinstance(doing, Walk):  # the most frequent step
-            over = self._walk_on(doing, robots, seconds, free)
-        elif isinstance(doing, Wait):  # also frequent
-            over = self._wait(doing.seconds, seconds)
-        else:
-            over = self._do(seconds)
+        match self.doing:
+            case Walk() as doing:
+                over = self._walk_on(doing, robots, seconds, free)
+            case Wait(seconds=span):
+                over = self._wait(span, seconds)
+            case _:
+                over = self._do(seconds)
         if over:
             self.doing = None
-        after = self.pose
-        if after is before:
-            return moved
-        return moved or after.x != before.x or after.y != before.y or after.yaw != before.yaw
+
+    def _note(self, seconds: float) -> None:
+        """Note for the kernel what comes next."""
+        if isinstance(self.doing, Walk) and self._dodging is None:
+            self.note_walk(self.doing.to, self.doing.speed or self.person.speed, seconds)
+        else:
+            self.note_pause(stands=self.doing is None and not (self._script if self._orders is None else self._orders))
 
     def _begin(self) -> bool:
         """Begin the next step; return whether there is one."""
@@ -182,14 +196,16 @@ class Walker:
         while idle < AHEAD_MAX and elapsed + seconds < span:  # summed tick by tick, to the last bit
             elapsed += seconds
             idle += 1
-        self._elapsed, self._idle = elapsed, idle
+        self._elapsed, self.idle = elapsed, idle
         return False
 
     def _do(self, seconds: float) -> bool:
         """Continue a step other than Walk and Wait; return whether it is over."""
         match self.doing:
             case Look(at=at):
-                return self._turn(self.pose.point.bearing_to(Point(*at)), TURN_RATE * seconds)
+                heading = self.pose.point.bearing_to(Point(*at))
+                self.pose, there = _turned(self.pose, heading, TURN_RATE * seconds)
+                return there
             case Show(seconds=span):
                 return self._elapsed >= span
             case Say(text=text):
@@ -208,7 +224,7 @@ class Walker:
             return False
         (x, y), pose = walk.to, self.pose
         dx, dy = x - pose.x, y - pose.y
-        left = math.hypot(dx, dy)
+        left = math.sqrt(dx * dx + dy * dy)
         heading = math.atan2(dy, dx) if left > 1e-9 else pose.yaw
         c, s = math.cos(heading), math.sin(heading)
         here_x, here_y = pose.x, pose.y
@@ -219,14 +235,14 @@ class Walker:
             if 0.0 < c * off_x + s * off_y < MANNERS and abs(c * off_y - s * off_x) < SIDE:
                 self._let_pass(heading, c * off_y - s * off_x, seconds, free)
                 return False
-        self._waited = 0.0
+        self.waited = 0.0
         return self._stride(x, y, (walk.speed or self.person.speed) * seconds, left, (heading, c, s))
 
     def _let_pass(self, heading: float, beside: float, seconds: float, free: Free) -> None:
         """Wait for a robot in the way; after a while, choose a place to step aside."""
-        self._waited += seconds
-        if self._waited >= PATIENCE:
-            self._waited = 0.0
+        self.waited += seconds
+        if self.waited >= PATIENCE:
+            self.waited = 0.0
             self._dodging = self._way_out(heading, beside, free)
 
     def _way_out(self, heading: float, beside: float, free: Free) -> Point | None:
@@ -254,7 +270,7 @@ class Walker:
     def _step(self, x: float, y: float, step: float) -> bool:
         """Walk ``step`` m towards (x, y); return whether it is reached."""
         pose = self.pose
-        left = math.hypot(x - pose.x, y - pose.y)
+        left = math.sqrt((x - pose.x) ** 2 + (y - pose.y) ** 2)
         heading = math.atan2(y - pose.y, x - pose.x) if left > 1e-9 else pose.yaw
         return self._stride(x, y, step, left, (heading, math.cos(heading), math.sin(heading)))
 
@@ -262,18 +278,19 @@ class Walker:
         """Walk ``step`` of ``left`` m to (x, y); return whether it is reached. ``way``: heading (rad), cosine, sine."""
         pose, (heading, c, s) = self.pose, way
         self.walking = True
-        self._way += min(step, left)
+        self.way += min(step, left)
         if left <= step:
             self.pose = Pose(x, y, heading)
             return True
         self.pose = Pose(pose.x + step * c, pose.y + step * s, heading)
         return False
 
-    def _turn(self, heading: float, step: float) -> bool:
-        off = math.remainder(heading - self.pose.yaw, math.tau)
-        turned = self.pose.yaw + max(-step, min(step, off))
-        self.pose = Pose(self.pose.x, self.pose.y, math.remainder(turned, math.tau))
-        return abs(off) <= step
+
+def _turned(pose: Pose, heading: float, step: float) -> tuple[Pose, bool]:
+    """Return a pose turned towards ``heading`` by ``step`` (rad) at most, and whether it is reached."""
+    off = math.remainder(heading - pose.yaw, math.tau)
+    turned = pose.yaw + max(-step, min(step, off))
+    return Pose(pose.x, pose.y, math.remainder(turned, math.tau)), abs(off) <= step
 
 
 def _strolling(person: Person) -> Iterator[Step]:

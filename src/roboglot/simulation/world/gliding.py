@@ -22,6 +22,7 @@ from roboglot.values import dataclass
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
+LOWEST = AWAY[2] / 2  # m below which movable bodies are away
 MARGIN = 0.012  # m around each robot: more than contacts extend beyond the shapes and what speed gains in a tick
 
 
@@ -34,7 +35,10 @@ class _Kernels:
 
 
 class Gliding:
-    """All robots of a world; its floors are level, and only robots and a lift's car move."""
+    """All robots of a world; its floors are level, and only robots and a lift's car move.
+
+    ``scene``, ``geoms``, ``state``, ``servos`` and ``settings`` are what ``kernels/ticks.py`` takes.
+    """
 
     def __init__(self, model: MjModel, data: MjData, hulls: FloatArray, walls: Walls, *, car: bool) -> None:
         """``hulls``: the table of all; ``car``: whether there is a lift."""
@@ -44,26 +48,27 @@ class Gliding:
         geoms = model.body_geomadr[movable[np.argsort(model.body_mocapid[movable])]].astype(np.int64)
         people = model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE
         shapes = model.geom_size, np.where(people, -1 - geoms, geoms)
-        self._near = hulls, walls.table, data.mocap_pos, data.mocap_quat, *shapes, AWAY[2] / 2, MARGIN
-        self._motion = (
-            hulls,
-            np.zeros((len(hulls), 7)),
+        self.scene = walls.table, data.mocap_pos, data.mocap_quat, shapes[0]
+        self.geoms = shapes[1]  # by movable body
+        self.state = (
             data.qpos,
             data.qvel,
             data.ctrl,
             data.qacc,
             data.actuator_force,
             model.dof_M0,
-            model.jnt_range,
             model.qpos_spring,
             model.jnt_stiffness,
             model.dof_damping,
-            model.actuator_gainprm,
-            model.actuator_biasprm,
-            model.actuator_forcerange,
-            GRAVITY,
-            float(model.opt.timestep),
         )
+        uprights = np.zeros((len(hulls), 7))
+        gains, limits = model.actuator_gainprm, model.actuator_forcerange
+        self.servos = uprights, model.jnt_range, gains, model.actuator_biasprm, limits
+        self.settings = float(model.opt.timestep), LOWEST, MARGIN, GRAVITY
+        self._near = hulls, *self.scene, self.geoms, LOWEST, MARGIN
+        (*moving, slack, stiffness, damping), (_, ranges, *servos) = self.state, self.servos
+        springs = ranges, slack, stiffness, damping
+        self._motion = hulls, uprights, *moving, *springs, *servos, GRAVITY, float(model.opt.timestep)
         self._car: tuple[FloatArray, FloatArray, FloatArray] | None = None  # place, rate and goal
         if car:
             joint, servo = model.joint("car"), model.actuator("car").id
@@ -87,14 +92,22 @@ class Gliding:
 
         ``known``: contacts were searched since something was moved at once; they need not be for robots at rest.
         """
-        known = known and not self._data.nefc
+        known = known and self.parted
         return self._kernels is not None and self._kernels.clear(*self._near, seconds, known)
 
     def step(self, steps: int) -> bool:
         """Move robots that are clear on by so many steps of the physics; return False if this takes MuJoCo."""
-        if self._kernels is None or self._data.nefc or not self._car_stands():
-            return False
-        return self._kernels.glide(*self._motion, steps)
+        return self._kernels is not None and self.free and self._kernels.glide(*self._motion, steps)
+
+    @property
+    def parted(self) -> bool:
+        """True if no contact is left from the last step."""
+        return not self._data.nefc
+
+    @property
+    def free(self) -> bool:
+        """True if no contact is left, and the lift's car stands."""
+        return self.parted and self._car_stands()
 
     def _car_stands(self) -> bool:
         if self._car is None:

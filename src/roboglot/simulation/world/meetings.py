@@ -54,7 +54,7 @@ class Meetings:
 
     def forget(self) -> None:
         """Search again: something was moved at once."""
-        self._switch(off=False)
+        self.switch(off=False)
         self._left, self._others = 0.0, None
 
     def look(self, seconds: float, *, touched: bool = False) -> None:
@@ -62,9 +62,13 @@ class Meetings:
         if self._gliding is None:
             return
         if self._gliding.loaded:  # looks at everything in every tick
-            self._switch(off=not touched and self._gliding.clear(seconds, known=self._is_known()))
+            if not touched:
+                touched = not self._gliding.clear(seconds, known=(known := self.known))
+                if not known:
+                    self.note()
+            self.switch(off=not touched)
             return
-        revision = sum(self._props.revisions.values())
+        revision = self._changes()
         if revision != self._revision or (self.off and not all(map(self._as_expected, self._hulls))):
             self._revision = revision
             self.forget()
@@ -73,20 +77,26 @@ class Meetings:
         if self._left >= 0.0 or not self._hulls:  # real and recorded robots are not in any world
             return
         free = self._free() if self._is_calm() else 0.0
-        self._switch(off=bool(free >= WORTH))
+        self.switch(off=bool(free >= WORTH))
         self._wait = AGAIN if self.off else min(2.0 * self._wait, AGAIN_MAX)
         self._left = free - seconds if self.off else self._wait
 
-    def _is_known(self) -> bool:
-        """Return whether nothing but people was moved at once since the last call."""
-        revision = sum(self._props.revisions.values())
-        known = revision == self._revision and not any(hull.disturbed for hull in self._hulls)
-        self._revision = revision
-        for hull in self._hulls if not known else ():
-            hull.disturbed = False
-        return known
+    @property
+    def known(self) -> bool:
+        """True if nothing but people was moved at once since the last ``note``."""
+        return self._changes() == self._revision and not any(hull.disturbed for hull in self._hulls)
 
-    def _switch(self, *, off: bool) -> None:
+    def note(self) -> None:
+        """Note that contacts were searched for, or found impossible, with all where it is now."""
+        self._revision = self._changes()
+        for hull in self._hulls:
+            hull.disturbed = False
+
+    def _changes(self) -> int:
+        return sum(self._props.revisions.values())
+
+    def switch(self, *, off: bool) -> None:
+        """Search for contacts in the next steps, or do not."""
         if off is not self.off:
             self.off = off
             flags = int(self._model.opt.disableflags)

@@ -6,12 +6,13 @@ import copy
 import math
 from collections.abc import Callable, Container, Mapping
 from functools import lru_cache
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from msgspec.structs import replace
 
-from roboglot.kernels.layouts import HULL_FLOOR, HULL_WIDTH, HULL_X, HULL_Y
+from roboglot.kernels.layouts import HULL_FLOOR, HULL_WIDTH, HULL_X, HULL_Y, NEAR, SEEN, SETTLING, STUCK
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.body import Body
@@ -26,13 +27,13 @@ from roboglot.simulation.building.terrain import Ground
 from roboglot.simulation.building.things import Things
 from roboglot.simulation.building.walls import Walls
 from roboglot.simulation.people.people import keyed
+from roboglot.simulation.people.person_state import STRIDE_MAX
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.gliding import Gliding
 from roboglot.simulation.world.meetings import Meetings
 from roboglot.simulation.world.rays import Rays
 from roboglot.simulation.world.scene import TIMESTEP, VISITORS_MAX, build, visitors
 
-JUMP = 0.1  # m: more than a person walks in a tick
 LIGHT = 1.0  # kg; a lighter object moves before a bumper is pressed
 _compiled = lru_cache(maxsize=8)(build)
 
@@ -77,6 +78,8 @@ class Physics:
         self._spots = self._places.data.cast("B").cast("d")  # the same numbers in one row: quicker to write
         self._attitudes = self._data.mocap_quat.data.cast("B").cast("d")
         self._people = {person: _Standing(model, person) for person in people}
+        self.people = {person: standing.mocap for person, standing in self._people.items()}
+        self.around_people = self._hull_rows, self._places, self._data.mocap_quat
         self.props = Props(model, self._data, self._elevations)
         self.rays = Rays(model, self._data)
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
@@ -104,19 +107,23 @@ class Physics:
 
         ``meanwhile`` is called after every small step with its length (s), for objects too fast for a whole tick.
         """
-        for hull in self.hulls.values():
-            if hull.hand is not None:
-                hull.handle()
         self._meetings.look(seconds, touched=bool(self._touched))
-        steps = round(seconds / TIMESTEP)
         if meanwhile is None and self._meetings.off:
             if self._sleep.lasts:
                 self.rays.outdate()
                 return
-            if self._gliding is not None and self._gliding.step(steps):
+            if self._gliding is not None and self._gliding.step(round(seconds / TIMESTEP)):
                 self.rays.outdate()
                 self._see()
                 return
+        self._plod(seconds, meanwhile)
+
+    def _plod(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
+        """Do MuJoCo's steps."""
+        for hull in self._all_hulls:
+            if hull.hand is not None:
+                hull.handle()
+        steps = round(seconds / TIMESTEP)
         if meanwhile is None:
             mujoco.mj_step(self._model, self._data, nstep=steps)
         else:
@@ -124,6 +131,36 @@ class Physics:
                 mujoco.mj_step(self._model, self._data)
                 meanwhile(TIMESTEP)
         self._see()
+
+    @property
+    def glides(self) -> bool:
+        """True if a kernel may move the robots."""
+        return self._gliding is not None and self._gliding.loaded
+
+    def course(self) -> Course | None:
+        """Return what a kernel needs to move all for several ticks; None: the next one takes MuJoCo, or no kernels."""
+        if self._gliding is None or not self.glides or self._touched:
+            return None
+        return Course(self._gliding, self._sleep, self._meetings.known)
+
+    def moved(self, *, awake: bool, known: bool) -> None:
+        """Note that a kernel moved all, or (not ``awake``) found that nothing moves; ``known``: as of the course."""
+        self.rays.outdate()
+        self._meetings.switch(off=True)
+        if not known:
+            self._meetings.note()
+        if awake:
+            self._sleep.wake()
+
+    def end(self, stage: int, count: int, seconds: float) -> None:
+        """Do the rest of a tick's physics after the kernel has stopped at a stage, with a ``count``, of its."""
+        if stage in (NEAR, STUCK):
+            self._meetings.switch(off=stage == STUCK)
+            self._plod(seconds)
+        elif stage == SETTLING:
+            self._see()
+        elif stage == SEEN:
+            self._look(count)
 
     def load_kernels(self) -> None:
         """Move robots that nothing can touch without MuJoCo from now on."""
@@ -142,16 +179,23 @@ class Physics:
     def _see(self) -> None:
         """Read positions, velocities and touches after a step."""
         positions, velocities, _ = self._state
-        kernels, hulls = self.rows.kernels, self._all_hulls
+        kernels = self.rows.kernels
         rests = kernels.still(velocities, RESTS) if kernels is not None else tiny(velocities.tolist())
         self._sleep.settle(rests=rests)
-        standing = self._feet
-        if self._touched or self._data.nefc:  # others cannot touch anything
-            standing -= sum(len(hull.wheels) for hull in hulls if hull.support.sprung)
+        count = -1
         if kernels is not None:
             count = kernels.see(self._hull_rows, positions, velocities, STOREY, LIFTED, self.rows.others)
+        self._look(count)
+
+    def _look(self, count: int) -> None:
+        """Read the rest: of the ``count`` hulls that the kernel has left, -1: of all, and what touches them."""
+        hulls, standing = self._all_hulls, self._feet
+        if self._touched or self._data.nefc:  # others cannot touch anything
+            standing -= sum(len(hull.wheels) for hull in hulls if hull.support.sprung)
+        if count >= 0:
             hulls = [hulls[index] for index in self.rows.others[:count].tolist()] if count else []
         if hulls:
+            positions, velocities, _ = self._state
             places, rates = positions.tolist(), velocities.tolist()
             for hull in hulls:
                 hull.see(places, rates)
@@ -178,15 +222,12 @@ class Physics:
         """Place a person at ``pose`` (world)."""
         person = self._people[body]
         spots, at = self._spots, 3 * person.mocap
-        spots[at], spots[at + 1], spots[at + 2] = pose.x, pose.y, self._elevations[floor] + person.half
-        if not (abs(pose.x - person.x) < JUMP and abs(pose.y - person.y) < JUMP):
+        if not (person.there and max(abs(pose.x - spots[at]), abs(pose.y - spots[at + 1])) < STRIDE_MAX):
             self._meetings.forget()
-        person.x, person.y = pose.x, pose.y
-        if pose.yaw != person.facing:
-            person.facing = pose.yaw
-            turns, at = self._attitudes, 4 * person.mocap  # a quaternion around the vertical axis
-            turns[at], turns[at + 3] = math.cos(pose.yaw / 2), math.sin(pose.yaw / 2)
-            turns[at + 1] = turns[at + 2] = 0.0
+        spots[at], spots[at + 1], spots[at + 2] = pose.x, pose.y, self._elevations[floor] + person.half
+        turns, at = self._attitudes, 4 * person.mocap  # a quaternion around the vertical axis
+        turns[at], turns[at + 3] = math.cos(pose.yaw / 2), math.sin(pose.yaw / 2)
+        turns[at + 1] = turns[at + 2] = 0.0
         if not person.there:
             person.there = True
             self._model.body_conaffinity[person.id] = person.bits
@@ -194,7 +235,7 @@ class Physics:
     def remove_person(self, body: str) -> None:
         """Take a person away; ``move_person`` brings them back."""
         person = self._people[body]
-        self._places[person.mocap], person.x, person.there = AWAY, math.nan, False
+        self._places[person.mocap], person.there = AWAY, False
         self._model.body_conaffinity[person.id] = 0
 
     def spare_person(self, there: Container[str]) -> str:
@@ -277,6 +318,14 @@ class Physics:
         self._touched.add(touched)
 
 
+class Course(NamedTuple):
+    """Objects whose arrays a kernel moves on. ``known``: nothing but people was moved at once since the last step."""
+
+    gliding: Gliding
+    sleep: Sleep
+    known: bool
+
+
 class _Standing:
     """Indices of a person in the model."""
 
@@ -285,5 +334,4 @@ class _Standing:
         geom = body.geomadr[0]
         self.id, self.mocap, self.bits = body.id, int(body.mocapid[0]), int(model.geom_conaffinity[geom])
         self.half = float(model.geom_size[geom][:2].sum())  # m: of a capsule, radius and half its straight part
-        self.x = self.y = self.facing = math.nan
         self.there = False  # whether robots may collide with them

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import TYPE_CHECKING, TypeVar
 
@@ -13,6 +13,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.people.crowd import Crowd
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.world.description import Person
 from roboglot.values import dataclass
@@ -28,10 +29,15 @@ class Population:
     """``robots`` and ``simulated`` grow as robots are equipped; their hulls are in the physics from the start."""
 
     physics: Physics
-    walkers: list[Walker]  # shared by everything that observes people
+    crowd: Crowd
     robots: dict[str, Robot] = field(default_factory=dict)
     simulated: dict[str, SimulatedRobot] = field(default_factory=dict)
     starts: dict[str, tuple[Pose, int]] = field(default_factory=dict)  # the initial place and floor of each
+
+    @property
+    def walkers(self) -> Sequence[Walker]:
+        """The people."""
+        return self.crowd.walkers
 
     @property
     def hulls(self) -> Mapping[str, Hull]:
@@ -78,12 +84,9 @@ class Population:
             raise ValueError(f"there is a person {name or body} already")
         person = Person(path=((pose.x, pose.y),), facing=math.degrees(pose.yaw), name=name or body)
         walker = Walker(person, floor, body, look=max((walker.look for walker in self.walkers), default=0) + 1)
-        self.walkers.append(walker)
-        self.physics.move_person(body, pose, floor)
+        self.crowd.join(walker)
         return walker
 
     def remove_walker(self, name: str) -> None:
         """Take a person away. Raises NotFound."""
-        walker = self.walker(name)
-        self.walkers.remove(walker)
-        self.physics.remove_person(walker.body)
+        self.crowd.leave(self.walker(name))

@@ -15,6 +15,7 @@ from importlib.metadata import version
 
 import numpy as np
 
+from roboglot.kernels import WORLD
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
 from roboglot.model.background import load
 from roboglot.model.clock import Clock, PatientClock, RealClock, Timer
@@ -30,6 +31,7 @@ from roboglot.simulation.bodies.rounds import Rounds
 from roboglot.simulation.building.building import Building
 from roboglot.simulation.detectors.glance import Surroundings
 from roboglot.simulation.faults.faults import Faults
+from roboglot.simulation.people.crowd import Crowd
 from roboglot.simulation.people.people import Walker, keyed
 from roboglot.simulation.people.routine import Clap, Say
 from roboglot.simulation.radio.gadgets import Gadgets
@@ -48,11 +50,13 @@ from roboglot.simulation.world.population import Population
 from roboglot.simulation.world.randomness import Chances
 from roboglot.simulation.world.sight import Sight
 from roboglot.simulation.world.sightlines import SightLines
+from roboglot.simulation.world.ticking import Ticking
 from roboglot.simulation.world.truth import Truth
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
+AHEAD_MAX = 25  # ticks that are done at once
 BEHIND_MAX = 25  # ticks by which a slow machine may lag before time is skipped, if the clock does not wait
 ROBOTS_MAX = 200
 
@@ -94,11 +98,11 @@ class World:
             raise ValueError("two robots have the same name")
         self._physics = Physics(description, bodies)
         self._walkers = keyed([floor.people for floor in description.floors])
-        self._population = Population(self._physics, self._walkers)
+        self._crowd = Crowd(self._walkers, self._physics)
+        self._population = Population(self._physics, self._crowd)
         self.building = Building(description, self._physics, self._walkers)
         self._environment = self._make_environment(seed)
-        for walker in self._walkers:
-            self._physics.move_person(walker.body, walker.pose, walker.floor)
+        self._crowd.meet(self._environment.surroundings.lines.leads, self._sound)
         radii = {name: body.hull.radius for name, body in bodies.items()}
         places = Places(description, [(p.start, p.floor, radii[p.name]) for p in robots if p.start is not None])
         for placement in robots:
@@ -115,6 +119,7 @@ class World:
         self.hands = noted(self.own_hands, self.outside)
         self.faults = Faults(self, description.faults)
         self._rounds = Rounds(self._physics.rows, TICK)
+        self._ticking = Ticking(self._physics, self._crowd, self._rounds, TICK)
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
@@ -193,11 +198,13 @@ class World:
     async def _load_kernels(self) -> None:
         """Switch the sensors to the compiled kernels; missing ones are compiled first, in a process of their own."""
         with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors continue without it
-            await compile_beside(("sweep", "rays", "together", "gliding"))
+            await compile_beside(WORLD)
             await load(self._environment.sight.load_kernel)
             await load(self._environment.rays.load_kernel)
             await load(self._physics.rows.load_kernels)
             await load(self._physics.load_kernels)
+            await load(self._crowd.load_kernels)
+            await load(self._ticking.load_kernels)
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""
@@ -252,31 +259,39 @@ class World:
         self._arm()
 
     def _tick(self) -> Iterator[None]:
+        """Do a tick, and those after it until a robot has something due, as far as nothing else happens meanwhile."""
         self._ticks += 1
-        stamp = self._origin + self._ticks * TICK
         robots = tuple(self._population.simulated.values())  # steps lie apart: one may join meanwhile
-        self._rounds.control(robots)
-        self._physics.drive(TICK)
+        beads, rounds, ticking = self._environment.beads, self._rounds, self._ticking
+        followed = rounds.control(robots, lean=ticking.lean and not beads.flying)
         yield
-        self.faults.step(stamp)
-        self.building.step(stamp, TICK)
-        self._walk()
+        self.faults.step(self.time)
+        self.building.step(self.time, TICK)
+        left = ticking.run(self._most(), self._ticks - 1, self._origin, followed=followed)
+        if not left.ticks:
+            rounds.control(robots)
+            left = ticking.run(self._most(), self._ticks - 1, self._origin, followed=True)
+        rounds.skip(left.ticks)
+        if left.ticks > 1:
+            self._ticks += left.ticks - 1
+            self._clock.go_ahead(self.time)
+            self.building.step(self.time, TICK)
         self._environment.sight.moved()
-        beads = self._environment.beads
-        self._physics.step(TICK, beads.fly if beads.flying else None)
+        ticking.end(left, self.time, beads.fly if beads.flying else None)
         yield
-        yield from self._rounds.sense(robots, stamp)
+        yield from rounds.sense(robots, self.time)
 
-    def _walk(self) -> None:
-        if not self._walkers:
-            return
-        robots, free = self._physics.spots(), self._environment.surroundings.lines.leads
-        for walker in self._walkers:
-            if walker.walk(TICK, robots.get(walker.floor, ()), free):
-                self._physics.move_person(walker.body, walker.pose, walker.floor)
-            if walker.aloud:
-                for step in walker.fetch():
-                    self._sound(walker, step)
+    def _most(self) -> int:
+        """Return how many ticks may be done at once, the present one included; 0: it takes small steps."""
+        if self._environment.beads.flying:
+            return 0
+        until = min(self._clock.free_until, self.faults.next)
+        if until <= self.time or not self.building.rests:
+            return 1
+        most = self._rounds.free(AHEAD_MAX)
+        while most > 1 and self._origin + (self._ticks + most - 1) * TICK > until:
+            most -= 1
+        return most
 
     def _sound(self, walker: Walker, step: Say | Clap) -> None:
         """Emit a person's sound, unless there are too many sounds already."""

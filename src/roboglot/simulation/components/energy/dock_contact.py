@@ -9,6 +9,7 @@ from itertools import chain
 import numpy as np
 from msgspec import Struct
 
+from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.layouts import (
     CONTACT_ANGLE,
     CONTACT_DISTANCE,
@@ -17,6 +18,7 @@ from roboglot.kernels.layouts import (
     DOCK_WIDTH,
     HULL_WIDTH,
     TOGETHER,
+    TOUCHED,
     USE,
 )
 from roboglot.model.components.energy.battery import DockContact
@@ -26,7 +28,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
-from roboglot.simulation.bodies.rows import Kernels, Rows, Sense
+from roboglot.simulation.bodies.rows import Leg, Rows, Sense, SharedSense
 
 TABLE = "dock contact"
 
@@ -77,23 +79,28 @@ class SimulatedDockContact(DockContact):
         return False
 
 
-def _together(rows: Rows, parts: Sequence[tuple[SimulatedDockContact, Sense]]) -> Sense:
+def _together(rows: Rows, parts: Sequence[tuple[SimulatedDockContact, Sense]]) -> SharedSense:
     """Return a function that checks for all robots in one call of the kernel, which leaves those that change."""
-    tables = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, CONTACT_WIDTH)
+    hulls, contacts = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, CONTACT_WIDTH)
     docks = parts[0][0].docks if parts else ()
     known: list[Pose] = []
     table = np.zeros((0, DOCK_WIDTH))
 
-    def touch(kernels: Kernels, _stamp: float, _seconds: float) -> int:
+    def present() -> tuple[FloatArray, FloatArray]:
+        """Return the contacts and the docks, where they are now."""
         nonlocal known, table
         if (there := [*chain.from_iterable(docks)]) != known:  # one was moved
             known = there
             floors = ((number, dock) for number, those in enumerate(docks) for dock in those)
             fronts = [(dock.x, dock.y, math.cos(dock.yaw), math.sin(dock.yaw), dock.yaw, at) for at, dock in floors]
             table = np.array(fronts).reshape(-1, DOCK_WIDTH)
-        return kernels.touch(*tables, table, rows.others)
+        return contacts, table
 
-    return rows.sense({contact.index: sense for contact, sense in parts}, touch)
+    return rows.sense(
+        {contact.index: sense for contact, sense in parts},
+        lambda kernels, _stamp, _seconds: kernels.touch(hulls, *present(), rows.others),
+        Leg(TOUCHED, present),
+    )
 
 
 def _fit(fit: Fitting) -> SimulatedDockContact:

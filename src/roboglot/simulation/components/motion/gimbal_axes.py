@@ -19,6 +19,7 @@ from roboglot.kernels.layouts import (
     GIMBAL_TURNED,
     GIMBAL_WIDTH,
     GIMBAL_YAW,
+    GIMBALS,
     HULL_WIDTH,
     TOGETHER,
     USE,
@@ -35,7 +36,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.hull_state import LEVEL
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.quantities import Offset, Positive
-from roboglot.simulation.bodies.rows import Control, Rows
+from roboglot.simulation.bodies.rows import Control, Leg, Rows, SharedControl
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.values import dataclass
 
@@ -239,12 +240,13 @@ class GimbalAxes:
         self._base.steer(0.0 if abs(off) < SETTLED else max(-top, min(top, STEERING * off)))
 
 
-def together(rows: Rows, gimbals: Sequence[tuple[GimbalAxes, Control]]) -> Control:
+def together(rows: Rows, gimbals: Sequence[tuple[GimbalAxes, Control]]) -> SharedControl:
     """Return a function that controls all gimbals, in one call of the kernel as far as they follow their bodies."""
     hulls, table = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, GIMBAL_WIDTH)
     return rows.control(
         {axes.index: control for axes, control in gimbals},
         lambda kernels, seconds: kernels.follow(hulls, table, FOLLOWING, SETTLED, seconds, rows.others),
+        Leg(GIMBALS, lambda: (table,), (FOLLOWING, SETTLED)),
     )
 
 

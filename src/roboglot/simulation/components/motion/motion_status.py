@@ -17,6 +17,7 @@ from roboglot.kernels.layouts import (
     STATUS_WIDTH,
     TOGETHER,
     USE,
+    WATCHED,
 )
 from roboglot.model.components.motion.motion_status import MotionFlags, MotionStatus
 from roboglot.model.geometry import Twist
@@ -24,7 +25,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
-from roboglot.simulation.bodies.rows import Rows, Sense
+from roboglot.simulation.bodies.rows import Leg, Rows, Sense, SharedSense
 from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import TABLE as IMUS
@@ -114,12 +115,13 @@ class SimulatedMotionStatus(MotionStatus):
         return off_x * off_x + off_y * off_y > SLIP_SQUARE
 
 
-def _together(rows: Rows, parts: Sequence[tuple[SimulatedMotionStatus, Sense]]) -> Sense:
+def _together(rows: Rows, parts: Sequence[tuple[SimulatedMotionStatus, Sense]]) -> SharedSense:
     """Return a function that watches for all robots, in one call of the kernel as far as their wheels are whole."""
     tables = rows.table(HULLS, HULL_WIDTH), rows.table(IMUS, IMU_WIDTH), rows.table(TABLE, STATUS_WIDTH)
     return rows.sense(
         {status.index: sense for status, sense in parts},
         lambda kernels, stamp, _: kernels.watch(*tables, stamp, GRAVITY, SLIP_SQUARE, SLIP_RATE, rows.others),
+        Leg(WATCHED, lambda: tables[-1:], (GRAVITY, SLIP_SQUARE, SLIP_RATE)),
     )
 
 

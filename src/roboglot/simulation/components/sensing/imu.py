@@ -30,6 +30,7 @@ from roboglot.kernels.layouts import (
     IMU_TURNED,
     IMU_WIDTH,
     IMU_YAW,
+    MEASURED,
     TOGETHER,
     USE,
 )
@@ -42,7 +43,7 @@ from roboglot.simulation.bodies.hull_state import LEVEL
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
-from roboglot.simulation.bodies.rows import Rows, Sense
+from roboglot.simulation.bodies.rows import Leg, Rows, Sense, SharedSense
 from roboglot.simulation.bodies.support import GRAVITY
 
 ACCELERATION_UNIT = GRAVITY / 8192  # per unit of a 16-bit converter for 4 g
@@ -198,12 +199,13 @@ class SimulatedImu(Imu):
         )
 
 
-def _together(rows: Rows, parts: Sequence[tuple[SimulatedImu, Sense]]) -> Sense:
+def _together(rows: Rows, parts: Sequence[tuple[SimulatedImu, Sense]]) -> SharedSense:
     """Return a function that measures with all IMUs, in one call of the kernel as far as they are level."""
     hulls, imus, noises = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, IMU_WIDTH), rows.table(NOISES, NOISE_WIDTH)
     return rows.sense(
         {imu.index: sense for imu, sense in parts},
         lambda kernels, stamp, seconds: kernels.measure(hulls, imus, noises, stamp, seconds, GRAVITY, rows.others),
+        Leg(MEASURED, lambda: (imus, noises), (GRAVITY,)),
     )
 
 

@@ -6,7 +6,7 @@ All rays are cast at one instant; a real scanner spreads a turn over its period.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from roboglot.model.sensing import LaserScan
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative, Positive
-from roboglot.simulation.bodies.rows import Rows, Sense
+from roboglot.simulation.bodies.rows import Rows
 from roboglot.simulation.components.sensing.odometry import SimulatedOdometry
 from roboglot.simulation.world.sight import Sight
 
@@ -175,9 +175,9 @@ class _Turns:
         """Measure for ``lidar`` when its next turn ends."""
         self._due.setdefault(self._tick + lidar.period, []).append(lidar)
 
-    def measure(self, _stamp: float, _seconds: float) -> None:
+    def measure(self, tick: int) -> None:
         """Measure all turns that end in this tick."""
-        self._tick += 1
+        self._tick = tick
         views: dict[_View, list[SimulatedLidar]] = {}
         for lidar in self._due.pop(self._tick, ()):
             if (view := lidar.view()) is not None:
@@ -191,7 +191,7 @@ class _Turns:
                 lidar.taken = row.copy()  # it may be kept for long
 
 
-def _measure_all(_: Rows, lidars: Sequence[SimulatedLidar]) -> Sense:
+def _measure_all(_: Rows, lidars: Sequence[SimulatedLidar]) -> Callable[[int], None]:
     turns = _Turns(lidars[0].sight)
     for lidar in lidars:
         lidar.turns, lidar.taken = turns, None

@@ -20,6 +20,7 @@ from roboglot.kernels.layouts import (
     ODOMETRY_STATE,
     ODOMETRY_STILL,
     ODOMETRY_WIDTH,
+    RECKONED,
     TOGETHER,
     USE,
 )
@@ -29,7 +30,7 @@ from roboglot.model.sensing import OdometryReading
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative, Positive
-from roboglot.simulation.bodies.rows import Rows, Seat, Sense
+from roboglot.simulation.bodies.rows import Leg, Rows, Seat, Sense, SharedSense
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import TABLE as IMUS
 from roboglot.simulation.components.sensing.imu import SimulatedImu
@@ -154,13 +155,14 @@ class SimulatedOdometry(Odometry):
         return list(self._noises[at : at + ODOMETRY_NOISES])
 
 
-def _together(rows: Rows, parts: Sequence[tuple[SimulatedOdometry, Sense]]) -> Sense:
+def _together(rows: Rows, parts: Sequence[tuple[SimulatedOdometry, Sense]]) -> SharedSense:
     """Return a function that reckons for all robots, in one call of the kernel unless they drive sideways."""
     tables = rows.table(HULLS, HULL_WIDTH), rows.table(IMUS, IMU_WIDTH), rows.table(TABLE, ODOMETRY_WIDTH)
     noises = rows.table(NOISES, NOISE_WIDTH)
     return rows.sense(
         {odometry.index: sense for odometry, sense in parts},
         lambda kernels, stamp, seconds: kernels.reckon(*tables, noises, stamp, seconds, rows.others),
+        Leg(RECKONED, lambda: (tables[-1], noises)),
     )
 
 

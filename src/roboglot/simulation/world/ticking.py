@@ -1,0 +1,140 @@
+"""Ticks of a world between the control of its robots and their own sensing: wheels, people, physics, shared senses.
+
+Several at once by one kernel (``kernels/ticks.py``), which stops where something needs more than it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from roboglot.kernels import loading
+from roboglot.kernels.layouts import (
+    COUNT_UNIT,
+    DONE,
+    DRIVE,
+    GIMBALS,
+    MEASURED,
+    PEOPLE,
+    RECKONED,
+    SEEN,
+    STAGE_UNIT,
+    TICKS_UNIT,
+    TOUCHED,
+    WATCHED,
+)
+from roboglot.simulation.bodies.hull import STOREY
+from roboglot.simulation.bodies.rounds import Rounds
+from roboglot.simulation.bodies.rows import Leg
+from roboglot.simulation.bodies.sleep import RESTS
+from roboglot.simulation.bodies.support import LIFTED
+from roboglot.simulation.people.crowd import HABITS, Crowd
+from roboglot.values import dataclass
+
+if TYPE_CHECKING:
+    from roboglot.simulation.world.physics import Physics
+
+LEGS = [GIMBALS, TOUCHED, MEASURED, WATCHED, RECKONED]  # stages of parts, as the kernel takes their tables
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """Ticks that have begun, the stage at which the last one has stopped, and a number with it; DONE: it is over."""
+
+    ticks: int
+    stage: int
+    count: int
+
+
+class Ticking:
+    """Ticks of one world. ``seconds``: length of one."""
+
+    def __init__(self, physics: Physics, crowd: Crowd, rounds: Rounds, seconds: float) -> None:
+        self._physics, self._crowd, self._rounds, self._seconds = physics, crowd, rounds, seconds
+        self._hulls = physics.around_people[0]
+        self._run: Callable[..., int] | None = None
+
+    def load_kernels(self) -> None:
+        """Do several ticks at once from now on, where that is possible; results stay the same, to the last bit."""
+        with loading():
+            from roboglot.kernels import ticks
+
+        self._run = ticks.run
+
+    @property
+    def lean(self) -> bool:
+        """True if ``run`` may do the gimbals of the next tick."""
+        return self._run is not None and self._physics.glides
+
+    def run(self, ticks: int, number: int, origin: float, *, followed: bool) -> Left:
+        """Begin up to so many ticks after tick ``number``, 0: one without the kernel.
+
+        ``followed``: the first one's shared control has run.
+
+        ``origin``: stamp of tick 0, s. The last one waits for ``end``.
+        """
+        if not ticks:
+            return Left(1, DRIVE, 0)
+        legs, course = self._legs(), self._physics.course() if self._run is not None else None
+        if course is None or legs is None or self._run is None:
+            return Left(1, DRIVE, 0) if followed else Left(0, GIMBALS, 0)
+        gliding, sleep, known = course
+        step, *others = gliding.settings
+        answer = self._run(
+            (self._hulls, *(table for leg in legs for table in leg.tables())),
+            (self._crowd.table, *gliding.scene),
+            gliding.geoms,
+            gliding.state,
+            gliding.servos,
+            sleep.now,
+            sleep.kept,
+            (
+                origin,
+                self._seconds,
+                step,
+                RESTS,
+                STOREY,
+                LIFTED,
+                *others,
+                *HABITS,
+                *(number for leg in legs for number in leg.settings),
+            ),
+            round(self._seconds / step),
+            number,
+            ticks,
+            followed,
+            known and gliding.parted,
+            sleep.holds,
+            gliding.free,
+            self._physics.rows.others,
+        )
+        begun, rest = divmod(answer, TICKS_UNIT)
+        count, rest = divmod(rest, COUNT_UNIT)
+        moved, stage = rest % STAGE_UNIT, rest // STAGE_UNIT
+        if begun > (stage == PEOPLE):
+            self._physics.moved(awake=bool(moved), known=known)
+        return Left(begun, stage, count)
+
+    def _legs(self) -> list[Leg] | None:
+        """Return the parts' legs in the kernel; None if there are parts that it does not know."""
+        every = [control.leg for control in self._rounds.controls] + [sense.leg for sense in self._rounds.senses]
+        legs = [leg for leg in every if leg is not None]
+        return legs if [leg.stage for leg in legs] == LEGS and len(legs) == len(every) else None
+
+    def end(self, left: Left, stamp: float, meanwhile: Callable[[float], None] | None = None) -> None:
+        """Do what is left of a tick (stamp, s); ``meanwhile``: see ``Physics.step``."""
+        stage, count, seconds, physics = left.stage, left.count, self._seconds, self._physics
+        if stage == DONE:
+            return
+        if stage == DRIVE:
+            physics.drive(seconds)
+        if stage in (DRIVE, PEOPLE):
+            self._crowd.walk(seconds, count if stage == PEOPLE else -1)
+            physics.step(seconds, meanwhile)
+        elif stage <= SEEN:
+            physics.end(stage, count, seconds)
+        for sense in self._rounds.senses:
+            if sense.leg is None or sense.leg.stage > stage:
+                sense(stamp, seconds)
+            elif sense.leg.stage == stage:
+                sense.end(count, stamp, seconds)
