@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from roboglot.model.clock import RealClock
-from roboglot.model.slices import BEHIND_MAX, IDLE, SERVING, SLICE, TURN, Slices
+from roboglot.model.inputs.slices import BEHIND_MAX, IDLE, SERVING, SLICE, TURN, Slices
 
 
 class Machine:
@@ -38,7 +38,7 @@ class Machine:
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
     machine = Machine()
-    monkeypatch.setattr("roboglot.model.slices.time.perf_counter", lambda: machine.now)
+    monkeypatch.setattr("roboglot.model.inputs.slices.time.perf_counter", lambda: machine.now)
     return machine
 
 

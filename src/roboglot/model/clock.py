@@ -18,7 +18,7 @@ from contextvars import copy_context
 from functools import partial
 
 from roboglot.model.clock_base import HOLD_MAX, Clock, RealTimers, Timer
-from roboglot.model.slices import Slices
+from roboglot.model.inputs.slices import Slices
 
 __all__ = ["LOCKSTEP_EPOCH", "Clock", "LockstepClock", "PatientClock", "RealClock", "Timer"]
 YIELD_AFTER = 0.5  # s of lockstep time
