@@ -94,12 +94,13 @@ def test_trials_are_all_tabulated_and_never_played_twice(folder: Path) -> None:
     assert [row["seed"] for row in rows(folder) if row["scenario"] == "stays.yaml"] == ["1", "2"]
 
 
-def test_interrupted_campaign_leaves_a_table_and_no_process(folder: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_campaign_leaves_a_table_and_no_process(number: signal.Signals, folder: Path) -> None:
     (folder / "scenarios/a_stays.yaml").write_text(STAYS)
     (folder / "scenarios/b_hangs.yaml").write_text(HANGS)
     process = begin(folder, "--seeds", "1")
     wait_until(lambda: rows(folder) and still_sleeping())
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     said, _ = process.communicate(timeout=180)
     assert process.returncode == 130, said
     assert "1 of 2 trials were played" in said

@@ -44,7 +44,7 @@ def command(
     ] = OUT,
     longest: Annotated[float, typer.Option(min=1, help="Longest duration of a trial, in real seconds.")] = 600.0,
 ) -> None:
-    """Play scenarios with many seeds. Ctrl-C keeps the results so far; the same command resumes."""
+    """Play scenarios with many seeds. Ctrl-C (or SIGTERM) keeps the results so far; the same command resumes."""
     from roboglot.testing.campaign.table import OtherCampaign, Table
     from roboglot.testing.campaign.trials import trials_of
     from roboglot.testing.scenarios import files

@@ -95,12 +95,19 @@ def show(
 @app.command()
 def top(
     data: Data = None,
-    once: Annotated[bool, typer.Option("--once", help="Print one table and exit.")] = False,
+    once: Annotated[
+        bool | None,
+        typer.Option(
+            "--once/--watch", help="Print one table and exit (the default in a pipe), or go on."
+        ),
+    ] = None,
     period: Annotated[
         float, typer.Option(min=0.5, help="Seconds between tables, over which processor time is measured.")
     ] = 2.0,
 ) -> None:
     """Show each shard's processor time and memory, and whether it keeps up with robot time."""
+    terminal = sys.stdout.isatty()
+    ends = not terminal if once is None else once
     before = {row.name: (row.cpu, time.monotonic()) for row in _ask("look", data).shards}
     while True:
         time.sleep(period)
@@ -117,8 +124,8 @@ def top(
         memory = sum(row.memory for row in answer.shards) / MEGABYTE
         robots = sum(len(row.robots) for row in answer.shards)
         lines.append(f"{len(answer.shards)} shards, {robots} robots, {memory:.0f} MB; nursery {answer.nursery}")
-        print("\n".join(lines) if once or not sys.stdout.isatty() else "\x1b[H\x1b[2J" + "\n".join(lines), flush=True)
-        if once:
+        print("\n".join(lines) if ends or not terminal else "\x1b[H\x1b[2J" + "\n".join(lines), flush=True)
+        if ends:
             return
 
 

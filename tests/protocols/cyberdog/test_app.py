@@ -169,6 +169,16 @@ async def test_call_during_attempt_leads_to_next_at_once(clock: LockstepClock) -
     await link.close()
 
 
+async def test_calls_without_end_leave_pauses_between_attempts(clock: LockstepClock) -> None:
+    link = Dialling(clock, None, AppRoute(ADDRESS, "127.0.0.1:1", 1), ticks=lambda _: Ticks())
+    link.start()
+    for _ in range(400):
+        await clock.advance(0.1)
+        link.seen("ipv4:127.0.0.1:4711")
+    assert link.attempts == pytest.approx([0.0, 5.0, 12.0, 21.0, 30.0, 39.0], abs=0.11)
+    await link.close()
+
+
 async def test_disconnect_forgets_the_app_until_it_calls_again(door, client, app, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: door._context.app.connected)

@@ -31,6 +31,7 @@ log = logging.getLogger(__name__)
 WILDCARDS = ("0.0.0.0", "::")
 EARLY_MAX = 0.75
 REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: first, then doubled up to the maximum
+REDIAL_CALLED = 4.0  # s at most, while clients keep calling
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,25 +143,34 @@ class AppLink:
         self._outboxes[push.code].put(text)
 
     async def _run(self) -> None:
-        pause = REDIAL_FIRST
+        pause, called = REDIAL_FIRST, False
         while True:
             if not self._target:
-                await self._hear()
+                await self._news.wait()
+                self._news.clear()
                 continue
             target = self._target
             if await self._keep(target):
-                pause = REDIAL_FIRST
+                pause, called = REDIAL_FIRST, False
             if self._target == target:
-                await self._hear(pause)
+                called = await self._rest(target, pause, min(pause, REDIAL_CALLED) if called else 0.0)
                 pause = min(2.0 * pause, REDIAL_MAX)
 
-    async def _hear(self, patience: float | None = None) -> None:
-        """Wait for a change of the app's address, or ``patience`` seconds; changes during dialling count, too."""
-        try:
-            await (self._news.wait() if patience is None else self._clock.wait_for(self._news.wait(), patience))
-        except TimeoutError:
-            return
-        self._news.clear()
+    async def _rest(self, target: str, pause: float, least: float) -> bool:
+        """Wait ``pause`` s until ``target`` is dialled again, but after ``least`` only for a call of a client.
+
+        Return whether one called, perhaps during the attempt before. A change of the address ends the wait.
+        """
+        begun, called = self._clock.time(), False
+        end = begun + pause
+        while self._target == target and (left := end - self._clock.time()) > 0.0:
+            try:
+                await self._clock.wait_for(self._news.wait(), left)
+            except TimeoutError:
+                break
+            self._news.clear()
+            called, end = True, min(end, begun + least)
+        return called
 
     async def _keep(self, target: str) -> bool:
         """Dial ``target`` and send heartbeats until it is lost or moves; return whether one got through."""

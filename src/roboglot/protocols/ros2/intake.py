@@ -3,41 +3,61 @@
 from __future__ import annotations
 
 import struct
-from collections import deque
+import threading
+from collections import defaultdict, deque
 from collections.abc import Callable
+from itertools import count
 
 CDR_HEADER = 4  # bytes; the second says the order of the others
 TWIST = {0: struct.Struct(">6d"), 1: struct.Struct("<6d")}  # by order
+VELOCITY = "cmd_vel"
 
 
 class Intake:
-    """Messages in their order; as of a topic with a depth, the oldest make room for new ones."""
+    """Messages in their order. Of a topic whose queue is full, the oldest makes room for a new one.
+
+    Of velocities only the newest counts: each replaces the one before.
+    """
 
     def __init__(self, most: int, drop: Callable[[str], None]) -> None:
-        """``drop`` is called with the topic of a message for which the oldest made room, in any thread."""
-        self._drop = drop
-        self._heard: deque[tuple[str, bytes | None]] = deque(maxlen=most)
+        """``most``: messages of a topic; ``drop`` is called with a topic whose oldest made room, in any thread."""
+        self._most, self._drop = most, drop
+        self._lock = threading.Lock()
+        self._numbers = count()
+        self._heard: dict[int, tuple[str, bytes | None]] = {}  # in their order
+        self._waiting = defaultdict[str, deque[int]](deque)
 
     def __len__(self) -> int:
         return len(self._heard)
 
     def put(self, key: str, data: bytes | None) -> None:
         """Add a message, in any thread. None: it was too long to be kept."""
-        if len(self._heard) == self._heard.maxlen:
+        with self._lock:
+            waiting = self._waiting[key]
+            full = len(waiting) >= (1 if key == VELOCITY else self._most)
+            if full:
+                del self._heard[waiting.popleft()]
+            number = next(self._numbers)
+            waiting.append(number)
+            self._heard[number] = key, data
+        if full and key != VELOCITY:
             self._drop(key)
-        self._heard.append((key, data))
 
     def pop(self) -> tuple[str, bytes | None]:
         """Return the oldest message, which waits no more."""
-        return self._heard.popleft()
+        with self._lock:
+            key, data = self._heard.pop(next(iter(self._heard)))
+            self._waiting[key].popleft()
+        return key, data
 
     def stops(self) -> bool:
         """Return whether a velocity of zero waits."""
-        return any(_stops(key, data) for key, data in tuple(self._heard))
+        with self._lock:
+            return any(_stops(key, data) for key, data in self._heard.values())
 
 
 def _stops(key: str, data: bytes | None) -> bool:
-    if key != "cmd_vel" or data is None:
+    if key != VELOCITY or data is None:
         return False
     try:
         return not any(TWIST[data[1]].unpack_from(data, CDR_HEADER))

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from roboglot.recording.sampler import Sampler
 
 log = logging.getLogger(__name__)
-PENDING_MAX = 32  # messages queued for handling; beyond this the oldest are dropped and logged
+PENDING_MAX = 32  # messages of a topic queued for handling; beyond this the oldest are dropped and logged
 FULL = "robot %s: too many messages of %s come: the oldest are dropped"
 PICTURE_PERIOD = 0.2  # s
 JPEG_QUALITY = 80

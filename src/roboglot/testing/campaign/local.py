@@ -40,7 +40,7 @@ class _Running:
 def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: Leave, ended: Ended) -> None:
     """Play ``trials``, ``workers`` at a time; ``ended`` is called after each. Call it from the main thread.
 
-    Raises KeyboardInterrupt at SIGINT, once running trials have ended.
+    Raises KeyboardInterrupt at SIGINT and SIGTERM, once running trials have ended.
     """
     os.environ.update(ENVIRONMENT)
     context = multiprocessing.get_context("forkserver")
@@ -91,13 +91,15 @@ def _start_fork_server() -> None:
 
 @contextlib.contextmanager
 def interruptions() -> Iterator[Connection]:
-    """Deliver SIGINT through a pipe: raised anywhere, it could lose a process that has just been started."""
+    """Deliver SIGINT and SIGTERM through a pipe: raised anywhere, they could lose a process that was just started."""
     ear, mouth = multiprocessing.Pipe(duplex=False)
-    before = signal.signal(signal.SIGINT, lambda *_: mouth.send_bytes(b"!"))
+    numbers = signal.SIGINT, signal.SIGTERM
+    before = [(number, signal.signal(number, lambda *_: mouth.send_bytes(b"!"))) for number in numbers]
     try:
         yield ear
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before:
+            signal.signal(number, handler)
         ear.close()
         mouth.close()
 
