@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import socket
 import threading
-from collections.abc import Callable
 
 import grpc
 import pytest
@@ -37,14 +36,14 @@ async def test_all_bytes_are_read_in_one_turn() -> None:
 
 
 async def test_server_made_within_wakes_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    loop, takes, take = asyncio.get_running_loop(), list[socket.socket](), wakes._take
+    loop, takes, read_ahead = asyncio.get_running_loop(), list[socket.socket](), wakes._read_ahead
     own = loop.add_reader
 
-    def noted(reads: socket.socket, wake: Callable[[], object]) -> None:
+    def noted(reads: socket.socket) -> None:
         takes.append(reads)
-        take(reads, wake)
+        read_ahead(reads)
 
-    monkeypatch.setattr(wakes, "_take", noted)
+    monkeypatch.setattr(wakes, "_read_ahead", noted)
     with prompt_wakes():
         server = grpc.aio.server()
     assert loop.add_reader == own
@@ -62,7 +61,7 @@ def test_loops_of_two_threads_take_turns() -> None:
     left, others = list[int](), list[int]()
 
     def wake() -> None:
-        other = threading.Thread(target=wakes._take, args=(reads, lambda: others.append(len(reads.recv(1)))))
+        other = threading.Thread(target=wakes._taker(reads, lambda: others.append(len(reads.recv(1)))))
         other.start()
         other.join()
         left.append(len(reads.recv(1)))
@@ -70,8 +69,22 @@ def test_loops_of_two_threads_take_turns() -> None:
     with reads, writes:
         reads.setblocking(False)
         writes.send(bytes(5))
-        wakes._take(reads, wake)
+        wakes._taker(reads, wake)()
         assert (left, others) == ([1], [])
         writes.send(bytes(1))
-        wakes._take(reads, lambda: left.append(len(reads.recv(1))))
+        wakes._taker(reads, lambda: left.append(len(reads.recv(1))))()
     assert left == [1, 1]
+
+
+def test_bytes_left_are_read_within_a_few_turns() -> None:
+    reads, writes = socket.socketpair()
+    left = list[int]()
+    with reads, writes:
+        reads.setblocking(False)
+        take = wakes._taker(reads, lambda: left.append(len(reads.recv(1))))
+        for _ in range(3 * wakes.LOOKED_FOR):
+            writes.send(bytes(5))
+            take()
+        assert len(reads.recv(1000)) < 5 * wakes.LOOKED_FOR
+        take()  # another loop has read all: no error, and no event to take
+    assert left == [1] * 3 * wakes.LOOKED_FOR

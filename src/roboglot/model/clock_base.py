@@ -97,15 +97,9 @@ class Clock(ABC):
         """Compute in a thread inside ``with`` for a robot: time that depends on the machine's speed waits for it."""
         yield
 
-    @contextmanager
-    def holding(self) -> Iterator[None]:
+    def holding(self) -> Holding:
         """Hold lockstep time inside ``with``."""
-        work = object()
-        self.hold(work)
-        try:
-            yield
-        finally:
-            self.release(work)
+        return Holding(self)
 
     def call_later(self, delay: float, callback: Callable[[], None]) -> Timer:
         """Call ``callback`` once, ``delay`` seconds from now."""
@@ -193,6 +187,21 @@ class Clock(ABC):
             raise
         finally:
             timer.cancel()
+
+
+class Holding:
+    """Hold of lockstep time inside ``with``."""
+
+    __slots__ = ("_clock",)
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+
+    def __enter__(self) -> None:
+        self._clock.hold(self)
+
+    def __exit__(self, *_: object) -> None:
+        self._clock.release(self)
 
 
 class RealTimer:

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 INT = 4  # bytes of the kernel's count
+LOOKED_FOR = 8  # turns of the loop between two looks for more bytes, each of which costs as much as taking an event
 _reading = threading.Lock()  # the loops of all threads read one socket
 
 
@@ -28,7 +29,7 @@ def prompt_wakes() -> Iterator[None]:
 
     def add(wakes: socket.socket, wake: Callable[[], object], *values: object) -> None:
         assert not values
-        add_reader(wakes, _take, wakes, wake)
+        add_reader(wakes, _taker(wakes, wake))
 
     vars(loop)["add_reader"] = add
     try:
@@ -37,19 +38,35 @@ def prompt_wakes() -> Iterator[None]:
         del vars(loop)["add_reader"]
 
 
-def _take(wakes: socket.socket, wake: Callable[[], object]) -> None:
-    """Read all bytes but the one that gRPC reads itself, then let gRPC take all events, also those of other loops.
+def _taker(wakes: socket.socket, wake: Callable[[], object]) -> Callable[[], None]:
+    """Return a function that lets gRPC take all events, also those of other loops.
 
-    One thread at a time: two could together read that last byte, too, and neither would take the events. A loop that
-    finds the lock taken is called again while there are bytes.
+    Now and then it reads all bytes but the one that gRPC reads itself. One thread at a time: two could together read
+    that last byte, too, and neither would take the events. A loop that finds the lock taken is called again while there
+    are bytes.
     """
-    if not _reading.acquire(blocking=False):
-        return
-    try:
-        count = int.from_bytes(fcntl.ioctl(wakes, termios.FIONREAD, bytes(INT)), sys.byteorder)
-        if count > 1:
-            wakes.recv(count - 1)
-        if count:
+    left = 1  # turns until the next look
+
+    def take() -> None:
+        nonlocal left
+        if not _reading.acquire(blocking=False):
+            return
+        try:
+            left -= 1
+            if not left:
+                left = LOOKED_FOR
+                _read_ahead(wakes)
             wake()
-    finally:
-        _reading.release()
+        except BlockingIOError:  # another loop read the byte, and took the events
+            pass
+        finally:
+            _reading.release()
+
+    return take
+
+
+def _read_ahead(wakes: socket.socket) -> None:
+    """Read all bytes but one."""
+    count = int.from_bytes(fcntl.ioctl(wakes, termios.FIONREAD, bytes(INT)), sys.byteorder)
+    if count > 1:
+        wakes.recv(count - 1)

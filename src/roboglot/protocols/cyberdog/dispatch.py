@@ -45,30 +45,35 @@ def error(code: InBandError) -> dict[str, int]:
 
 async def answer(call: Call) -> object | None:
     """Run the request; return its last answer, or None. Raises NotJson, and nothing else."""
-    tap = call.context.robot.tap
-    if not tap.watched:
-        last = await _outcome(call)
+    robot = call.context.robot
+    if robot.tap.watched:
+        last = await _followed(call)
     else:
-        key = str(int(call.code))
-        began = call.began = tap.request(DOOR, key, call.text)
-        try:
-            last = await _outcome(call)
-        except NotJson as bad:
-            answered = error(InBandError.BAD_PARAMETERS)
-            tap.reply(DOOR, key, write(answered), _status(answered), str(bad), began)
-            raise
-        if last is not None or call.why:
-            text, status = ("", SILENT) if last is None else (write(last), _status(last))
-            tap.reply(DOOR, key, text, status, call.why, began)
-    if delay := lateness(call.context.robot):
-        await call.context.robot.clock.sleep(delay)
+        last = await (_answered(call) if robot.stand_in is None else _stood_in(call, robot.stand_in))
+    if delay := lateness(robot):
+        await robot.clock.sleep(delay)
     return last
 
 
-async def _outcome(call: Call) -> object | None:
-    """Return the last answer of the robot or its stand-in."""
-    if (stand_in := call.context.robot.stand_in) is None:
-        return await _answered(call)
+async def _followed(call: Call) -> object | None:
+    """Run the request, and note it and its outcome for followers."""
+    robot = call.context.robot
+    tap, key = robot.tap, str(int(call.code))
+    began = call.began = tap.request(DOOR, key, call.text)
+    try:
+        last = await (_answered(call) if robot.stand_in is None else _stood_in(call, robot.stand_in))
+    except NotJson as bad:
+        answered = error(InBandError.BAD_PARAMETERS)
+        tap.reply(DOOR, key, write(answered), _status(answered), str(bad), began)
+        raise
+    if last is not None or call.why:
+        text, status = ("", SILENT) if last is None else (write(last), _status(last))
+        tap.reply(DOOR, key, text, status, call.why, began)
+    return last
+
+
+async def _stood_in(call: Call, stand_in: StandIn) -> object | None:
+    """Return the last answer of the robot's stand-in."""
     try:
         return await _ask_stand_in(call, stand_in)
     except RobotError as refused:

@@ -5,29 +5,40 @@ gRPC's own answer to them would be the status UNKNOWN with the name of a Python 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
 import grpc
 from google.protobuf.message import DecodeError
 
+from roboglot.transport.last_messages import ending_with_last
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 SERVICE = "grpcapi.GrpcApp"
 
 
 class Calls(Protocol):
-    """Handlers of the calls. A request is None if its bytes are malformed or its text is not UTF-8."""
+    """Handlers of the calls. A request is None if its bytes are malformed or its text is not UTF-8.
 
-    async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, /) -> None: ...  # noqa: N802 - the service's name
+    ``sendMsg`` returns its last answer, if there is one more.
+    """
+
+    async def sendMsg(  # noqa: N802 - the service's name
+        self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, /
+    ) -> pb.RecResponse | None: ...
     async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, /) -> None: ...  # noqa: N802
     async def heartbeat(self, request: None, rpc: grpc.aio.ServicerContext, /) -> None: ...
 
 
-def add_calls(server: grpc.aio.Server, calls: Calls) -> None:
-    """Have ``server`` serve ``calls``."""
-    answer, chunk, result = pb.RecResponse, pb.FileChunk, pb.Result
+def add_calls(
+    server: grpc.aio.Server, calls: Calls, holding: Callable[[], AbstractContextManager[None]] = nullcontext
+) -> None:
+    """Have ``server`` serve ``calls``, ``holding`` what is held while a last answer is sent."""
+    written, chunk, result = pb.RecResponse.SerializeToString, pb.FileChunk, pb.Result
+    answering = ending_with_last(calls.sendMsg, written, holding)
     methods = {
-        "sendMsg": grpc.unary_stream_rpc_method_handler(calls.sendMsg, _read, answer.SerializeToString),
+        "sendMsg": grpc.unary_stream_rpc_method_handler(answering, _read, written),
         "getFile": grpc.unary_stream_rpc_method_handler(calls.getFile, _read, chunk.SerializeToString),
         "heartbeat": grpc.unary_unary_rpc_method_handler(calls.heartbeat, lambda _: None, result.SerializeToString),
     }

@@ -8,24 +8,19 @@ import logging
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from urllib.parse import unquote
 
 import grpc
 
 from roboglot.config import is_loopback
-from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
-from roboglot.model.client_context import ask_for, identity
+from roboglot.model.admission import Right
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import RobotError
 from roboglot.model.events import BatteryChanged, LocalizationLost, LocalizationRecovered, MapReplaced
-from roboglot.model.inputs.outside import CALLED_OFF
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, host_of
-from roboglot.protocols.cyberdog.call import Call
+from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute
 from roboglot.protocols.cyberdog.certificates import Certificates, CertificateStore
-from roboglot.protocols.cyberdog.chapters.camera.camera import get_file
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.chapters.camera.transfers import Transfers
 from roboglot.protocols.cyberdog.chapters.camera.transmission import Transmission
@@ -45,28 +40,22 @@ from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
 from roboglot.protocols.cyberdog.chapters.system.updates import Updates
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.context import Context
-from roboglot.protocols.cyberdog.dispatch import answer, error
 from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.requests import add_calls
-from roboglot.protocols.cyberdog.stops import stops
+from roboglot.protocols.cyberdog.service import Service
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.door import Endpoint
-from roboglot.protocols.turns import wait_for_turn
-from roboglot.transport.limiter import pay
 from roboglot.transport.wakes import prompt_wakes
-from roboglot.wire.cyberdog.channel import MESSAGE_MAX, ROBOT_NAME, server_options
-from roboglot.wire.cyberdog.codes import FileError, InBandError, MachineState
+from roboglot.wire.cyberdog.channel import ROBOT_NAME, server_options
+from roboglot.wire.cyberdog.codes import MachineState
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
-from roboglot.wire.cyberdog.text import NotJson, read_params, write
 from roboglot.wire.visual.relay import FrameRelay
 
 log = logging.getLogger(__name__)
 CALLS_MAX = 512  # at the same time, over all connections
-FRAME = 64  # bytes of a message besides its text, with a margin
-CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message, whatever their encoding
 FOLDER = "cyberdog"  # in the data folder
 
 
@@ -101,7 +90,7 @@ class CyberDogDoor:
             self._server = server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         self._handshakes = Handshakes(self._address, self._config.port)
         self._cleanup.append(self._handshakes.close)
-        add_calls(server, _Service(self._context, self._handshakes))
+        add_calls(server, Service(self._context, self._handshakes), self._robot.clock.holding)
         if self._config.reflection:
             add_reflection(self._server)
         self.port = self._bind(server, certificates)
@@ -236,112 +225,6 @@ def _reads() -> set[str]:
     return {str(int(operation.key)) for operation in TABLE if operation.right is Right.SEE}
 
 
-class _Service:
-    """The three calls of the gRPC service."""
-
-    def __init__(self, context: Context, handshakes: Handshakes) -> None:
-        self._context, self._handshakes = context, handshakes
-
-    async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802 - the service's name
-        """Serve one request with any number of answers; the status is always OK."""
-        peer = rpc.peer()
-        self._handshakes.asked(peer)
-        await self._enter(rpc, peer)
-        if request is None:
-            _note_unreadable(peer)
-            await self._say(rpc, _answer(0, error(InBandError.BAD_PARAMETERS)))
-            return
-        code = request.nameCode
-        await self._count(peer, len(request.params))
-        tap, fairness = self._context.robot.tap, self._context.robot.fairness
-        use = fairness.of(peer.partition(":")[2]) if fairness else None
-        if fairness and use:
-            await wait_for_turn(fairness, use, lambda: stops(code, request.params))
-            begun = fairness.now()
-
-        async def reply(value: object) -> None:
-            if tap.watched:
-                tap.reply("cyberdog", str(int(code)), write(value), "ok", began=call.began)
-            await self._say(rpc, _answer(code, value))
-
-        call = Call(code, request.params, self._context, reply)
-        try:
-            last = await answer(call)
-        except NotJson as bad:
-            log.info("%d: %s", code, bad)
-            last, code = error(InBandError.BAD_PARAMETERS), 0
-        except asyncio.CancelledError:  # the app does not wait for the end
-            self._note_end(peer, code, call.began)
-            raise
-        finally:
-            if fairness and use:
-                fairness.took(use, fairness.now() - begun)
-        if last is not None:
-            await self._say(rpc, _answer(code, last))
-
-    async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
-        """Serve photos and recordings in chunks; errors are chunks, too."""
-        peer, tap = rpc.peer(), self._context.robot.tap
-        self._handshakes.asked(peer)
-        await self._enter(rpc, peer)
-        if request is None:
-            _note_unreadable(peer)
-            await self._say(rpc, pb.FileChunk(error_code=FileError.ARGUMENTS))
-            return
-        began = tap.request("cyberdog", str(int(request.nameCode)), request.params) if tap.watched else None
-        try:
-            fields = read_params(request.params)
-        except NotJson:
-            fields = {}
-        async with contextlib.aclosing(get_file(self._context, request.nameCode, fields, request.params)) as chunks:
-            async for chunk in chunks:
-                if tap.watched:
-                    tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
-                await self._say(rpc, chunk)
-                await self._count(peer, len(chunk.buffer))
-
-    def _note_end(self, peer: str, code: int, asked: float | None) -> None:
-        outside = self._context.robot.outside
-        outside.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
-
-    async def _say(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
-        """Write to a client; the time that this takes is not robot time."""
-        with self._context.robot.clock.holding():
-            await rpc.write(message)
-
-    async def _count(self, peer: str, size: int) -> None:
-        """Count bytes to or from a client; delay one beyond its share."""
-        admission = self._context.robot.admission
-        if admission.asks:
-            await pay(admission.spend(identity() or host_of(peer), size))
-
-    async def _enter(self, rpc: grpc.aio.ServicerContext, peer: str) -> None:
-        """Set the caller as the current client; only one with the right to see becomes the robot's app."""
-        admission, app = self._context.robot.admission, self._context.app
-        if not admission.asks:
-            app.seen(peer)
-            ask_for(f"cyberdog {host_of(peer)}", peer)
-            return
-        names = rpc.auth_context().get("x509_common_name", [])
-        proof = Proof(ProofKind.CERTIFICATE, names[0].decode()) if names else NO_PROOF
-        address = unquote(peer).partition(":")[2]
-        who = admission.known(address, proof) or admission.known(address) or ""
-        with contextlib.suppress(Unknown):
-            who = who or await admission.admit(address, proof)
-        ask_for(f"cyberdog {who or host_of(peer)}", peer, who)
-        if admission.may(Right.SEE):
-            app.seen(peer)
-            self._context.owner = who
-
-    async def heartbeat(self, _request: None, rpc: grpc.aio.ServicerContext) -> None:
-        """Refuse: only apps serve heartbeats."""
-        await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
-
-
-def _note_unreadable(peer: str) -> None:
-    log.info("cannot read a request of %s: it is not a SendRequest, or its params are not UTF-8", host_of(peer))
-
-
 def _as_client(store: CertificateStore) -> object:
     """Return the robot's credentials as a client of the app."""
     proof = store.newest()
@@ -363,15 +246,6 @@ def _as_server(store: CertificateStore, handshakes: Handshakes) -> object:
         return None if used is before else configured(used)
 
     return grpc.dynamic_ssl_server_credentials(configured(used), changed, require_client_authentication=True)
-
-
-def _answer(code: int, value: object) -> pb.RecResponse:
-    """Return a message to the app."""
-    text = write(value)
-    if len(text) > CHARACTERS_MAX and len(text.encode()) > MESSAGE_MAX - FRAME:
-        log.warning("the answer to %d is too long for a message: %d characters", code, len(text))
-        text = write(error(InBandError.UNAVAILABLE))
-    return pb.RecResponse(nameCode=code, data=text)
 
 
 def _once(action: Callable[[], None]) -> Callable[[], None]:

@@ -1,0 +1,172 @@
+"""The three calls of the gRPC service: who calls, whose turn it is, and what is sent."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from urllib.parse import unquote
+
+import grpc
+
+from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
+from roboglot.model.client_context import ask_for, identity
+from roboglot.model.inputs.outside import CALLED_OFF
+from roboglot.protocols.cyberdog.app_link import host_of
+from roboglot.protocols.cyberdog.call import Call
+from roboglot.protocols.cyberdog.chapters.camera.camera import get_file
+from roboglot.protocols.cyberdog.context import Context
+from roboglot.protocols.cyberdog.dispatch import answer, error
+from roboglot.protocols.cyberdog.handshakes import Handshakes
+from roboglot.protocols.cyberdog.stops import stops
+from roboglot.protocols.turns import wait_for_turn
+from roboglot.transport.limiter import pay
+from roboglot.values import dataclass
+from roboglot.wire.cyberdog.channel import MESSAGE_MAX
+from roboglot.wire.cyberdog.codes import FileError, InBandError
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.text import NotJson, read_params, write
+
+log = logging.getLogger(__name__)
+FRAME = 64  # bytes of a message besides its text, with a margin
+CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message, whatever their encoding
+CALLERS_MAX = 1024  # whose names are kept
+
+
+@dataclass(frozen=True, slots=True)
+class _Caller:
+    """Name of a client that did not prove another, and its address and port."""
+
+    name: str
+    address: str
+
+
+class Service:
+    """The three calls of the gRPC service."""
+
+    def __init__(self, context: Context, handshakes: Handshakes) -> None:
+        self._context, self._handshakes = context, handshakes
+        self._callers: dict[str, _Caller] = {}  # by peer, as gRPC writes it
+
+    async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:  # noqa: N802 - the service's name
+        """Serve one request with any number of answers, and return the last; the status is always OK."""
+        robot, peer = self._context.robot, rpc.peer()
+        caller = self._enter(peer)
+        if robot.admission.asks:
+            await self._admit(rpc, peer)
+        if request is None:
+            _note_unreadable(peer)
+            return _answer(0, error(InBandError.BAD_PARAMETERS))
+        if robot.admission.asks:
+            await self._count(peer, len(request.params))
+        if (fairness := robot.fairness) is None:
+            return await self._serve(request, rpc, peer)
+        use = fairness.of(caller.address)
+        if fairness.wait(use):
+            await wait_for_turn(fairness, use, lambda: stops(request.nameCode, request.params))
+        begun = fairness.now()
+        try:
+            return await self._serve(request, rpc, peer)
+        finally:
+            fairness.took(use, fairness.now() - begun)
+
+    async def _serve(self, request: pb.SendRequest, rpc: grpc.aio.ServicerContext, peer: str) -> pb.RecResponse | None:
+        """Answer a request whose turn it is; return its last answer."""
+        code, tap = request.nameCode, self._context.robot.tap
+
+        async def reply(value: object) -> None:
+            if tap.watched:
+                tap.reply("cyberdog", str(int(code)), write(value), "ok", began=call.began)
+            await self._say(rpc, _answer(code, value))
+
+        call = Call(code, request.params, self._context, reply)
+        try:
+            last = await answer(call)
+        except NotJson as bad:
+            log.info("%d: %s", code, bad)
+            return _answer(0, error(InBandError.BAD_PARAMETERS))
+        except asyncio.CancelledError:  # the app does not wait for the end
+            self._note_end(peer, code, call.began)
+            raise
+        return None if last is None else _answer(code, last)
+
+    async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
+        """Serve photos and recordings in chunks; errors are chunks, too."""
+        peer, tap = rpc.peer(), self._context.robot.tap
+        self._enter(peer)
+        if self._context.robot.admission.asks:
+            await self._admit(rpc, peer)
+        if request is None:
+            _note_unreadable(peer)
+            await self._say(rpc, pb.FileChunk(error_code=FileError.ARGUMENTS))
+            return
+        began = tap.request("cyberdog", str(int(request.nameCode)), request.params) if tap.watched else None
+        try:
+            fields = read_params(request.params)
+        except NotJson:
+            fields = {}
+        async with contextlib.aclosing(get_file(self._context, request.nameCode, fields, request.params)) as chunks:
+            async for chunk in chunks:
+                if tap.watched:
+                    tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
+                await self._say(rpc, chunk)
+                await self._count(peer, len(chunk.buffer))
+
+    def _note_end(self, peer: str, code: int, asked: float | None) -> None:
+        outside = self._context.robot.outside
+        outside.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
+
+    async def _say(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
+        """Write to a client; the time that this takes is not robot time."""
+        with self._context.robot.clock.holding():
+            await rpc.write(message)
+
+    async def _count(self, peer: str, size: int) -> None:
+        """Count bytes to or from a client; delay one beyond its share."""
+        admission = self._context.robot.admission
+        if admission.asks:
+            await pay(admission.spend(identity() or host_of(peer), size))
+
+    def _enter(self, peer: str) -> _Caller:
+        """Return the caller, and set it as the current client; where rights are asked for, ``_admit`` does that."""
+        caller = self._callers.get(peer)
+        if caller is None:
+            self._handshakes.asked(peer)
+            if len(self._callers) >= CALLERS_MAX:
+                self._callers.clear()
+            caller = self._callers[peer] = _Caller(f"cyberdog {host_of(peer)}", peer.partition(":")[2])
+        if not self._context.robot.admission.asks:
+            self._context.app.seen(peer)
+            ask_for(caller.name, peer)
+        return caller
+
+    async def _admit(self, rpc: grpc.aio.ServicerContext, peer: str) -> None:
+        """Set the caller as the current client; only one with the right to see becomes the robot's app."""
+        admission = self._context.robot.admission
+        names = rpc.auth_context().get("x509_common_name", [])
+        proof = Proof(ProofKind.CERTIFICATE, names[0].decode()) if names else NO_PROOF
+        address = unquote(peer).partition(":")[2]
+        who = admission.known(address, proof) or admission.known(address) or ""
+        with contextlib.suppress(Unknown):
+            who = who or await admission.admit(address, proof)
+        ask_for(f"cyberdog {who or host_of(peer)}", peer, who)
+        if admission.may(Right.SEE):
+            self._context.app.seen(peer)
+            self._context.owner = who
+
+    async def heartbeat(self, _request: None, rpc: grpc.aio.ServicerContext) -> None:
+        """Refuse: only apps serve heartbeats."""
+        await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
+
+
+def _note_unreadable(peer: str) -> None:
+    log.info("cannot read a request of %s: it is not a SendRequest, or its params are not UTF-8", host_of(peer))
+
+
+def _answer(code: int, value: object) -> pb.RecResponse:
+    """Return a message to the app."""
+    text = write(value)
+    if len(text) > CHARACTERS_MAX and len(text.encode()) > MESSAGE_MAX - FRAME:
+        log.warning("the answer to %d is too long for a message: %d characters", code, len(text))
+        text = write(error(InBandError.UNAVAILABLE))
+    return pb.RecResponse(nameCode=code, data=text)
