@@ -272,19 +272,19 @@ def shade(
     MARGIN longer than a row; ``samples`` (SAMPLES); ``lines`` (3, LINE more than a row).
     """
     height, width = luma.shape
-    line, blues, reds = lines[0], lines[1], lines[2]
     for top in range(0, height, depth.shape[0]):
         rows = min(depth.shape[0], height - top)
         fill(outlines, spans, planes, last, top, rows, ends, depth, seen)
         for row in range(rows):
             y = top + row
+            inside = y < height - 2  # elsewhere the end of a row is not followed by one that is painted later
+            line = luma[y] if inside else lines[0]
+            blues, reds = blue[y >> 1] if inside else lines[1], red[y >> 1] if inside else lines[2]
             _shade_row(
                 y, seen, row, planes, sources, paints, textures, masks, grounds, shadows, frame, gain, samples,
                 line, blues, reds,
             )  # fmt: skip
-            for x in range(width):
-                luma[np.uintp(y), np.uintp(x)] = line[np.uintp(x)]
-            if y & 1 == 0:
-                for x in range(width >> 1):
-                    blue[np.uintp(y >> 1), np.uintp(x)] = blues[np.uintp(x)]
-                    red[np.uintp(y >> 1), np.uintp(x)] = reds[np.uintp(x)]
+            if not inside:
+                for x in range(width):
+                    luma[y, x] = line[x]
+                    blue[y >> 1, x >> 1], red[y >> 1, x >> 1] = blues[x >> 1], reds[x >> 1]

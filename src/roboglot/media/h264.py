@@ -76,7 +76,7 @@ def _open(width: int, height: int, rate: float, quantizer: int) -> VideoCodecCon
     second = max(1, round(rate))
     x264 = {
         "aud": 1, "repeat-headers": 1, "annexb": 1, "force-cfr": 1, "keyint": second, "min-keyint": 1, "scenecut": 0,
-        "threads": 1, "sliced-threads": 0,
+        "threads": 1, "sliced-threads": 0, "no-dct-decimate": 1,  # the last: a twelfth less time, 7 % more bytes
     }  # fmt: skip
     codec.gop_size = second
     codec.options = {

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from itertools import chain
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from roboglot.simulation.rendering.interior import (
     symbols_of,
 )
 from roboglot.simulation.rendering.shapes import (
+    UNTURNED,
     Mesh,
     joined,
     paint_row,
@@ -80,8 +82,9 @@ class Stage:
     def instant(self, number: int, viewer: Hull, eye: Eye) -> Instant:
         """Return the figures before the eye, without the viewer. Quick: it runs between two physics steps."""
         sector = _Sector(eye.x, eye.y, eye.yaw, eye.spread)
-        figures = tuple(figure for figure in self._figures(number, viewer, sector) if sector.meets(figure))
-        return Instant(number, figures)
+        figures = (self._people(number, sector), self._robots(number, viewer, sector), self._loose(number, sector),
+                   self._furniture(number, sector))  # fmt: skip
+        return Instant(number, tuple(chain(*figures)))
 
     def scene(self, instant: Instant) -> Scene:
         """Return everything to draw; may run in any thread."""
@@ -103,57 +106,57 @@ class Stage:
             self._floors[number] = plan, mesh, ground
         return self._floors[number]
 
-    def _figures(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:
-        """Yield all objects in the sector, and possibly more; only robots are tested, as their fittings take long."""
-        yield from self._people(number)
-        yield from self._robots(number, viewer, sector)
-        yield from self._loose(number)
-        yield from self._furniture(number)
-
-    def _people(self, number: int) -> Iterator[Figure]:
+    def _people(self, number: int, sector: _Sector) -> Iterator[Figure]:
         elevation = self._world.elevation(number)
         for walker in self._walkers:
             if walker.floor == number:
-                pose, who = walker.pose, walker.person
-                make = partial(person, walker.look, walker.joints)
-                yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), who.radius)
+                pose, radius = walker.pose, walker.person.radius
+                if sector.has(pose.x, pose.y, radius + REACH):
+                    make = partial(person, walker.look, walker.joints)
+                    yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), radius)
 
     def _robots(self, number: int, viewer: Hull, sector: _Sector) -> Iterator[Figure]:
         for index, hull in enumerate(self._hulls):
+            if hull.floor != number or hull is viewer:
+                continue
             pose, section = hull.pose, hull.body.hull
-            if hull.floor == number and hull is not viewer and sector.has(pose.x, pose.y, section.radius + REACH):
+            if sector.has(pose.x, pose.y, section.radius + REACH):
                 make = partial(robot, index % len(ROBOTS), section, round(hull.belly, 2), hull.body.walks)
                 if owner := self._life.robots.get(hull.name):
                     make = partial(_together, (make, *fittings(owner, hull)))
                 yield Figure(make, pose.x, pose.y, hull.elevation, rotation(hull.tilt, pose.yaw), section.radius)
 
-    def _loose(self, number: int) -> Iterator[Figure]:
+    def _loose(self, number: int, sector: _Sector) -> Iterator[Figure]:
         """Yield things that may change floors: small things, beads and the lift's car."""
         elevation, storey = self._world.elevation(number), self._world.floors[number].height
         for index, thing in enumerate(self._things):
             x, y, z = thing.position.tolist()
-            if _inside(z, elevation, storey):
+            radius = thing.diameter / 2
+            if _inside(z, elevation, storey) and sector.has(x, y, radius + REACH):
                 make = partial(can, index, thing.diameter, thing.height)
-                yield Figure(make, x, y, z, rotation(LEVEL, 0.0), thing.diameter / 2)
+                yield Figure(make, x, y, z, UNTURNED, radius)
         for x, y, z in self._life.beads.places:
-            if _inside(z, elevation, storey):
-                yield Figure(bead, x, y, z, rotation(LEVEL, 0.0), 0.0)
+            if _inside(z, elevation, storey) and sector.has(x, y, REACH):
+                yield Figure(bead, x, y, z, UNTURNED, 0.0)
         if (lift := self._life.lift) is not None and _inside(lift.elevation, elevation, storey):
-            frame, inside = lift.frame, partial(car, *lift.section.size)
-            yield Figure(
-                inside, frame.x, frame.y, lift.elevation, rotation(LEVEL, frame.yaw), 0.0, sum(lift.section.size)
-            )
+            frame, size = lift.frame, lift.section.size
+            if sector.has(frame.x, frame.y, sum(size)):
+                turned = rotation(LEVEL, frame.yaw)
+                yield Figure(partial(car, *size), frame.x, frame.y, lift.elevation, turned, 0.0)
 
-    def _furniture(self, number: int) -> Iterator[Figure]:
+    def _furniture(self, number: int, sector: _Sector) -> Iterator[Figure]:
         """Yield movable furniture, and the tags on it."""
         elevation = self._world.elevation(number)
         for solid in self._props.on(number):
-            pose, make = solid.pose, partial(movable, replace(solid, pose=ORIGIN))
-            yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), max(solid.size[:2]) / 2)
+            pose, radius = solid.pose, max(solid.size[:2]) / 2
+            if sector.has(pose.x, pose.y, radius + REACH):
+                make = partial(movable, replace(solid, pose=ORIGIN))
+                yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), radius)
         for tag in moving_tags(self._world, self._props, number):
             pose, here = tag.card.pose, replace(tag, card=replace(tag.card, pose=ORIGIN))
-            make = partial(printed, here, self._masks)
-            yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), 0.0)
+            if sector.has(pose.x, pose.y, REACH):
+                make = partial(printed, here, self._masks)
+                yield Figure(make, pose.x, pose.y, elevation, rotation(LEVEL, pose.yaw), 0.0)
 
 
 def _together(makes: tuple[Callable[[], Mesh], ...]) -> Mesh:
@@ -178,10 +181,6 @@ class _Sector:
     y: float
     yaw: float
     spread: float
-
-    def meets(self, figure: Figure) -> bool:
-        """True if the figure may be visible."""
-        return self.has(figure.x, figure.y, figure.radius + figure.reach)
 
     def has(self, x: float, y: float, reach: float) -> bool:
         """True if anything within ``reach`` m of a place may be visible."""

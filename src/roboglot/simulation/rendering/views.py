@@ -73,7 +73,6 @@ class Figure:
     z: float
     rotation: Floats
     radius: float
-    reach: float = REACH  # m by which it extends beyond the radius, without a shadow
 
 
 @dataclass(frozen=True, slots=True)
