@@ -106,10 +106,12 @@ def measure(claims: Claims, part: Part, settle: float, seconds: float) -> None:
         with ThreadPoolExecutor(1) as beside:
             lesson = beside.submit(in_a_process, Lesson(robots, set(filmed), proof, APP, settle, seconds))
             time.sleep(settle + 1.0)
-            began, used, waited, factors = time.monotonic(), cpu(folder), starved(folder), list[float]()
+            began, used, waited = time.monotonic(), cpu(folder), starved(folder)
+            factors: dict[str, list[float]] = {row["name"]: [] for row in rows}
             while not lesson.done() and time.monotonic() - began < seconds - 1.0:
                 time.sleep(1.0)
-                factors.append(min(row["factor"] for row in look(folder)["shards"]))
+                for row in look(folder)["shards"]:
+                    factors[row["name"]].append(row["factor"])
             passed = time.monotonic() - began
             cores, share = (cpu(folder) - used) / passed, (starved(folder) - waited) / passed / part.shards
             seen, own = lesson.result()
@@ -122,7 +124,8 @@ def measure(claims: Claims, part: Part, settle: float, seconds: float) -> None:
     )
     print(f"reference: the serving threads waited for a processor for {share:.0%} of the time")
     print(f"{cores:.2f} cores, load {os.getloadavg()[0]:.1f}")
-    claims.at_least("robot time", sum(factors) / len(factors), 0.995, "x real time")
+    slowest = min(sum(each) / len(each) for each in factors.values())
+    claims.at_least("robot time, slowest shard", slowest, 0.995, "x real time")
 
 
 def report(claims: Claims, part: Part, seen: dict[str, Seen]) -> None:

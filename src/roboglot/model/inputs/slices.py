@@ -13,9 +13,9 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-SLICE = 0.0015  # real s of jobs after which the loop sees to its sockets
+SLICE = 0.001  # real s of jobs after which the loop sees to its sockets
 SERVING = 0.003  # real s for which sockets may keep waiting jobs from their next slice
-IDLE = 0.00015  # real s without anything to serve after which it begins
+IDLE = 0.0003  # real s without anything to serve after which it begins
 BEHIND_MAX = 0.2  # real s since jobs wait without end, after which sockets keep them no longer
 TURN = 0.00005  # real s of a turn of the loop in which it served something
 
