@@ -7,7 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from roboglot.autonomy.traffic.one_way import OneWay
-from roboglot.autonomy.traffic.right_of_way import Meeting, Way
+from roboglot.autonomy.traffic.right_of_way import Meeting, Way, announced_way, meetings
+from roboglot.model.components.logistics.traffic_radio import Announcement
+from roboglot.model.geometry import Point, Pose
 
 RADIUS = 0.25
 EAST = np.stack([np.arange(0.0, 12.0, 0.05), np.zeros(240)], axis=1)  # 12 m along x
@@ -53,6 +55,18 @@ def test_one_that_arrives_first_goes_first() -> None:
 )
 def test_others_hold_up_no_one(way: Way) -> None:
     assert meeting(way) is None
+
+
+@pytest.mark.parametrize("gone", [0.0, 0.1, 0.2, 0.35])
+def test_one_ahead_in_a_corridor_is_followed(gone: float) -> None:
+    """It announces the way that it planned at the last scan, and has driven a little since."""
+    way = tuple(Point(4.0 + 0.2 * n, 0.0) for n in range(25))
+    other = Announcement("b", "map", 0.0, Pose(4.0 + gone, 0.0), 0.5, RADIUS, way=way, inside=True)
+    coming = announced_way(other, Announcement("a", "map", 0.0, Pose(), 0.5, RADIUS))
+    assert coming.outranks
+    assert (np.diff(coming.points[:, 0]) > 0.0).all()
+    assert meeting(coming) is None
+    assert list(meetings(EAST[60:], 0.5, RADIUS, [coming])) == []
 
 
 def test_robot_inside_drives_on() -> None:

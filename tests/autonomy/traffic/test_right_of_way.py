@@ -13,6 +13,9 @@ from hypothesis import strategies as st
 from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.autonomy.traffic.movers import MoverTracker
 from roboglot.autonomy.traffic.right_of_way import (
+    CLEAR_MOVING,
+    DECELERATION,
+    REACTION,
     Way,
     announced_way,
     free_of_movers,
@@ -84,6 +87,16 @@ def test_brakes_for_what_cannot_stop_any_more() -> None:
     free = free_of_movers(EAST, Pose(), RADIUS, [fast])
     assert 2.0 - 2 * RADIUS - 0.2 < free < 2.0
     assert free_of_movers(EAST, Pose(), RADIUS, [north(2.0, start=-1.0, speed=0.0)]) == math.inf
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.3])
+def test_brakes_for_what_creeps_towards_it(speed: float) -> None:
+    """Two that creep would close the gap that each keeps to what stands, before either sees it."""
+    creeps = Way(np.stack([np.arange(1.0, 0.0, -0.2), np.zeros(5)], axis=1), speed, RADIUS, outranks=False)
+    stops = 1.0 - speed * REACTION - speed**2 / (2.0 * DECELERATION)
+    assert creeps.stopping()[-1] == pytest.approx((stops, 0.0))
+    free = free_of_movers(EAST, Pose(), RADIUS, [creeps])
+    assert free == pytest.approx(stops - 2 * RADIUS - CLEAR_MOVING, abs=0.06)
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.3, 1.2))

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 CLEAR = 0.10  # m kept between two hulls
 CLEAR_MOVING = 0.06  # m kept from the place where a moving object can come to a stop
 DECELERATION, REACTION = 0.6, 0.2  # m/s2 and s assumed for others
+PASSED = 5  # points of an announced way among which the robot may be by now
 STEP = 0.2  # m between two points of a route that are compared
 SLOW = 0.4  # m/s assumed at least, to decide which robot arrives first
 BEFORE, AFTER = 1.0, 2.0  # s between two arrivals, later or earlier, from which robots do not meet
@@ -65,12 +66,16 @@ class Way:
         return math.hypot(x - pose.x, y - pose.y) < reach
 
     def stopping(self) -> Points:
-        """Return the points within its stopping distance."""
+        """Return the points within its stopping distance, and the place where it stops."""
         reach = self.speed * REACTION + self.speed**2 / (2.0 * DECELERATION)
-        steps = np.zeros(len(self.points))
         ahead = self.points[1:] - self.points[:-1]
-        steps[1:] = np.hypot(ahead[:, 0], ahead[:, 1])
-        return self.points[np.cumsum(steps) <= reach]
+        along = np.concatenate(([0.0], np.cumsum(np.hypot(ahead[:, 0], ahead[:, 1]))))
+        within = self.points[along <= reach]
+        if not 0.0 < reach < along[-1]:
+            return within
+        last = len(within)
+        share = (reach - along[last - 1]) / (along[last] - along[last - 1])
+        return np.concatenate((within, within[-1:] + share * ahead[last - 1]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +93,10 @@ def rank(announcement: Announcement) -> tuple[bool, int, str]:
 
 
 def announced_way(other: Announcement, mine: Announcement, *, lively: bool = True) -> Way:
-    """Return the way that another robot announced."""
-    points = [(other.pose.x, other.pose.y), *((point.x, point.y) for point in other.way)]
+    """Return the way that another robot announced, without what it passed since it planned that."""
+    away = [other.pose.distance_to(point) for point in other.way[:PASSED]]
+    ahead = other.way[away.index(min(away)) + 1 :] if away else ()
+    points = [(other.pose.x, other.pose.y), *((point.x, point.y) for point in ahead)]
     outranks = rank(other) < rank(mine)
     return Way(np.array(points), other.speed, other.radius, outranks, other.robot, lively)
 
