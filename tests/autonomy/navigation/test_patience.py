@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +16,7 @@ from roboglot.autonomy.navigation.replanner import Replanner
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.errors import Blocked, NotLocalized
+from roboglot.model.geometry import Point, Pose
 
 
 def made(clock: LockstepClock, **belief: Any) -> Patience:
@@ -64,23 +66,58 @@ async def test_lost_robot_gives_up() -> None:
         patience.check_place()
 
 
-async def test_going_around_is_bounded() -> None:
-    events = SimpleNamespace(listen=lambda *_: lambda: None)
+def replanning(
+    tuning: PilotTuning, *, leaves: float | None = None, turning: float = 0.0
+) -> tuple[Replanner, Any, list[object]]:
+    """A replanner before an obstacle, its follower, and the followers that were looked at; ``leaves``: a robot does."""
+    looked = list[object]()
     course: Any = SimpleNamespace(
-        robot=SimpleNamespace(clock=LockstepClock(), events=events), tuning=PilotTuning(arounds_max=3), belief=None
+        robot=SimpleNamespace(clock=LockstepClock(), events=SimpleNamespace(listen=lambda *_: lambda: None)),
+        tuning=tuning,
+        belief=SimpleNamespace(pose=Pose()),
+        traffic=SimpleNamespace(is_closed_by_others=lambda *_, **__: leaves is not None, leaves=lambda _: leaves),
     )
-    goal: Any = SimpleNamespace(points=(None,))
-    lookout: Any = SimpleNamespace(blocked=True, blocked_at=-100.0)
-    options: Any = None
-    replanner = Replanner(course, options, goal, Journey(), lookout)
-    follower: Any = SimpleNamespace(left=5.0, passed=0, along=0.0, take=lambda _: None, stop_at=0.0)
-    plan: Any = SimpleNamespace(result=lambda: SimpleNamespace(length=6.0, goals=(None,)))
+    lookout: Any = SimpleNamespace(
+        blocked=True,
+        blocked_at=0.0 if leaves is not None else -100.0,
+        blocked_place=Point(),
+        look_ahead=lambda follower, _: looked.append(follower),
+    )
+    follower: Any = SimpleNamespace(
+        left=5.0,
+        passed=0,
+        take=lambda _: None,
+        turning=lambda *_: turning,
+        carrot=lambda: (Point(), 0.0),
+        route=SimpleNamespace(ahead=lambda *_: None),
+    )
+    goal: Any = SimpleNamespace(points=(Point(),))
+    planner: Any = None
+    return Replanner(course, planner, goal, Journey(), lookout), follower, looked
+
+
+def planned(length: float) -> Any:
+    return SimpleNamespace(result=lambda: SimpleNamespace(length=length, goals=(Point(),)))
+
+
+async def test_going_around_is_bounded() -> None:
+    replanner, follower, _ = replanning(PilotTuning(arounds_max=3))
     for _ in range(3):
-        lookout.blocked = True
-        assert replanner._take(follower, plan)
-    lookout.blocked = True
+        replanner._lookout.blocked = True
+        assert replanner._take(follower, planned(6.0))
+    replanner._lookout.blocked = True
     with pytest.raises(Blocked, match="3 times"):
-        replanner._take(follower, plan)
+        replanner._take(follower, planned(6.0))
+
+
+@pytest.mark.parametrize(
+    ("leaves", "turning", "taken"), [(1.0, 0.0, True), (1.0, 2.0, False), (4.0, 2.0, True), (math.inf, 2.0, True)]
+)
+async def test_turning_back_for_one_that_leaves_takes_longer(leaves: float, turning: float, *, taken: bool) -> None:
+    """A way around another robot, 0.4 m longer; once taken, the newest scan shows at once whether it is free."""
+    replanner, follower, looked = replanning(PilotTuning(), leaves=leaves, turning=turning)
+    assert replanner._take(follower, planned(length=follower.left + 0.4)) == taken
+    assert looked == ([follower] if taken else [])
 
 
 def test_strict_tracks_make_patient() -> None:

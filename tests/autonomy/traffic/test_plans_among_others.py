@@ -88,6 +88,28 @@ def test_first_one_keeps_its_way(robot: Robot, belief: Belief, way: Way, *, meet
     traffic.close()
 
 
+def straight(start: tuple[float, float], by: tuple[float, float], speed: float) -> Way:
+    """A robot that goes on by steps of ``by`` m."""
+    return Way(np.array(start) + np.arange(15)[:, None] * np.array(by), speed, RADIUS, outranks=False, lively=True)
+
+
+@pytest.mark.world("empty")
+@pytest.mark.parametrize(
+    ("way", "seconds"),
+    [
+        (straight((1.5, -1.0), (0.0, 0.2), 0.5), (1.0 + 2 * RADIUS + 0.1) / 0.5),  # crosses
+        (straight((1.5, 1.0), (0.0, 0.2), 0.5), 0.0),  # crossed
+        (straight((1.0, 0.0), (0.2, 0.0), 0.5), 0.0),  # drives ahead
+        (straight((3.0, 0.0), (-0.2, 0.0), 0.5), np.inf),  # comes
+        (straight((1.5, 0.0), (0.0, 0.2), 0.0), np.inf),  # stands
+    ],
+)
+def test_when_others_leave_the_way(robot: Robot, belief: Belief, way: Way, seconds: float) -> None:
+    traffic, path = among(robot, belief, way), np.stack([np.arange(0.0, 3.0, 0.05), np.zeros(60)], axis=1)
+    assert traffic.leaves(path) == pytest.approx(seconds, abs=0.6)
+    traffic.close()
+
+
 @pytest.mark.world("empty")
 @pytest.mark.parametrize("here", [1.0, 2.0, 3.0])
 def test_one_of_two_in_a_corridor_backs_out(robot: Robot, belief: Belief, here: float) -> None:
@@ -118,3 +140,20 @@ def test_what_flickers_in_a_corridor_has_no_right(belief: Belief, robot: Robot) 
     traffic.close()
     assert waits[:4] == [False] * 4
     assert waits[5:] == [True] * 4
+
+
+@pytest.mark.world("empty")
+def test_body_that_came_stays_off_the_map(belief: Belief, robot: Robot) -> None:
+    """It may leave out of sight: as part of the map it would close its place for good."""
+    traffic, kept = Traffic(robot, belief), list[bool]()
+    front = np.stack((0.02 * np.abs(np.arange(-4, 5)), 0.05 * np.arange(-4, 5)), axis=1)
+    for scan in range(800):
+        echoes = front + np.array((max(2.0, 3.0 - 0.05 * scan), 0.0))
+        traffic.observe(echoes, Pose(), 20.0 + 0.1 * scan)
+        kept.append(any(abs(x - 2.16) < 0.1 and radius > 0.3 for x, _, radius in belief.others))
+    assert all(kept[30:600])
+    assert not any(kept[-100:])
+    traffic.rest()
+    traffic.observe(front + np.array((2.0, 0.0)), Pose(), 200.0)
+    assert belief.others == []
+    traffic.close()

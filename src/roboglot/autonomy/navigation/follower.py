@@ -19,6 +19,7 @@ LOOKAHEAD, LOOKAHEAD_SECONDS = 0.12, 0.2  # m, and m per m/s, of look-ahead alon
 FINAL = 0.3  # m from the end: head straight for the goal and keep the heading
 FINAL_SPEED = 0.5  # m/s within that distance
 TURN_ON_SPOT = math.radians(60.0)  # heading error beyond which the robot turns before it drives
+TURN_AHEAD = 0.4  # m along another route to where it leads first
 TURN_AT_END = math.radians(15.0)  # for a differential base close to the goal
 TURN_GAIN = 4.0  # 1/s
 TURN_RATE = 2.0  # rad/s at most: scans smear in faster turns
@@ -134,6 +135,14 @@ class Follower:
         step = self.limits.angular_acceleration * PERIOD
         self.yaw_rate = _towards(self.yaw_rate, math.copysign(wanted, error), step)
         return self.yaw_rate
+
+    def turning(self, pose: Pose, route: Route) -> float:
+        """Return the time that turning on the spot into ``route`` takes longer than going on, s."""
+        ahead = route.point_at(min(TURN_AHEAD, route.length))
+        now, then = (abs(wrap_angle(pose.point.bearing_to(at) - pose.yaw)) for at in (self.carrot()[0], ahead))
+        if then <= max(now, TURN_ON_SPOT):
+            return 0.0
+        return (then - now) / min(TURN_RATE, self.limits.twist.yaw) + self.speed / self.limits.linear_acceleration
 
     def halt(self) -> None:
         """Note that the base was stopped by others."""

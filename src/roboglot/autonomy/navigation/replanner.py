@@ -154,13 +154,14 @@ class Replanner:
         if route is None:
             self._planned_at = self._clock.time() + tuning.wait_period - tuning.replan_period
             return False
-        if self._polite and route.length > follower.left + tuning.around:
+        pose, more = self._course.belief.pose, route.length - follower.left
+        cost = more / tuning.others_pace + follower.turning(pose, route)
+        if self._polite and (more > tuning.around or cost > self._leaves(follower)):
             return False  # waiting takes less time
-        more = route.length - follower.left
         if self._around and not lookout.blocked and more > tuning.around:
             return False  # the obstacle has left
         detour = more > tuning.detour
-        if detour and lookout.blocked and self._clock.time() - lookout.blocked_at < self._bears(more):
+        if lookout.blocked and self._clock.time() - lookout.blocked_at < self._bears(follower, more, cost):
             return False
         if len(self._goal.points) - self.passed(follower) != len(route.goals):
             self._stale = True  # a goal was reached meanwhile
@@ -168,15 +169,24 @@ class Replanner:
         self._count(detour, around=lookout.blocked and route.length > follower.left + tuning.around)
         self._first += follower.passed
         follower.take(route)
-        if lookout.blocked:
-            follower.stop_at = follower.along  # until the next scan shows whether this route is free
         lookout.blocked = False
+        lookout.look_ahead(follower, pose)  # the next scan may be a tenth of a second away
         return True
 
-    def _bears(self, more: float) -> float:
-        """Return the time to wait before taking a way that is ``more`` m longer, s."""
-        tuning, place = self._tuning, self._lookout.blocked_place
-        if not self._course.traffic.is_closed_by_others(place):
+    def _leaves(self, follower: Follower) -> float:
+        """Return the time until others are expected to have left the way ahead, s; inf: they stand or come along it."""
+        carrot, beyond = follower.carrot()
+        path = follower.route.ahead(self._course.belief.pose, carrot, beyond, self._tuning.horizon)
+        return self._course.traffic.leaves(path)
+
+    def _bears(self, follower: Follower, more: float, cost: float) -> float:
+        """Return the time to wait before an obstacle until a way ``more`` m and ``cost`` s longer is taken, s."""
+        tuning, traffic, place = self._tuning, self._course.traffic, self._lookout.blocked_place
+        if traffic.is_closed_by_others(place, moving=True) and self._leaves(follower) < cost:
+            return tuning.others_after
+        if more <= tuning.detour:
+            return 0.0
+        if not traffic.is_closed_by_others(place):
             return tuning.detour_after
         return max(tuning.detour_after, min(tuning.others_after, more / tuning.others_pace))
 

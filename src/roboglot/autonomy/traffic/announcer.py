@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,9 @@ from roboglot.model.robot import Robot
 HEARD_MAX = 1.0  # s for which an announcement counts
 HEARD_REACH = 12.0  # m within which announcements matter
 PERIOD = 0.2  # s between two announcements
-AROUND = 0.1  # m around an announced hull in which echoes are its own
+AROUND = 0.1  # m around a hull in which echoes are its own
+
+Body = tuple[float, float, float]  # x, y, radius
 
 
 class Announcer:
@@ -27,6 +30,8 @@ class Announcer:
         self.way: NDArray[np.float64] = np.empty((0, 2))
         self.inside = False  # whether the robot is in a place too narrow for two robots to pass
         self._announced_at = -math.inf
+        self._bodies: list[Body] = []  # of those that announce themselves
+        self._watched: list[Body] = []
         self._stop = robot.events.listen(ScanTaken, self._announce)
 
     def close(self) -> None:
@@ -68,12 +73,18 @@ class Announcer:
             inside=self.inside,
         )
 
+    def watch(self, movers: Iterable[tuple[float, float, float, float]]) -> None:
+        """Keep others that announce nothing off the map, too: x, y, radius (m) and speed (m/s) of each."""
+        self._watched = [(x, y, radius + AROUND + PERIOD * speed) for x, y, radius, speed in movers]
+        self._belief.others = [*self._bodies, *self._watched]
+
     def _announce(self, event: ScanTaken) -> None:
         if event.stamp - self._announced_at < PERIOD - 0.01 or TrafficRadio not in self._robot:
             return
         self._announced_at = event.stamp
-        self._belief.others = [
+        self._bodies = [
             (other.pose.x, other.pose.y, other.radius + AROUND + PERIOD * other.speed)
             for other in self.heard(event.stamp)
         ]
+        self._belief.others = [*self._bodies, *self._watched]
         self._robot[TrafficRadio].announce(self.announcement(event.stamp) if self.frame else None)

@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.route import SPACING
 from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.traffic.announcer import Announcer
 from roboglot.autonomy.traffic.one_way import OneWay
 from roboglot.autonomy.traffic.right_of_way import (
+    ALIKE,
     CLEAR,
     STEP,
     THROUGH,
     Meeting,
     Way,
     announced_way,
+    directions,
     expected_way,
     free_of_movers,
     meetings,
@@ -40,10 +43,13 @@ SAME = 0.6  # m between the sighting and the announcement of the same robot
 BEFORE_NARROW = 0.6  # m in front of a narrow place where the robot waits: one that comes out has room to turn
 FACING = 0.27 + 0.5  # m between a hull and the centre of the object in front of it
 AROUND = 4.0  # m within which other robots may be the obstacle
+PARKED = 60.0  # s after its last motion for which what moved, still in sight, does not become part of the map
 LIVELY = 8.0  # s after its last motion for which a robot counts as under way
 FAR = 3.0  # m at which such robots will have left before the robot arrives
 PROVEN = 0.4  # s for which a thing must be seen to go first: ghosts of walls, in a turn, last shorter
 STOPPED = 5.0  # s after which a robot standing in a narrow place may reverse, too
+SOON = 4.0  # s in which the robot will have left the first metres of its route
+GOES = 0.2  # m/s of a robot that leaves its place
 IN_IT = 0.9  # m between the centre of such a robot and the place that it blocks
 TRAIL = 20  # places that were passed
 TRAIL_STEP = 0.2  # m between two of them
@@ -83,6 +89,7 @@ class Traffic:
             for mover in self._watch().observe(echoes, self._belief.map, pose, stamp)
             if not any(mover.point.distance_to(other.pose) < SAME for other in heard)
         ]
+        self._announcer.watch((m.x, m.y, m.radius, m.speed) for m in movers if _is_passing(m, self._belief.map, stamp))
         inside = self._announcer.inside = self._is_inside(pose, heard, movers, stamp)
         self._ways = []
         if heard:
@@ -132,10 +139,30 @@ class Traffic:
         """Return the places of others that will have left before the robot gets there."""
         return [Point(*way.points[0].tolist()) for way in self._ways if way.lively and not way.is_within(FAR, pose)]
 
-    def is_closed_by_others(self, place: Point) -> bool:
-        """True if another robot that is under way stands there, and will leave."""
-        here = Pose(place.x, place.y)
-        return any(way.lively and way.is_within(IN_IT, here) for way in self._ways)
+    def is_closed_by_others(self, place: Point, *, moving: bool = False) -> bool:
+        """True if another robot that is under way is there, and will leave; ``moving``: only if it does so now."""
+        here, least = Pose(place.x, place.y), GOES if moving else 0.0
+        return any(way.lively and way.speed >= least and way.is_within(IN_IT, here) for way in self._ways)
+
+    def leaves(self, path: Points) -> float:
+        """Return the time until all others are expected to have left ``path`` (dense), s; inf: one will not."""
+        radius, latest = self._robot.description.radius + CLEAR, 0.0
+        mine = path[:: round(STEP / SPACING)]
+        for way in self._ways if len(mine) >= 2 else ():
+            close = way.distances(mine) < radius + way.radius
+            on = np.flatnonzero(close.any(axis=0))
+            if not len(on):
+                continue
+            if way.speed < GOES or len(way.points) < 2:
+                return math.inf
+            last = int(on[-1])
+            beside = int(way.distances(mine)[:, last].argmin())
+            if float(directions(mine)[beside] @ directions(way.points)[last]) > ALIKE:
+                continue  # it drives ahead
+            if last == len(way.points) - 1:
+                return math.inf
+            latest = max(latest, float(way.seconds[last]))
+        return latest
 
     def is_among_others(self, pose: Pose) -> bool:
         """True if other robots or things that are under way are near."""
@@ -241,10 +268,10 @@ class Traffic:
         return [(np.array([*trail, (pose.x, pose.y), *near]), 2 * mine + CLEAR)]
 
     def is_free(self, path: Points, *, ruled: bool) -> bool:
-        """True if no other way is near ``path``; ``ruled``: only ways with right of way count."""
+        """True if no other is near ``path`` soon; ``ruled``: only those with right of way count."""
         mine = self._robot.description.radius + CLEAR
         ways = [way for way in self._ways if way.outranks or not ruled]
-        return not any((way.distances(path) < mine + way.radius).any() for way in ways)
+        return not any((way.distances(path) < mine + way.radius)[:, way.seconds < SOON].any() for way in ways)
 
     # -- itself --------------------------------------------------------------------------------------------------------
 
@@ -265,3 +292,14 @@ class Traffic:
     def rest(self) -> None:
         """Announce that the robot has no goal."""
         self._announcer.way, self.meeting, self.meets = np.empty((0, 2)), None, False
+        self._announcer.watch(())
+
+
+def _is_passing(mover: Mover, grid: EvidenceGrid, stamp: float) -> bool:
+    """True if a thing on free floor has moved while it was in sight: it is a robot or a person, no furniture."""
+    if stamp - mover.moved_at > PARKED:
+        return False
+    row = math.floor(mover.y / RESOLUTION) - grid.first_row
+    column = math.floor(mover.x / RESOLUTION) - grid.first_column
+    within = 0 <= row < grid.evidence.shape[0] and 0 <= column < grid.evidence.shape[1]
+    return within and bool(grid.evidence[row, column] < 0)
