@@ -96,7 +96,7 @@ class Traffic:
             mine = self._announcer.announcement(stamp)
             self._ways = [announced_way(other, mine, lively=self._goes(other)) for other in heard]
         self._went = {other.robot: self._went[other.robot] for other in heard if other.robot in self._went}
-        self._ways += [self._expected(mover, pose, stamp, inside=inside) for mover in movers]
+        self._ways += [_expected(self._tight, mover, pose, stamp, inside=inside) for mover in movers]
         self._one_way.observe(self._ways, stamp)
 
     def _is_inside(self, pose: Pose, heard: list[Announcement], movers: list[Mover], stamp: float) -> bool:
@@ -113,15 +113,6 @@ class Traffic:
         if other.way:
             self._went[other.robot] = other.stamp
         return other.stamp - self._went.get(other.robot, -math.inf) <= LIVELY
-
-    def _expected(self, mover: Mover, pose: Pose, stamp: float, *, inside: bool) -> Way:
-        """Return the way of a robot that announces none: it goes first if only it is in a narrow place."""
-        stood, proven = stamp - mover.moved_at, stamp - mover.since >= PROVEN
-        if not inside and proven and stood <= STOPPED and self._tight.holds(pose.point, mover.point):
-            points = straight_on(mover, THROUGH)
-            narrow = self._tight.along(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
-            return through_narrow(mover, points, narrow)
-        return expected_way(mover, lively=stood <= LIVELY)
 
     def _watch(self) -> MoverTracker:
         if self._tracker is None:
@@ -303,3 +294,13 @@ def _is_passing(mover: Mover, grid: EvidenceGrid, stamp: float) -> bool:
     column = math.floor(mover.x / RESOLUTION) - grid.first_column
     within = 0 <= row < grid.evidence.shape[0] and 0 <= column < grid.evidence.shape[1]
     return within and bool(grid.evidence[row, column] < 0)
+
+
+def _expected(tight: Tight, mover: Mover, pose: Pose, stamp: float, *, inside: bool) -> Way:
+    """Return the way of a robot that announces none: it goes first if only it is in a narrow place."""
+    stood, proven = stamp - mover.moved_at, stamp - mover.since >= PROVEN
+    if not inside and proven and stood <= STOPPED and tight.holds(pose.point, mover.point):
+        points = straight_on(mover, THROUGH)
+        narrow = tight.along(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
+        return through_narrow(mover, points, narrow)
+    return expected_way(mover, lively=stood <= LIVELY)
