@@ -175,7 +175,7 @@ def test_inflation_closes_what_the_hull_would_touch() -> None:
 def test_obstacles_are_remembered_until_a_ray_passes_through() -> None:
     seen, free = np.zeros((60, 60), np.float32), np.full((60, 60), -9, np.int16)
     near, far, noted, count = np.array([[1.0, 0.0]]), np.array([[2.0, 0.0]]), np.empty((9, 2), np.int32), 0
-    pose = np.array((0.5, 0.5, 0.0))
+    pose = np.array((0.5, 0.5, 0.0, 0.0, 0.0))
     count, _ = remember(free, seen, near, np.ones(1, np.uint8), pose, 5.0, 3.0, RESOLUTION, noted, count)
     assert seen[10, 30] == 3.0
     cost = inflated_cost(free, seen, 2.0, RESOLUTION, 0.2, 0.5, 9.0, 3.0)
@@ -195,7 +195,7 @@ def test_rays_beside_noted_cells_need_not_be_followed(seed: int, most: int) -> N
     sparing, thorough = np.zeros((80, 80), np.float32), np.zeros((80, 80), np.float32)
     noted, count = np.empty((most, 2), np.int32), 0
     for now in range(1, 6):
-        pose = np.array((*random.uniform(1.0, 3.0, 2), random.uniform(-3.0, 3.0)))
+        pose = np.array((*random.uniform(1.0, 3.0, 2), random.uniform(-3.0, 3.0), 7.0, -3.0))
         angles, ways = np.linspace(-3.1, 3.1, 40), random.uniform(0.1, 2.5, 40)
         rays, hit = (ways * (np.cos(angles), np.sin(angles))).T.copy(), (random.random(40) < 0.3).astype(np.uint8)
         scan = evidence, sparing, rays, hit, pose, 2.0, float(now), RESOLUTION
@@ -203,7 +203,7 @@ def test_rays_beside_noted_cells_need_not_be_followed(seed: int, most: int) -> N
         remember(evidence, thorough, *scan[2:], noted, -1)
         turn = pose[2] + angles[(hit > 0) & (ways <= 2.0)]
         there = ways[(hit > 0) & (ways <= 2.0)] * (np.cos(turn), np.sin(turn))
-        assert echoes == pytest.approx(there.T + pose[:2])
+        assert echoes == pytest.approx(there.T + pose[:2] + pose[3:])
         assert (sparing == thorough).all()
         assert count == -1 or sorted(map(tuple, noted[:count])) == sorted(map(tuple, np.argwhere(sparing)))
 

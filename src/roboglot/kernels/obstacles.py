@@ -79,14 +79,15 @@ def _aimed(ends: FloatArray, x: float, y: float, near: FloatArray, count: int) -
 
 
 @kernel(
-    "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64, float64,"
-    " int32[:,::1], int64)",
+    "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64[::1], float64,"
+    " float64, int32[:,::1], int64)",
 )
 def _note(
     evidence: Int16Array,
     seen: SingleArray,
     ends: FloatArray,
     hit: ByteArray,
+    pose: FloatArray,
     now: float,
     resolution: float,
     noted: Int32Array,
@@ -97,7 +98,7 @@ def _note(
     for i in range(ends.shape[0]):
         if hit[i] == 0:
             continue
-        echoes[met, 0], echoes[met, 1] = ends[i, 0], ends[i, 1]
+        echoes[met, 0], echoes[met, 1] = ends[i, 0] + pose[3], ends[i, 1] + pose[4]
         met += 1
         col, row = int(np.floor(ends[i, 0] / resolution)), int(np.floor(ends[i, 1] / resolution))
         if not (0 <= row < height and 0 <= col < width) or beside_occupied(evidence, row, col):
@@ -146,9 +147,9 @@ def remember(
     """Note the time ``now`` (> 0) in cells with a hit that the map does not explain; 0 in those that rays pass.
 
     ``rays`` (n, 2; base_link, m) are looked at up to ``reach`` m; ``pose`` (x, y, yaw) is base_link's, from the grid's
-    corner. The first ``count`` rows of ``noted`` are the cells (row, column) that are not 0: only rays that come near
-    them are followed. Returns how many there are now, or -1 when they are more than ``noted`` holds; and the hits
-    within reach (n, 2; m from the grid's corner).
+    corner, followed by that (x, y) in map. The first ``count`` rows of ``noted`` are the cells (row, column) that are
+    not 0: only rays that come near them are followed. Returns how many there are now, or -1 when they are more than
+    ``noted`` holds; and the hits within reach (n, 2; map, m).
     """
     height, width = seen.shape
     x, y = pose[0], pose[1]
@@ -174,7 +175,7 @@ def remember(
         if seen[noted[k, 0], noted[k, 1]] > 0.0:
             noted[left, 0], noted[left, 1] = noted[k, 0], noted[k, 1]
             left += 1
-    return _note(evidence, seen, ends, hits, now, resolution, noted, left if count >= 0 else -1)
+    return _note(evidence, seen, ends, hits, pose, now, resolution, noted, left if count >= 0 else -1)
 
 
 @kernel("Tuple((int64, float64))(float64[:,::1], int64, int64, float64, float64)")

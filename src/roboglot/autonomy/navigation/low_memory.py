@@ -62,6 +62,11 @@ class LowMemory:
             self._latest = stamp
         return found
 
+    @property
+    def has_seen(self) -> bool:
+        """True if there was a low obstacle since the start."""
+        return self._latest > -math.inf
+
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
         """Return the time (s) of the last sighting in each of the map's cells; 0: never."""
         return self._sightings.of(grid)

@@ -76,9 +76,9 @@ class ScanMemory:
     ) -> NDArray[np.float64]:
         """Remember obstacles of ``scan`` that are not ``shown`` on the map; return its near echoes in map (n, 2; m)."""
         corner, sightings, stamp = grid.corner, self._sightings, max(now, 1e-3)
-        seen, at = sightings.of(grid), np.array((pose.x - corner.x, pose.y - corner.y, pose.yaw))
+        at = np.array((pose.x - corner.x, pose.y - corner.y, pose.yaw, corner.x, corner.y))
+        seen = sightings.of(grid)
         sightings.count, echoes = remember(
             shown, seen, scan.ends, scan.hit, at, OBSTACLE_RANGE, stamp, RESOLUTION, sightings.noted, sightings.count
         )
-        echoes += (corner.x, corner.y)
         return echoes

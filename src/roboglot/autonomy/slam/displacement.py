@@ -45,9 +45,11 @@ class DisplacementWatch:
             corrections.popleft()
         sigma = math.sqrt(float(prior[0, 0] + prior[1, 1]))
         corrections.append((stamp, seen.x - before.x, seen.y - before.y, way, sigma))
-        _, xs, ys, ways, sigmas = zip(*corrections, strict=True)
-        shoved = math.hypot(sum(xs), sum(ys))
-        if shoved <= SHOVED + SHOVED_PER_METRE * sum(ways) + SIGMAS * max(sigmas):
+        x = y = driven = widest = 0.0
+        for _, along, up, some, sigma in corrections:
+            x, y, driven, widest = x + along, y + up, driven + some, max(widest, sigma)
+        shoved = math.hypot(x, y)
+        if shoved <= SHOVED + SHOVED_PER_METRE * driven + SIGMAS * widest:
             return None
         self.forget(stamp)
         return shoved

@@ -68,16 +68,15 @@ class LearntNoise:
         rises only if ``rising()``, which is called only if needed.
         """
         c, s = math.cos(direction), math.sin(direction)
-        before, (way, around) = self._before, self._described
+        before, (way, around) = self._before.tolist(), self._described
+        wide, narrow = prior.tolist(), posterior.tolist()
         correction_along = c * correction[0] + s * correction[1]
         factor = _learnt(
-            self.way_factor, correction_along, _along(prior, c, s), _along(posterior, c, s), _along(before, c, s), way
+            self.way_factor, correction_along, _along(wide, c, s), _along(narrow, c, s), _along(before, c, s), way
         )
         if factor <= self.way_factor or rising():
             self.way_factor = factor
-        self.yaw_factor = _learnt(
-            self.yaw_factor, correction[2], float(prior[2, 2]), float(posterior[2, 2]), float(before[2, 2]), around
-        )
+        self.yaw_factor = _learnt(self.yaw_factor, correction[2], wide[2][2], narrow[2][2], before[2][2], around)
 
     @property
     def newest(self) -> Doubt:
@@ -101,9 +100,9 @@ class LearntNoise:
         return math.sqrt(self.way_factor), math.sqrt(self.yaw_factor)
 
 
-def _along(matrix: NDArray[np.float64], c: float, s: float) -> float:
+def _along(matrix: list[list[float]], c: float, s: float) -> float:
     """Return the variance in the direction with cosine ``c`` and sine ``s``."""
-    return float(c * c * matrix[0, 0] + 2.0 * c * s * matrix[0, 1] + s * s * matrix[1, 1])
+    return c * c * matrix[0][0] + 2.0 * c * s * matrix[0][1] + s * s * matrix[1][1]
 
 
 def _learnt(factor: float, correction: float, prior: float, posterior: float, before: float, described: float) -> float:
