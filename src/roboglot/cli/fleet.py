@@ -97,9 +97,7 @@ def top(
     data: Data = None,
     once: Annotated[
         bool | None,
-        typer.Option(
-            "--once/--watch", help="Print one table and exit (the default in a pipe), or go on."
-        ),
+        typer.Option("--once/--watch", help="Print one table and exit (the default in a pipe), or go on."),
     ] = None,
     period: Annotated[
         float, typer.Option(min=0.5, help="Seconds between tables, over which processor time is measured.")

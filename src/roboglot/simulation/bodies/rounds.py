@@ -82,6 +82,7 @@ class Rounds:
         self.controls: list[SharedControl] = []
         self.senses: list[SharedSense] = []
         self._ahead: list[Callable[[int], None]] = []
+        self.gathered = 0  # how often these were made anew
         self._ticks = 0
         self._controlled = self._sensed = Agenda((), (), 0)
 
@@ -134,6 +135,7 @@ class Rounds:
     def _gather(self, robots: tuple[SimulatedRobot, ...]) -> None:
         """Make the functions of all robots' parts anew."""
         self._robots = robots
+        self.gathered += 1
         self.controls.clear()
         self.senses.clear()
         self._ahead.clear()

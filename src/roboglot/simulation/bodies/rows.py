@@ -34,11 +34,12 @@ class Kernels:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """Stage of a tick in ``kernels/ticks.py``, with the tables (asked for anew each time) and numbers it takes."""
+    """Stage of a tick in ``kernels/ticks.py``, with the tables and numbers it takes; ``refresh`` updates the tables."""
 
     stage: int
-    tables: Callable[[], tuple[FloatArray, ...]]
+    tables: tuple[FloatArray, ...]
     settings: tuple[float, ...] = ()
+    refresh: Callable[[], None] | None = None
 
 
 class Rows:

@@ -25,7 +25,6 @@ from roboglot.kernels.layouts import (
 )
 from roboglot.simulation.bodies.hull import STOREY
 from roboglot.simulation.bodies.rounds import Rounds
-from roboglot.simulation.bodies.rows import Leg
 from roboglot.simulation.bodies.sleep import RESTS
 from roboglot.simulation.bodies.support import LIFTED
 from roboglot.simulation.people.crowd import HABITS, Crowd
@@ -51,8 +50,12 @@ class Ticking:
 
     def __init__(self, physics: Physics, crowd: Crowd, rounds: Rounds, seconds: float) -> None:
         self._physics, self._crowd, self._rounds, self._seconds = physics, crowd, rounds, seconds
-        self._hulls = physics.around_people[0]
         self._run: Callable[..., int] | None = None
+        self._gathered = 0  # of the rounds, to which these belong
+        self._arrays: tuple[object, ...] = ()
+        self._settings: tuple[float, ...] = ()
+        self._refresh: list[Callable[[], None]] = []
+        self._steps, self._others = 0, physics.rows.others
 
     def load_kernels(self) -> None:
         """Do several ticks at once from now on, where that is possible; results stay the same, to the last bit."""
@@ -67,59 +70,58 @@ class Ticking:
         return self._run is not None and self._physics.glides
 
     def run(self, ticks: int, number: int, origin: float, *, followed: bool) -> Left:
-        """Begin up to so many ticks after tick ``number``, 0: one without the kernel.
+        """Begin up to so many ticks after tick ``number``, 0: one without the kernel. The last one waits for ``end``.
 
-        ``followed``: the first one's shared control has run.
-
-        ``origin``: stamp of tick 0, s. The last one waits for ``end``.
+        ``followed``: the first one's shared control has run; ``origin``: stamp of tick 0, s.
         """
         if not ticks:
             return Left(1, DRIVE, 0)
-        legs, course = self._legs(), self._physics.course() if self._run is not None else None
-        if course is None or legs is None or self._run is None:
+        if self._gathered != self._rounds.gathered:
+            self._gather()
+        course = self._physics.course() if self._arrays else None
+        if course is None or self._run is None:
             return Left(1, DRIVE, 0) if followed else Left(0, GIMBALS, 0)
+        if self._settings[0] != origin:
+            self._settings = origin, *self._settings[1:]
+        for refresh in self._refresh:
+            refresh()
         gliding, sleep, known = course
-        step, *others = gliding.settings
         answer = self._run(
-            (self._hulls, *(table for leg in legs for table in leg.tables())),
-            (self._crowd.table, *gliding.scene),
-            gliding.geoms,
-            gliding.state,
-            gliding.servos,
-            sleep.now,
-            sleep.kept,
-            (
-                origin,
-                self._seconds,
-                step,
-                RESTS,
-                STOREY,
-                LIFTED,
-                *others,
-                *HABITS,
-                *(number for leg in legs for number in leg.settings),
-            ),
-            round(self._seconds / step),
+            *self._arrays,
+            self._settings,
+            self._steps,
             number,
             ticks,
             followed,
             known and gliding.parted,
             sleep.holds,
             gliding.free,
-            self._physics.rows.others,
+            self._others,
         )
         begun, rest = divmod(answer, TICKS_UNIT)
         count, rest = divmod(rest, COUNT_UNIT)
-        moved, stage = rest % STAGE_UNIT, rest // STAGE_UNIT
+        stage, moved = divmod(rest, STAGE_UNIT)
         if begun > (stage == PEOPLE):
             self._physics.moved(awake=bool(moved), known=known)
         return Left(begun, stage, count)
 
-    def _legs(self) -> list[Leg] | None:
-        """Return the parts' legs in the kernel; None if there are parts that it does not know."""
-        every = [control.leg for control in self._rounds.controls] + [sense.leg for sense in self._rounds.senses]
+    def _gather(self) -> None:
+        """Take the arrays of the robots' parts and of the physics; none if there are parts that the kernel lacks."""
+        rounds, self._arrays, course = self._rounds, (), self._physics.course()
+        every = [control.leg for control in rounds.controls] + [sense.leg for sense in rounds.senses]
         legs = [leg for leg in every if leg is not None]
-        return legs if [leg.stage for leg in legs] == LEGS and len(legs) == len(every) else None
+        if self._run is None or course is None or [leg.stage for leg in legs] != LEGS or len(legs) < len(every):
+            return
+        self._gathered = rounds.gathered
+        gliding, sleep, _ = course
+        tables = self._physics.around_people[0], *(table for leg in legs for table in leg.tables)
+        scene, geoms = (self._crowd.table, *gliding.scene), gliding.geoms
+        self._arrays = tables, scene, geoms, gliding.state, gliding.servos, sleep.now, sleep.kept
+        self._refresh = [leg.refresh for leg in legs if leg.refresh is not None]
+        step, *physical = gliding.settings
+        limits = self._seconds, step, RESTS, STOREY, LIFTED
+        self._settings = 0.0, *limits, *physical, *HABITS, *(number for leg in legs for number in leg.settings)
+        self._steps = round(self._seconds / step)
 
     def end(self, left: Left, stamp: float, meanwhile: Callable[[float], None] | None = None) -> None:
         """Do what is left of a tick (stamp, s); ``meanwhile``: see ``Physics.step``."""

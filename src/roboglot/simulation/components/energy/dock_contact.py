@@ -9,7 +9,6 @@ from itertools import chain
 import numpy as np
 from msgspec import Struct
 
-from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.layouts import (
     CONTACT_ANGLE,
     CONTACT_DISTANCE,
@@ -28,7 +27,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
-from roboglot.simulation.bodies.rows import Leg, Rows, Sense, SharedSense
+from roboglot.simulation.bodies.rows import Kernels, Leg, Rows, Sense, SharedSense
 
 TABLE = "dock contact"
 
@@ -84,23 +83,23 @@ def _together(rows: Rows, parts: Sequence[tuple[SimulatedDockContact, Sense]]) -
     hulls, contacts = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, CONTACT_WIDTH)
     docks = parts[0][0].docks if parts else ()
     known: list[Pose] = []
-    table = np.zeros((0, DOCK_WIDTH))
+    table = np.zeros((sum(map(len, docks)), DOCK_WIDTH))
 
-    def present() -> tuple[FloatArray, FloatArray]:
-        """Return the contacts and the docks, where they are now."""
-        nonlocal known, table
+    def refresh() -> None:
+        """Take over where the docks are now."""
+        nonlocal known
         if (there := [*chain.from_iterable(docks)]) != known:  # one was moved
             known = there
             floors = ((number, dock) for number, those in enumerate(docks) for dock in those)
-            fronts = [(dock.x, dock.y, math.cos(dock.yaw), math.sin(dock.yaw), dock.yaw, at) for at, dock in floors]
-            table = np.array(fronts).reshape(-1, DOCK_WIDTH)
-        return contacts, table
+            for row, (at, dock) in zip(table, floors, strict=True):
+                row[:] = dock.x, dock.y, math.cos(dock.yaw), math.sin(dock.yaw), dock.yaw, at
 
-    return rows.sense(
-        {contact.index: sense for contact, sense in parts},
-        lambda kernels, _stamp, _seconds: kernels.touch(hulls, *present(), rows.others),
-        Leg(TOUCHED, present),
-    )
+    def touch(kernels: Kernels, _stamp: float, _seconds: float) -> int:
+        refresh()
+        return kernels.touch(hulls, contacts, table, rows.others)
+
+    leg = Leg(TOUCHED, (contacts, table), refresh=refresh)
+    return rows.sense({contact.index: sense for contact, sense in parts}, touch, leg)
 
 
 def _fit(fit: Fitting) -> SimulatedDockContact:

@@ -20,6 +20,7 @@ from roboglot.simulation.components.motion.drive_locks import DriveLocks
 from roboglot.simulation.components.motion.hindrances import STANDS, Hindrances
 
 NO_WHEELS = WheelSpeeds()
+SLOW = 0.3  # m/s: up to here nothing watches how fast it is
 
 
 class SimulatedBase(Base):
@@ -30,6 +31,7 @@ class SimulatedBase(Base):
 
     def __init__(self, section: BaseSection, hull: Hull) -> None:
         self.duty = Duty()  # while speeds change or something limits them
+        self.when_fast: list[Duty] = []  # start when it moves faster than SLOW, or is to
         self.wheels = wheels = Wheels(section, self._rewired)
         self.limits = BaseLimits(
             twist=Twist(section.speed, section.speed if wheels.mecanum else 0.0, section.yaw_speed),
@@ -140,6 +142,7 @@ class SimulatedBase(Base):
         """Move base_link at ``twist`` by the legs, at once and in spite of locks."""
         self._target = twist
         self._speeds, self._carried = self.wheels.speeds_of(twist), twist != STILL
+        self._note_pace()
         self._turn_wheels(twist)
 
     def control(self, seconds: float) -> None:
@@ -183,14 +186,22 @@ class SimulatedBase(Base):
     def _take_time(self) -> None:
         """Begin to follow a command; end hard braking, unless it is to stand."""
         self.duty.begin()
+        self._note_pace()
         if self._target not in (STILL, NO_WHEELS):
             self._haste = 1.0
+
+    def _note_pace(self) -> None:
+        """Start what watches a base that moves faster than SLOW, or will."""
+        for duty in self.when_fast:
+            if not duty.on and max(self._twist_of(self._target).speed, self._twist.speed) > SLOW:
+                duty.begin()
 
     def _respect_bars(self) -> None:
         """Stop at once in a barred direction; a turn on the spot stays possible."""
         target = self._twist_of(self._target)
         if self.hindrances.blocks(target.x):
             self._target = Twist(0.0, 0.0, target.yaw)
+            self._note_pace()
         if self.hindrances.blocks(self._twist.x):
             self._twist = Twist(0.0, 0.0, self._twist.yaw)
             self._speeds = self.wheels.speeds_of(self._twist)
@@ -199,6 +210,7 @@ class SimulatedBase(Base):
         """Brake at the next opportunity."""
         self._target = STILL
         self.duty.begin()
+        self._note_pace()
 
     def _twist_of(self, command: Twist | WheelSpeeds) -> Twist:
         return command if isinstance(command, Twist) else self.wheels.twist_of(command)

@@ -246,7 +246,7 @@ def together(rows: Rows, gimbals: Sequence[tuple[GimbalAxes, Control]]) -> Share
     return rows.control(
         {axes.index: control for axes, control in gimbals},
         lambda kernels, seconds: kernels.follow(hulls, table, FOLLOWING, SETTLED, seconds, rows.others),
-        Leg(GIMBALS, lambda: (table,), (FOLLOWING, SETTLED)),
+        Leg(GIMBALS, (table,), (FOLLOWING, SETTLED)),
     )
 
 

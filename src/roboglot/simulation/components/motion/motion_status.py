@@ -121,7 +121,7 @@ def _together(rows: Rows, parts: Sequence[tuple[SimulatedMotionStatus, Sense]]) 
     return rows.sense(
         {status.index: sense for status, sense in parts},
         lambda kernels, stamp, _: kernels.watch(*tables, stamp, GRAVITY, SLIP_SQUARE, SLIP_RATE, rows.others),
-        Leg(WATCHED, lambda: tables[-1:], (GRAVITY, SLIP_SQUARE, SLIP_RATE)),
+        Leg(WATCHED, tables[-1:], (GRAVITY, SLIP_SQUARE, SLIP_RATE)),
     )
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from roboglot.model.geometry import Twist
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
-from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.bodies.schedule import Duty
+from roboglot.simulation.components.motion.base import SLOW, SimulatedBase
 from roboglot.simulation.components.sensing.bumper import BumperSection, SimulatedBumper, zone_of
 from roboglot.simulation.world.sight import Sight
 
@@ -25,7 +26,6 @@ SIDE, ALONG = np.maximum(1e-9, np.abs(np.sin(FAN))), np.cos(FAN)
 DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with a margin
 REACTION = 0.1  # s
 PERIOD = 4  # ticks
-SLOW = 0.3  # m/s; below this it does not begin
 
 
 class SoftTouch:
@@ -33,12 +33,18 @@ class SoftTouch:
 
     def __init__(self, speed: float, hull: Hull, base: SimulatedBase, bumper: SimulatedBumper, sight: Sight) -> None:
         self._speed, self._hull, self._base, self._bumper, self._sight = speed, hull, base, bumper, sight
+        self.duty = Duty()
+        base.when_fast.append(self.duty)
 
     def sense(self, _stamp: float, _seconds: float) -> None:
         """Measure ahead, and limit the base's pace."""
         twist, base = self._base.wanted, self._base
         slow = twist.speed <= (max(SLOW, self._speed) if math.isinf(base.hindrances.pace) else self._speed)
-        if slow or zone_of(twist.x, twist.y) in self._bumper.masked:
+        if slow:
+            base.hindrances.pace = math.inf
+            self.duty.end()
+            return
+        if zone_of(twist.x, twist.y) in self._bumper.masked:
             base.hindrances.pace = math.inf
             return
         now = max(base.velocity.speed, self._speed)
@@ -70,4 +76,11 @@ def _fit(fit: Fitting) -> SoftTouch | None:
     return SoftTouch(section.touch_speed, fit.hull, fit.get(SimulatedBase), bumper, fit.world.sight)
 
 
-PART = Part(name="soft_touch", fit=_fit, after=("base", "bumper_stop"), sense=SoftTouch.sense, every=PERIOD)
+PART = Part(
+    name="soft_touch",
+    fit=_fit,
+    after=("base", "bumper_stop"),
+    sense=SoftTouch.sense,
+    every=PERIOD,
+    duty=lambda touch: touch.duty,
+)

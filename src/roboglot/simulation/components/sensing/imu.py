@@ -205,7 +205,7 @@ def _together(rows: Rows, parts: Sequence[tuple[SimulatedImu, Sense]]) -> Shared
     return rows.sense(
         {imu.index: sense for imu, sense in parts},
         lambda kernels, stamp, seconds: kernels.measure(hulls, imus, noises, stamp, seconds, GRAVITY, rows.others),
-        Leg(MEASURED, lambda: (imus, noises), (GRAVITY,)),
+        Leg(MEASURED, (imus, noises), (GRAVITY,)),
     )
 
 

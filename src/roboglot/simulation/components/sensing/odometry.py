@@ -162,7 +162,7 @@ def _together(rows: Rows, parts: Sequence[tuple[SimulatedOdometry, Sense]]) -> S
     return rows.sense(
         {odometry.index: sense for odometry, sense in parts},
         lambda kernels, stamp, seconds: kernels.reckon(*tables, noises, stamp, seconds, rows.others),
-        Leg(RECKONED, lambda: (tables[-1], noises)),
+        Leg(RECKONED, (tables[-1], noises)),
     )
 
 
