@@ -282,24 +282,25 @@ def reckon(
     seconds: float,
     others: IntArray,
 ) -> int:
-    """Add a tick to the odometry of robots that stand, or drive straight on or in a curve, and have noise left."""
+    """Add a tick to the odometry of robots that stand, or drive and have noise left."""
     count, drawn = 0, noises.shape[1]
     for i in range(hulls.shape[0]):
         row = odometries[i]
         if row[USE] == 0.0:
             continue
         wheel_x, wheel_y, rate = hulls[i, HULL_WHEEL_X], hulls[i, HULL_WHEEL_Y], imus[i, IMU_RATE]
-        if wheel_x == 0.0 and hulls[i, HULL_WHEEL_YAW] == 0.0 and abs(rate) < row[ODOMETRY_STILL]:
+        drives = wheel_x != 0.0 or wheel_y != 0.0
+        if not drives and hulls[i, HULL_WHEEL_YAW] == 0.0 and abs(rate) < row[ODOMETRY_STILL]:
             rate = 0.0
         at, yaw = int(row[ODOMETRY_AT]), row[ODOMETRY_STATE + 3]
         turned = yaw + rate * seconds if rate != 0.0 else yaw
-        usual = row[USE] == TOGETHER and hulls[i, HULL_SLACK] == 0.0 and wheel_y == 0.0
-        if not (usual and (wheel_x == 0.0 or at < drawn) and -math.pi < turned <= math.pi):
+        usual = row[USE] == TOGETHER and hulls[i, HULL_SLACK] == 0.0
+        if not (usual and (not drives or at < drawn) and -math.pi < turned <= math.pi):
             others[count] = i
             count += 1
             continue
         vx = vy = 0.0
-        if wheel_x != 0.0:
+        if drives:
             vx = wheel_x * (row[ODOMETRY_SCALE_X] + row[ODOMETRY_NOISE] * noises[i, at])
             vy = wheel_y * (row[ODOMETRY_SCALE_Y] + row[ODOMETRY_NOISE] * noises[i, at + 1])
             row[ODOMETRY_AT] = at + ODOMETRY_NOISES
@@ -307,7 +308,7 @@ def reckon(
             c, s = math.cos(middle), math.sin(middle)
             row[ODOMETRY_STATE + 1] += (c * vx - s * vy) * seconds
             row[ODOMETRY_STATE + 2] += (s * vx + c * vy) * seconds
-            row[ODOMETRY_STATE + 7] += abs(vx) * seconds
+            row[ODOMETRY_STATE + 7] += math.sqrt(vx * vx + vy * vy) * seconds
         row[ODOMETRY_STATE], row[ODOMETRY_STATE + 3] = stamp, turned
         row[ODOMETRY_STATE + 4], row[ODOMETRY_STATE + 5], row[ODOMETRY_STATE + 6] = vx, vy, rate
     return count

@@ -90,7 +90,7 @@ class SimulatedBase(Base):
     @property
     def velocity(self) -> Twist:
         if self._free:
-            return self._rolled()
+            return _rolled(self._hull, mecanum=self.wheels.mecanum)
         return self.wheels.twist_of(self.wheels.driven(self._speeds)) if self.wheels.dead else self._twist
 
     def walk(self, walkable: Callable[[Twist], Twist] | None) -> None:
@@ -215,11 +215,12 @@ class SimulatedBase(Base):
     def _twist_of(self, command: Twist | WheelSpeeds) -> Twist:
         return command if isinstance(command, Twist) else self.wheels.twist_of(command)
 
-    def _rolled(self) -> Twist:
-        """Return the hull's velocity in base_link, as freely rolling wheels measure it."""
-        (vx, vy, _, turn), yaw = self._hull.motion, self._hull.turned
-        c, s = math.cos(yaw), math.sin(yaw)
-        return Twist(c * vx + s * vy, (c * vy - s * vx) if self.wheels.mecanum else 0.0, turn)
+
+def _rolled(hull: Hull, *, mecanum: bool) -> Twist:
+    """Return the hull's velocity in base_link, as freely rolling wheels measure it."""
+    (vx, vy, _, turn), yaw = hull.motion, hull.turned
+    c, s = math.cos(yaw), math.sin(yaw)
+    return Twist(c * vx + s * vy, (c * vy - s * vx) if mecanum else 0.0, turn)
 
 
 def _nearer(now: Twist, target: Twist, linear: float, angular: float) -> Twist:

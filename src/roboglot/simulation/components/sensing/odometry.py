@@ -136,7 +136,7 @@ class SimulatedOdometry(Odometry):
             c, s = math.cos(middle), math.sin(middle)
             x += (c * vx - s * vy) * seconds
             y += (s * vx + c * vy) * seconds
-            way += math.hypot(vx, vy) * seconds
+            way += math.sqrt(vx * vx + vy * vy) * seconds
         if rate:
             yaw += rate * seconds
             if not -math.pi < yaw <= math.pi:
@@ -156,7 +156,7 @@ class SimulatedOdometry(Odometry):
 
 
 def _together(rows: Rows, parts: Sequence[tuple[SimulatedOdometry, Sense]]) -> SharedSense:
-    """Return a function that reckons for all robots, in one call of the kernel unless they drive sideways."""
+    """Return a function that reckons for all robots, in one call of the kernel."""
     tables = rows.table(HULLS, HULL_WIDTH), rows.table(IMUS, IMU_WIDTH), rows.table(TABLE, ODOMETRY_WIDTH)
     noises = rows.table(NOISES, NOISE_WIDTH)
     return rows.sense(
