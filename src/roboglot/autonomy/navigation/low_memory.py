@@ -62,10 +62,9 @@ class LowMemory:
             self._latest = stamp
         return found
 
-    @property
-    def has_seen(self) -> bool:
-        """True if there was a low obstacle since the start."""
-        return self._latest > -math.inf
+    def kept(self, grid: EvidenceGrid) -> list[NDArray[np.float32]]:
+        """Return ``seen`` in a list, which is empty before the first sighting."""
+        return [self.seen(grid)] if self._latest > -math.inf else []
 
     def seen(self, grid: EvidenceGrid) -> NDArray[np.float32]:
         """Return the time (s) of the last sighting in each of the map's cells; 0: never."""

@@ -296,9 +296,7 @@ class Planner:
         if not places:
             return
         grid = self._belief.map
-        frame, memories = GridFrame(grid.corner, grid.evidence.shape), [self._scans.seen(grid)]
-        if self._low.has_seen:
-            memories.append(self._low.seen(grid))
+        frame, memories = GridFrame(grid.corner, grid.evidence.shape), [self._scans.seen(grid), *self._low.kept(grid)]
         for window in (frame.around((place,), MOVING_REACH) for place in places):
             for seen in memories:
                 np.minimum(seen[window], np.float32(until), out=seen[window])
