@@ -33,7 +33,6 @@ class Lookout:
         self._traffic = course.traffic
         self._narrow, self._low = NarrowWatch(planner.radius), LowSight(course.robot)
         self._scan_at = -math.inf
-        self._seen = np.empty((0, 2))  # echoes and obstacles of the newest scan, in map
         self.follower: Follower | None = None
         self.blocked, self.blocked_at = False, -math.inf
         self.blocked_place = Point()  # in map; of the obstacle that blocks the way
@@ -79,16 +78,17 @@ class Lookout:
         self._traffic.observe(points, pose, event.stamp)
         self._planner.forget_soon(self._traffic.moving, event.stamp)
         self._planner.forget(self._traffic.far(pose))
-        self._seen = points
         if self.follower:
-            self.look_ahead(self.follower, pose)
+            beside = self._planner.low_around(pose, self._tuning.horizon, event.stamp)
+            self._look_ahead(self.follower, pose, points, beside)
             if (width := self._narrow.entered(scan.points)) is not None:
                 self._robot.events.publish(CorridorEntered(stamp=event.stamp, action=self._action, width=width))
 
-    def look_ahead(self, follower: Follower, pose: Pose) -> None:
-        """Find obstacles on the route among the points of the newest scan and those remembered as cells."""
-        tuning, planner, seen, aim = self._tuning, self._planner, self._seen, follower.carrot()
-        remembered = planner.low_around(pose, tuning.horizon, self._scan_at)
+    def _look_ahead(
+        self, follower: Follower, pose: Pose, seen: NDArray[np.float64], remembered: NDArray[np.float64]
+    ) -> None:
+        """Find obstacles on the route among the points ``seen`` now and ``remembered`` as cells (map)."""
+        tuning, planner, aim = self._tuning, self._planner, follower.carrot()
         path = follower.route.ahead(pose, *aim, tuning.horizon)
         points = np.concatenate((seen, remembered)) if len(remembered) else seen
         tight = planner.free_way(path, points, pose, tuning.slow_margin)

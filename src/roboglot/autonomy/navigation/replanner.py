@@ -169,8 +169,9 @@ class Replanner:
         self._count(detour, around=lookout.blocked and route.length > follower.left + tuning.around)
         self._first += follower.passed
         follower.take(route)
+        if lookout.blocked:
+            follower.stop_at = follower.along  # until the next scan shows whether this route is free
         lookout.blocked = False
-        lookout.look_ahead(follower, pose)  # the next scan may be a tenth of a second away
         return True
 
     def _leaves(self, follower: Follower) -> float:
