@@ -40,21 +40,24 @@ async function pack(name) {
 }
 
 // Stored as it is sent, which is a third as large. What is there stays if it holds the same: releases of zlib differ.
-async function packed(name) {
-  const bundle = Buffer.from(await pack(name));
-  const there = await readFile(join(TARGET, `${name}.mjs.gz`)).catch(() => null);
+async function packed(folder, name, code) {
+  const bundle = Buffer.from(code);
+  const there = await readFile(join(folder, `${name}.mjs.gz`)).catch(() => null);
   return there && !Buffer.compare(gunzipSync(there), bundle) ? there : gzipSync(bundle, { level: 9 });
 }
 
 async function licences(packages) {
-  const texts = [];
+  const texts = new Map();
   for (const name of packages) {
     const folder = join(here, "node_modules", name);
     const { version } = JSON.parse(await readFile(join(folder, "package.json"), "utf-8"));
     const file = (await readdir(folder)).find((entry) => /^licen[cs]e/i.test(entry));
-    if (file) texts.push(`${name} ${version}\n\n${await readFile(join(folder, file), "utf-8")}`);
+    if (!file) continue;
+    const text = await readFile(join(folder, file), "utf-8"); // many packages have the same
+    texts.set(text, [...(texts.get(text) ?? []), `${name} ${version}`]);
   }
-  return Buffer.from(texts.join("\n\n----------------------------------------\n\n"));
+  const sections = [...texts].map(([text, names]) => `${names.join("\n")}\n\n${text}`);
+  return Buffer.from(sections.join("\n\n----------------------------------------\n\n"));
 }
 
 async function packagesOf(scopes) {
@@ -66,7 +69,8 @@ async function packagesOf(scopes) {
 }
 
 async function files() {
-  const found = { "blockly.mjs.gz": await packed("blockly"), "codemirror.mjs.gz": await packed("codemirror") };
+  const found = {};
+  for (const name of ["blockly", "codemirror"]) found[`${name}.mjs.gz`] = await packed(TARGET, name, await pack(name));
   found["blockly.LICENSE"] = await licences(["blockly"]);
   found["codemirror.LICENSE"] = await licences(await packagesOf(["@codemirror", "@lezer", "@marijn"]));
   for (const name of MEDIA) found[`media/${name}`] = await readFile(join(here, "node_modules/blockly/media", name));
@@ -85,7 +89,7 @@ async function axe() {
 async function plots() {
   const { code } = await transform(await readFile(join(here, "node_modules/uplot/dist/uPlot.esm.js"), "utf-8"),
     { minify: true, format: "esm", target: "es2022", charset: "utf8" });
-  return { "uplot.mjs": Buffer.from(code) };
+  return { "uplot.mjs.gz": await packed(CONSOLE, "uplot", code) };
 }
 
 const checking = process.argv.includes("--check");

@@ -138,7 +138,8 @@ async def test_thirty_targets_get_thirty_feedbacks(phone: Phone) -> None:
     phone.app.slowness = 0.02
     await phone.ask("delete", *(f"t{number}" for number in range(30)))
     await until(lambda: len(phone.answers("delete")) == 30)
-    assert [answer["target_id"] for answer in phone.answers("delete")] == [f"t{number}" for number in range(30)]
+    targets = sorted(answer["target_id"] for answer in phone.answers("delete"))  # several are in flight at a time
+    assert targets == sorted(f"t{number}" for number in range(30))
 
 
 async def test_list_too_large_for_message_comes_in_parts(phone: Phone) -> None:
