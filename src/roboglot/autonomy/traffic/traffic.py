@@ -43,6 +43,7 @@ SAME = 0.6  # m between the sighting and the announcement of the same robot
 BEFORE_NARROW = 0.6  # m in front of a narrow place where the robot waits: one that comes out has room to turn
 FACING = 0.27 + 0.5  # m between a hull and the centre of the object in front of it
 AROUND = 4.0  # m within which other robots may be the obstacle
+CAME = 1.0  # m from its first place from which a thing has moved: more than any is wide
 PARKED = 60.0  # s after its last motion for which what moved, still in sight, does not become part of the map
 LIVELY = 8.0  # s after its last motion for which a robot counts as under way
 FAR = 3.0  # m at which such robots will have left before the robot arrives
@@ -287,8 +288,11 @@ class Traffic:
 
 
 def _is_passing(mover: Mover, grid: EvidenceGrid, stamp: float) -> bool:
-    """True if a thing on free floor has moved while it was in sight: it is a robot or a person, no furniture."""
-    if stamp - mover.moved_at > PARKED:
+    """True if a thing on free floor came from elsewhere while it was in sight: a robot or a person, no furniture.
+
+    What shows another side of itself to a robot that drives around it seems to move, too, but not as far.
+    """
+    if stamp - mover.moved_at > PARKED or mover.came < CAME:
         return False
     row = math.floor(mover.y / RESOLUTION) - grid.first_row
     column = math.floor(mover.x / RESOLUTION) - grid.first_column
