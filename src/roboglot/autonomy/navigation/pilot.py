@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner
     from roboglot.autonomy.navigation.route import Route
 
-FIRST_ROUTE_PERIOD = 0.5  # s between two attempts to find any route
+FIRST_ROUTE_PERIOD = 1.0  # s between two attempts to find any route
 WAITING_SPEED = 0.05  # m/s below which a robot in front of an obstacle counts as waiting
 CRUISE_SHARE = 0.7  # of the top speed that a long drive averages
 
