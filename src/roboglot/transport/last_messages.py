@@ -2,8 +2,8 @@
 
 A streaming handler of ``grpc.aio`` writes its messages, and when it returns, gRPC sends the status: two batches, and
 after each a wake-up of gRPC's thread, of the loop and of the client. Most streams have one message. Sent with its
-status, as gRPC itself does in a call without a stream, it takes two thirds of the processor time; the frames on the
-wire are the same.
+status, as gRPC itself does in a call without a stream, a bare echo takes about a tenth less processor time; the frames
+on the wire are the same.
 """
 
 from __future__ import annotations
