@@ -299,3 +299,34 @@ async def test_without_the_key_nothing_beats(
         else:
             assert (await read_frame(reader)).kind is kind
     writer.transport.abort()
+
+
+async def test_a_gateway_that_closes_ends_handshakes(gateway: tuple[Runtime, str]) -> None:
+    runtime, _ = gateway
+    assert runtime._gateway is not None
+    reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port)
+    while not runtime._gateway._transports:  # noqa: ASYNC110 - until it is accepted
+        await asyncio.sleep(0.01)
+    await runtime._gateway.close()
+    with contextlib.suppress(ConnectionError):
+        assert await asyncio.wait_for(reader.read(), 5.0) == b""
+    writer.close()
+
+
+async def test_a_connector_that_is_stopped_ends_its_handshake(tmp_path: Path) -> None:
+    called: asyncio.Future[asyncio.StreamReader] = asyncio.get_running_loop().create_future()
+    writers: list[asyncio.StreamWriter] = []
+
+    def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:  # with nothing
+        writers.append(writer)
+        called.set_result(reader)
+
+    async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        link = Connector("127.0.0.1", port, "a", "token", HERE, KnownGateways(tmp_path / "gateways.json"))
+        running = asyncio.ensure_future(link.run(lambda *_: None))
+        reader = await called
+        running.cancel()
+        with contextlib.suppress(ConnectionError):
+            await asyncio.wait_for(reader.read(), 5.0)
+        writers[0].close()

@@ -119,8 +119,12 @@ class Connector:
         context.minimum_version = ssl.TLSVersion.TLSv1_3
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is checked instead
         loop = asyncio.get_running_loop()
-        _, call = await loop.create_connection(lambda: TlsCall(made, context), self._gateway, self._port)
-        return cast(TunnelLink, await call.over)
+        transport, call = await loop.create_connection(lambda: TlsCall(made, context), self._gateway, self._port)
+        try:
+            return cast(TunnelLink, await call.over)
+        except asyncio.CancelledError:
+            transport.abort()
+            raise
 
     def _check(self, link: TunnelLink) -> tuple[str, bool]:
         """Return the gateway's fingerprint, and whether it is new here. Raises NotTrusted."""

@@ -91,6 +91,7 @@ class Gateway:
         self._server: asyncio.Server | None = None
         self._addresses: dict[str, str] = {}  # identity by the tunnel's address
         self._connections = Connections(CONNECTIONS_MAX)
+        self._transports: set[asyncio.Transport] = set()  # also of those that still shake hands
         self._sessions: set[asyncio.Task[None]] = set()
         self._tunnels: dict[str, Tunnel] = {}  # by the key of their heartbeats
 
@@ -104,7 +105,7 @@ class Gateway:
 
         loop = asyncio.get_running_loop()
         self._server = await loop.create_server(
-            lambda: _Entry(self._guard, self._connections, encrypted), self._host, self.port
+            lambda: _Entry(self._guard, self._connections, self._transports, encrypted), self._host, self.port
         )
         self.port = self._server.sockets[0].getsockname()[1]
 
@@ -123,12 +124,14 @@ class Gateway:
         return hashlib.sha256(ssl.PEM_cert_to_DER_cert(_first(self._tls[0].read_text()))).hexdigest()
 
     async def close(self) -> None:
-        """End all tunnels."""
+        """End all tunnels and connections."""
         if self._server is not None:
             self._server.close()
         for session in self._sessions:
             session.cancel()
         await asyncio.gather(*self._sessions, return_exceptions=True)
+        for transport in tuple(self._transports):
+            transport.abort()
 
     def _begin(self, link: TunnelLink) -> None:
         session = asyncio.get_running_loop().create_task(self._receive(link), name="tunnel")
@@ -216,20 +219,32 @@ class Gateway:
 
 
 class _Entry(asyncio.Protocol):
-    """Meter before the gateway's TLS: counts connections and bytes by host."""
+    """Meter before the gateway's TLS: counts connections and bytes by host. ``opened``: the transports of all."""
 
-    def __init__(self, guard: Guard, connections: Connections, factory: Callable[[], asyncio.Protocol]) -> None:
-        self._guard, self._connections, self._factory = guard, connections, factory
+    def __init__(
+        self,
+        guard: Guard,
+        connections: Connections,
+        opened: set[asyncio.Transport],
+        factory: Callable[[], asyncio.Protocol],
+    ) -> None:
+        self._guard, self._connections, self._opened, self._factory = guard, connections, opened, factory
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+    def connection_made(self, made: asyncio.BaseTransport) -> None:
+        transport = cast(asyncio.Transport, made)
         host = (transport.get_extra_info("peername") or ("",))[0]
         if not self._connections.enter(host, self._guard.config.connections):
             seldom.warning(host, "gateway: %s turned away, it has %d connections", host, self._connections.of(host))
-            cast(asyncio.Transport, transport).abort()
+            transport.abort()
             return
-        spend = partial(self._guard.bytes.spend, f"tunnel from {host}")
-        inner = Metered(self._factory(), spend, partial(self._connections.leave, host))
-        cast(asyncio.Transport, transport).set_protocol(inner)
+        self._opened.add(transport)
+
+        def left() -> None:
+            self._connections.leave(host)
+            self._opened.discard(transport)
+
+        inner = Metered(self._factory(), partial(self._guard.bytes.spend, f"tunnel from {host}"), left)
+        transport.set_protocol(inner)
         inner.connection_made(transport)
 
 
