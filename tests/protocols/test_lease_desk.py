@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from roboglot.cli.control.lease import _ask, command, in_words
+from roboglot.cli.control import running
+from roboglot.cli.control.lease import command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.hosting.local_socket import CALLERS_MAX, LINE_MAX
 from roboglot.model.client_context import asking_for
@@ -39,6 +40,10 @@ from roboglot.wire.slamware.chapters.motion import AngleOptions
 
 pytestmark = pytest.mark.world("empty")
 ADDRESS = free_addresses(1)
+
+
+async def _ask(path: Path, request: Request) -> Answer:
+    return await running.exchange(path, request, Answer, 10.0)
 
 
 @pytest.fixture
@@ -116,10 +121,10 @@ def test_the_command_says_when_no_one_is_there(tmp_path: Path) -> None:
 
 
 def test_command_says_when_there_is_no_such_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def answer(path: Path, wish: Request) -> Answer:
+    def answer(name: str, request: Request, data: Path | None) -> Answer:
         return Answer([Control("a", "", "", 0.0, "", "", "")])
 
-    monkeypatch.setattr("roboglot.cli.control.lease._ask", answer)
+    monkeypatch.setattr("roboglot.cli.control.lease.wish", answer)
     command("a", data=tmp_path)
     with pytest.raises(SystemExit, match="there is no robot 'b'; there are a"):
         command("b", data=tmp_path)

@@ -15,7 +15,8 @@ from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from mcap.reader import make_reader
 
 from roboglot import runtime
-from roboglot.cli.recordings.record import _exchange, _show
+from roboglot.cli.control import running
+from roboglot.cli.recordings.record import _show
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.health import FaultLevel, Health
@@ -40,6 +41,10 @@ def config(data: Path, record: RecordConfig) -> Config:
     return dataclasses.replace(
         base, robots=(RobotConfig("a", "universal", ADDRESS),), record=record, console=ConsoleConfig(enabled=False)
     )
+
+
+async def ask(desk: Path, request: Request) -> Answer:
+    return await running.exchange(desk, request, Answer, 30.0)
 
 
 def size(path: str) -> int:
@@ -90,23 +95,23 @@ async def test_recording_is_started_marked_and_ended_from_outside(tmp_path: Path
     started = Runtime(config(tmp_path / "data", RecordConfig()))
     await started.start()
     desk = tmp_path / "data" / NAME
-    assert not (await _exchange(desk, Request())).on
-    assert "no recording is under way" in (await _exchange(desk, Request("mark", "x"))).error
-    assert "no recording is under way" in (await _exchange(desk, Request("stop"))).error
-    refused = await _exchange(desk, Request("start", "/proc/nowhere/x.mcap"))
+    assert not (await ask(desk, Request())).on
+    assert "no recording is under way" in (await ask(desk, Request("mark", "x"))).error
+    assert "no recording is under way" in (await ask(desk, Request("stop"))).error
+    refused = await ask(desk, Request("start", "/proc/nowhere/x.mcap"))
     assert "cannot be written" in refused.error
-    assert (await _exchange(desk, Request("start", f"{tmp_path}/"))).on
-    assert "under way" in (await _exchange(desk, Request("start", f"{tmp_path}/"))).error
+    assert (await ask(desk, Request("start", f"{tmp_path}/"))).on
+    assert "under way" in (await ask(desk, Request("start", f"{tmp_path}/"))).error
     await advance(started, 1.0)
-    assert not (await _exchange(desk, Request("mark", "x"))).error
-    ended = await _exchange(desk, Request("stop"))
+    assert not (await ask(desk, Request("mark", "x"))).error
+    ended = await ask(desk, Request("stop"))
     assert not ended.on
     assert ended.entries > 20
     assert not started.fleet.robots["a"].tap.watched
     before = size(ended.path)
     await advance(started, 1.0)
     assert size(ended.path) == before
-    again = await _exchange(desk, Request("start", f"{tmp_path}/"))
+    again = await ask(desk, Request("start", f"{tmp_path}/"))
     assert again.path != ended.path
     await advance(started, 0.5)
     await started.close()

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import msgspec
 import typer
 
+from roboglot.cli.control import running
 from roboglot.config import default_data_folder
 from roboglot.extras import MissingExtra
 from roboglot.hosting.visible import visible
@@ -326,20 +327,9 @@ def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
 
 def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:
     """Return the fleet's answer; without one, or after a refusal, end the program with a sentence."""
-    from roboglot.hosting.local_socket import ask
     from roboglot.shards.wishes import SOCKET, Answer, Request
 
-    folder = _folder(data)
-    request = msgspec.json.encode(Request(verb, **wish))
-    try:
-        answer = msgspec.json.decode(asyncio.run(ask(folder / SOCKET, request, PATIENCE)), type=Answer)
-    except OSError as error:
-        sys.exit(f"roboglot fleet: no fleet is up in {folder}: {error.strerror or 'it takes too long'}")
-    except msgspec.DecodeError:
-        sys.exit(f"roboglot fleet: the fleet in {folder} is of another version")
-    if answer.error:
-        sys.exit(f"roboglot fleet: {answer.error}")
-    return answer
+    return running.request("fleet", _folder(data) / SOCKET, Request(verb, **wish), Answer, PATIENCE, "no fleet is up")
 
 
 def _print(answer: Answer) -> None:

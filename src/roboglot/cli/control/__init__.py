@@ -1,1 +1,1 @@
-"""Control of the robots of a running ``roboglot up``: lease, stop, reset."""
+"""Control of the robots of a running ``roboglot up``: lease, stop, reset. ``running.py`` asks any running program."""

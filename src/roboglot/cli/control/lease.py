@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
-import msgspec
 import typer
 
+from roboglot.cli.control import running
 from roboglot.config import default_data_folder
-from roboglot.hosting.local_socket import ask
 from roboglot.protocols.lease_desk import NAME, Answer, Control, Request
 
 PATIENCE = 10.0  # s to wait until the robot has braked
@@ -54,22 +52,7 @@ def command(
 def wish(command: str, request: Request, data: Path | None) -> Answer:
     """Return the answer of the running `roboglot up`; without one, end the program with a sentence."""
     folder = data or default_data_folder(os.environ)
-    try:
-        answer = asyncio.run(_ask(folder / NAME, request))
-    except OSError as error:
-        sys.exit(f"roboglot {command}: no `roboglot up` answers in {folder}: {error.strerror or 'it takes too long'}")
-    if answer.error:
-        sys.exit(f"roboglot {command}: {answer.error}")
-    return answer
-
-
-async def _ask(path: Path, wish: Request) -> Answer:
-    """Return the answer. Raises OSError; its subclass TimeoutError if the robot does not brake in time."""
-    line = await ask(path, msgspec.json.encode(wish), PATIENCE)
-    try:
-        return msgspec.json.decode(line, type=Answer)
-    except msgspec.DecodeError:
-        raise OSError(0, "it hung up") from None
+    return running.request(command, folder / NAME, request, Answer, PATIENCE)
 
 
 def in_words(control: Control) -> str:

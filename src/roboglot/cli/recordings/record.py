@@ -14,14 +14,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import msgspec
 import typer
 from typer.core import TyperGroup
 
+from roboglot.cli.control import running
 from roboglot.cli.recordings.reasons import in_words
 from roboglot.config import default_data_folder
 from roboglot.hosting.event_loop import run
-from roboglot.hosting.local_socket import ask
 from roboglot.protocols.record_desk import NAME, Answer, Request
 
 SWITCH = 0.0002  # s that the thread which writes keeps what passes waiting; Python's own 5 ms can be seen
@@ -190,18 +189,7 @@ def repair(
 
 def _ask(data: Path | None, wish: Request) -> Answer:
     folder = data or default_data_folder(os.environ)
-    try:
-        answer = asyncio.run(_exchange(folder / NAME, wish))
-    except OSError as error:
-        sys.exit(f"roboglot record: no `roboglot up` answers in {folder}: {error.strerror or 'it takes too long'}")
-    if answer.error:
-        sys.exit(f"roboglot record: {answer.error}")
-    return answer
-
-
-async def _exchange(path: Path, wish: Request) -> Answer:
-    line = await ask(path, msgspec.json.encode(wish), PATIENCE)
-    return msgspec.json.decode(line, type=Answer)
+    return running.request("record", folder / NAME, wish, Answer, PATIENCE)
 
 
 def _show(answer: Answer) -> None:
