@@ -47,6 +47,7 @@ async def port(folder: Path, *, plain: bool = True, admit: bool = True) -> Async
     loop = asyncio.get_running_loop()
     server = await loop.create_server(lambda: TlsPort(Echo, tls, lambda _host: admit), "127.0.0.1", 0)
     trusting = ssl.create_default_context(cafile=str(folder / "apps" / "ca-cert.pem"))
+    trusting.verify_flags |= ssl.VERIFY_X509_STRICT  # the default since Python 3.13
     yield server.sockets[0].getsockname()[1], trusting
     server.close()
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import ssl
 import stat
-from datetime import UTC, datetime, tzinfo
+from datetime import UTC, datetime, timedelta, tzinfo
 from pathlib import Path
 
 import grpc
 import pytest
 from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import Encoding, load_pem_private_key
 from cryptography.x509.oid import NameOID
 
 from roboglot.protocols.cyberdog import certificates, signing
@@ -17,6 +22,8 @@ from roboglot.protocols.cyberdog.certificates import (
     BadCertificates,
     CertificateStore,
     ensure_certificates,
+    ensure_site,
+    export_app,
     export_client,
 )
 from roboglot.protocols.cyberdog.config import CyberDogConfig
@@ -56,6 +63,71 @@ def test_keys_are_private_and_ca_key_is_gone(tmp_path: Path) -> None:
         "client-key.pem": 0o600,
     }
     assert [path.name for path in tmp_path.iterdir()] == ["tls"]
+
+
+def handshake(server: ssl.SSLContext, client: ssl.SSLContext, host: str) -> None:
+    """Shake hands in memory, both verifying strictly, as Python does since 3.13. Raises ssl.SSLError."""
+    for context in (server, client):
+        context.verify_flags |= ssl.VERIFY_X509_STRICT
+    to_server, to_client = ssl.MemoryBIO(), ssl.MemoryBIO()
+    caller = client.wrap_bio(to_client, to_server, server_hostname=host)
+    answerer = server.wrap_bio(to_server, to_client, server_side=True)
+    for _ in range(3):
+        for end in (caller, answerer):
+            with contextlib.suppress(ssl.SSLWantReadError):
+                end.do_handshake()
+    caller.do_handshake()
+    answerer.do_handshake()
+
+
+def context(purpose: ssl.Purpose, trusted: Path, certificate: Path, key: Path) -> ssl.SSLContext:
+    made = ssl.create_default_context(purpose, cafile=str(trusted))
+    made.load_cert_chain(certificate, key)
+    made.verify_mode = ssl.CERT_REQUIRED
+    return made
+
+
+def test_strict_clients_and_servers_accept_all_certificates(tmp_path: Path) -> None:
+    ca, certificate, key = export_client(tmp_path / "data", tmp_path / "robots")
+    robot = context(
+        ssl.Purpose.CLIENT_AUTH, ca, *(tmp_path / "data" / "tls" / f"server-{end}.pem" for end in ("cert", "key"))
+    )
+    handshake(robot, context(ssl.Purpose.SERVER_AUTH, ca, certificate, key), "cyberdog2.server")
+
+    _, certificate, key = export_app(tmp_path / "data", "anna", tmp_path / "anna")
+    apps = tmp_path / "data" / "apps" / "ca-cert.pem"
+    robot.load_verify_locations(apps)
+    handshake(robot, context(ssl.Purpose.SERVER_AUTH, ca, certificate, key), "cyberdog2.server")
+
+    site = context(ssl.Purpose.CLIENT_AUTH, apps, *ensure_site(tmp_path / "data", {"127.0.0.1"}))
+    handshake(site, context(ssl.Purpose.SERVER_AUTH, apps, certificate, key), "127.0.0.1")
+
+
+def without_new_extensions(key: ec.EllipticCurvePrivateKey) -> bytes:
+    """Return the certificate of the apps' CA as 0.2 made it."""
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "roboglot apps")])
+    now = datetime.now(UTC)
+    builder = x509.CertificateBuilder(name, name, key.public_key(), 1, now, now + timedelta(days=90))
+    builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+    return builder.sign(key, hashes.SHA256()).public_bytes(Encoding.PEM)
+
+
+def test_old_ca_of_apps_is_renewed_and_clients_that_trust_it_go_on(tmp_path: Path) -> None:
+    ensure_site(tmp_path, {"127.0.0.1"})
+    apps = tmp_path / "apps" / "ca-cert.pem"
+    key = load_pem_private_key((tmp_path / "apps" / signing.CA_KEY).read_bytes(), password=None)
+    assert isinstance(key, ec.EllipticCurvePrivateKey)
+    old = tmp_path / "old.pem"
+    old.write_bytes(without_new_extensions(key))
+    apps.write_bytes(old.read_bytes())
+
+    _, certificate, own = export_app(tmp_path, "anna", tmp_path / "anna")
+    assert apps.read_bytes() != old.read_bytes()
+    site = context(ssl.Purpose.CLIENT_AUTH, apps, *ensure_site(tmp_path, {"127.0.0.1", "::1"}))
+    handshake(site, context(ssl.Purpose.SERVER_AUTH, apps, certificate, own), "127.0.0.1")
+    x509.load_pem_x509_certificate(certificate.read_bytes()).verify_directly_issued_by(
+        x509.load_pem_x509_certificate(old.read_bytes())
+    )
 
 
 def test_export_gives_a_client_what_it_needs(tmp_path: Path) -> None:

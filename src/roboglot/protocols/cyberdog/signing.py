@@ -4,7 +4,8 @@ The only file that needs cryptography's library, which is loaded when something 
 
 Real robots carry RSA-4096 keys; making three of those takes two to five seconds, a P-256 key takes none, and every
 TLS library that gRPC clients are built on accepts it. The CA's own key is thrown away when both certificates are
-signed: no further ones can be made.
+signed: no further ones can be made. They name usages and key identifiers as RFC 5280 asks, since Python 3.13 and later
+verify strictly.
 """
 
 from __future__ import annotations
@@ -88,6 +89,7 @@ def serves(path: Path, names: Collection[str]) -> bool:
     try:
         certificate = x509.load_pem_x509_certificate(path.read_bytes())
         listed = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+        certificate.extensions.get_extension_for_class(x509.AuthorityKeyIdentifier)  # those of 0.2 have none
     except (ValueError, x509.ExtensionNotFound):
         return False
     fresh = certificate.not_valid_after_utc > datetime.now(UTC) + timedelta(days=30)
@@ -95,17 +97,25 @@ def serves(path: Path, names: Collection[str]) -> bool:
 
 
 def _apps_ca(apps: Path) -> ec.EllipticCurvePrivateKey:
-    """Return the key that signs apps' certificates; made on first use."""
+    """Return the key that signs apps' certificates; made on first use, its certificate anew if clients reject it."""
     if not (apps / CA_KEY).exists():
         apps.mkdir(parents=True, exist_ok=True, mode=0o700)
-        issuer = ec.generate_private_key(ec.SECP256R1())
-        signed = _certificate(APPS_CA, issuer, APPS_CA, issuer)
-        write(apps / CA_KEY, _pem(issuer), private=True)
-        write(apps / CA_CERT, signed.public_bytes(Encoding.PEM))
+        write(apps / CA_KEY, _pem(ec.generate_private_key(ec.SECP256R1())), private=True)
     issuer_key = load_pem_private_key((apps / CA_KEY).read_bytes(), password=None)
     if not isinstance(issuer_key, ec.EllipticCurvePrivateKey):
         raise ValueError(f"{apps / CA_KEY} is no key of ours; remove {apps} to have new ones")
+    if not _is_strict(apps / CA_CERT):
+        write(apps / CA_CERT, _certificate(APPS_CA, issuer_key, APPS_CA, issuer_key).public_bytes(Encoding.PEM))
     return issuer_key
+
+
+def _is_strict(ca: Path) -> bool:
+    """Return whether the file is a CA's certificate that says what its key is for; those of 0.2 do not."""
+    try:
+        x509.load_pem_x509_certificate(ca.read_bytes()).extensions.get_extension_for_class(x509.KeyUsage)
+    except (FileNotFoundError, ValueError, x509.ExtensionNotFound):
+        return False
+    return True
 
 
 def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
@@ -123,23 +133,40 @@ def _certificate(
     """``name``'s certificate for ``hosts`` (its name, if none), signed by ``issuer``; its own if they are the same."""
     now = datetime.now(UTC)
     is_ca = name == issuer
+    public = key.public_key()
     builder = (
         x509.CertificateBuilder()
         .subject_name(_name(name))
         .issuer_name(_name(issuer))
-        .public_key(key.public_key())
+        .public_key(public)
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - SLOW_CLOCKS)
         .not_valid_after(now + VALID_FOR)
         .add_extension(x509.BasicConstraints(ca=is_ca, path_length=0 if is_ca else None), critical=True)
+        .add_extension(_usage(is_ca), critical=True)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(public), critical=False)
     )
     if not is_ca:
         # Libraries that ignore the common name look here; both ends are server and client.
         uses = [ExtendedKeyUsageOID.SERVER_AUTH, *(() if server_only else (ExtendedKeyUsageOID.CLIENT_AUTH,))]
         names = x509.SubjectAlternativeName([_general_name(host) for host in hosts or (name,)])
+        by = x509.AuthorityKeyIdentifier.from_issuer_public_key(issuer_key.public_key())
         builder = builder.add_extension(names, critical=False)
         builder = builder.add_extension(x509.ExtendedKeyUsage(uses), critical=False)
+        builder = builder.add_extension(by, critical=False)
     return builder.sign(issuer_key, hashes.SHA256())
+
+
+def _usage(is_ca: bool) -> x509.KeyUsage:
+    """Return what the key may do: sign certificates, or handshakes."""
+    others = ("content_commitment", "key_encipherment", "data_encipherment", "key_agreement", "encipher_only")
+    return x509.KeyUsage(
+        digital_signature=not is_ca,
+        key_cert_sign=is_ca,
+        crl_sign=is_ca,
+        decipher_only=False,
+        **dict.fromkeys(others, False),
+    )
 
 
 def _general_name(host: str) -> x509.GeneralName:
