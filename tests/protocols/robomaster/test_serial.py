@@ -1,6 +1,7 @@
 """The pseudo-terminal: what a program on a serial cable sees."""
 
 import asyncio
+import contextlib
 import os
 from pathlib import Path
 
@@ -12,15 +13,16 @@ from roboglot.protocols.robomaster.server import RoboMasterDoor
 from tests.protocols.robomaster.text_client import ADDRESS
 
 
-async def heard(line: int) -> str:
-    """Return the output after a moment."""
-    for _ in range(100):
+async def heard(line: int, lines: int = 1) -> str:
+    """Return the output of at least so many lines, or what there is after a while."""
+    text = ""
+    for _ in range(1000):
         await asyncio.sleep(0.005)
-        try:
-            return os.read(line, 4096).decode()
-        except BlockingIOError:
-            continue
-    return ""
+        with contextlib.suppress(BlockingIOError):
+            text += os.read(line, 4096).decode()
+        if text.count("\n") >= lines:
+            break
+    return text
 
 
 @pytest.mark.world("empty", body="robomaster_ep")
@@ -37,7 +39,7 @@ async def test_commands_answers_pushes_and_events_on_one_line(robot, world, forw
         os.write(line, b"robot mo")
         await asyncio.sleep(0.01)
         os.write(line, b"de ?;chassis push attitude on afreq 1;armor event hit on;")
-        assert await heard(line) == "chassis_lead ;\nok;\nok;\n"
+        assert await heard(line, 3) == "chassis_lead ;\nok;\nok;\n"
         for _ in range(3):
             os.write(line, b"robot mode ?;")
             assert await heard(line) == "chassis_lead ;\n"

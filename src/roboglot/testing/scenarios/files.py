@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -251,4 +252,7 @@ def schema() -> dict[str, object]:
     for name, verbs in (("Step", STEPS), ("Check", CHECKS)):
         made["$defs"][name]["oneOf"] = [{"required": [verb]} for verb in verbs]
     made["$defs"]["Scenario"]["properties"]["$schema"] = {"type": "string"}
+    for kind in made["$defs"].values():
+        if "description" in kind:  # a docstring, which Python indents before 3.13
+            kind["description"] = inspect.cleandoc(kind["description"])
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "roboglot scenario"} | made
