@@ -94,8 +94,9 @@ def test_a_flood_of_guesses_leaves_few_rows(attacked: tuple[ServedRobot, Path]) 
     robot, phone = attacked
     FLOODS["log-ins"](ADDRESS, COUNT, phone)
     request = urllib.request.Request(f"http://{ADDRESS}:1448/")
-    with pytest.raises(urllib.error.HTTPError, match="401"):
+    with pytest.raises(urllib.error.HTTPError, match="401") as refused:
         urllib.request.urlopen(request, timeout=60)
+    refused.value.close()
     assert sum(path.stat().st_size for path in robot.data.glob("audit.db*")) < 5_000_000
     log = robot.data.with_name(f"{robot.data.name}.log").read_text()
     assert log.count(HOSTILE) < 100

@@ -148,7 +148,8 @@ def rest(served: Served, x: float) -> tuple[int, str]:
         with urlopen(Request(address, json.dumps(wish).encode(), {"content-type": "application/json"})) as reply:
             return reply.status, reply.read().decode()
     except HTTPError as error:
-        return error.code, error.read().decode()
+        with error:
+            return error.code, error.read().decode()
 
 
 @pytest.mark.slow  # long; tests/console/test_live.py has two pages without a browser

@@ -62,7 +62,8 @@ def _fetch(request: Request) -> tuple[int, Any]:
         with urlopen(request, timeout=60) as reply:
             status, text = reply.status, reply.read().decode()
     except HTTPError as error:
-        status, text = error.code, error.read().decode()
+        with error:
+            status, text = error.code, error.read().decode()
     return status, json.loads(text) if text.startswith(("{", "[")) else text
 
 

@@ -33,7 +33,8 @@ def post(url: str, shows: dict[str, str]) -> tuple[int, dict[str, Any], str]:
         with urlopen(Request(f"{url}/api/sign_in", data=json.dumps(shows).encode()), timeout=60) as reply:
             return reply.status, json.loads(reply.read()), str(reply.headers["set-cookie"] or "").partition(";")[0]
     except HTTPError as error:
-        return error.code, json.loads(error.read()), ""
+        with error:
+            return error.code, json.loads(error.read()), ""
 
 
 async def signed(shown: Shown, **shows: str) -> tuple[int, dict[str, Any], str]:

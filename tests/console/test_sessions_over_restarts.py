@@ -97,7 +97,8 @@ def me(url: str, cookie: str) -> str:
             found: dict[str, Any] = json.loads(reply.read())
             return str(found["name"])
     except HTTPError as error:
-        return "" if error.code == 401 else str(error)
+        with error:
+            return "" if error.code == 401 else str(error)
 
 
 async def names(shown: Shown, *cookies: str) -> list[str]:

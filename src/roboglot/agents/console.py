@@ -48,7 +48,8 @@ class ConsoleClient:
             with urlopen(request, timeout=SECONDS) as reply:
                 data: bytes = reply.read(ANSWER_MAX + 1)
         except HTTPError as error:
-            raise Refused(_reason(error)) from None
+            with error:
+                raise Refused(_reason(error)) from None
         except (URLError, OSError) as error:
             why = getattr(error, "reason", error)
             raise Refused(f"no roboglot answers at {self._url}: {why}; start it with `roboglot up`") from None

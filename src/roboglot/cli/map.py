@@ -132,6 +132,7 @@ def _call(robot: str, method: str, path: str, body: bytes | None = None) -> byte
         with urllib.request.urlopen(request, timeout=ANSWER_SECONDS_MAX) as answer:
             return bytes(answer.read(MAP_BYTES_MAX + 1))
     except urllib.error.HTTPError as error:
-        raise ValueError(f"the robot answers {error.code} {error.reason}: {error.read(500).decode()}") from None
+        with error:
+            raise ValueError(f"the robot answers {error.code} {error.reason}: {error.read(500).decode()}") from None
     except urllib.error.URLError as error:
         raise OSError(f"{robot} does not answer: {error.reason}") from None

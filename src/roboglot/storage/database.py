@@ -178,9 +178,12 @@ class _Reader:
 
     def close(self) -> None:
         """Finish what is queued, then close the file."""
-        if self._connection is not None:
-            self.thread.submit(self._connection.close).result()
+        self.thread.submit(self._close).result()  # behind a first read, which opens it
         self.thread.shutdown()
+
+    def _close(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
 
 
 @contextlib.contextmanager
