@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
@@ -59,10 +61,9 @@ async def test_usual_realism_is_default_and_seeds_are_repeatable() -> None:
 
 
 def test_an_unknown_preset_is_refused_in_words() -> None:
-    with pytest.raises(BadFile, match="clean, usual, hard"):
-        build_fleet(
-            "empty", [RobotConfig(body="hermes+worse")], clock=LockstepClock(), seed=1, database=Database(":memory:")
-        )
+    robots = [RobotConfig(body="hermes+worse")]
+    with closing(Database(":memory:")) as database, pytest.raises(BadFile, match="clean, usual, hard"):
+        build_fleet("empty", robots, clock=LockstepClock(), seed=1, database=database)
 
 
 @pytest.mark.slow  # with usual sensors: tests/autonomy/navigation/test_navigation.py

@@ -7,7 +7,8 @@ import errno
 import os
 import signal
 import socket
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import closing
 
 import pytest
 import pytest_asyncio
@@ -44,8 +45,9 @@ class Counting(RealClock):
 
 
 @pytest.fixture
-def stores() -> Stores:
-    return program_stores(Database(":memory:"), "a")
+def stores() -> Iterator[Stores]:
+    with closing(Database(":memory:")) as database:
+        yield program_stores(database, "a")
 
 
 @pytest_asyncio.fixture(loop_scope="module")

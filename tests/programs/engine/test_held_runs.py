@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
 
 import pytest
@@ -40,11 +41,11 @@ class SlowJournals(DatabaseJournalStore):
 
 
 @pytest.fixture
-def stores() -> Stores:
-    database = Database(":memory:")
-    journals = SlowJournals(database, "a")
-    journals.ready = asyncio.Event()
-    return replace(program_stores(database, "a"), journals=journals)
+def stores() -> Iterator[Stores]:
+    with closing(Database(":memory:")) as database:
+        journals = SlowJournals(database, "a")
+        journals.ready = asyncio.Event()
+        yield replace(program_stores(database, "a"), journals=journals)
 
 
 @pytest_asyncio.fixture(loop_scope="module")

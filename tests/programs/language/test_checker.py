@@ -52,6 +52,13 @@ def test_syntax_is_explained(source: str, line: int, column: int | None, english
     assert not problem.chinese.startswith("语法错误")
 
 
+def test_what_python_suggests_is_passed_on() -> None:
+    """From Python 3.14 on, which recognizes misspelled keywords."""
+    problem = from_syntax_error("invalid syntax. Did you mean 'while'?", 1, 1)
+    assert problem.english == "This is not a valid statement; perhaps 'while' is meant."
+    assert "'while'" in problem.chinese
+
+
 @pytest.mark.parametrize(
     "source",
     [

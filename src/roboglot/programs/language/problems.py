@@ -152,6 +152,10 @@ null byte
 The program contains an invisible character that does not belong there.
 程序里有不可见的非法字符。
 
+^invalid syntax\. (?:Did you mean|Maybe you meant) '([^']+)'
+This is not a valid statement; perhaps '{0}' is meant.
+这里的写法不对，也许应该写成 '{0}'。
+
 ^invalid syntax$
 This is not a valid statement.
 这里的写法不对。
