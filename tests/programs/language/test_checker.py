@@ -12,7 +12,7 @@ from roboglot.programs.language import BUILTINS, Names, ProblemKind, check, comp
 from roboglot.programs.language.instrument import Marks
 from roboglot.programs.language.places import Places
 from roboglot.programs.language.policy import attribute_allowed
-from roboglot.programs.language.problems import _SYNTAX
+from roboglot.programs.language.problems import _SYNTAX, from_syntax_error
 from roboglot.programs.worker.environment import build_builtins
 
 MARKS = Marks([None], lambda _unit, _line: None)
@@ -41,6 +41,14 @@ NAMES = Names(
         ("def f(a, a): pass", 1, None, "appears twice"),
         ("x = [1 2]", 1, None, "comma"),
         ("2x = 1", 1, 1, "cannot begin with a digit"),
+        ("print(f'a } b')", 1, None, "a '}' of the text is written twice"),
+        ("print(f'{x!k}')", 1, None, "in the braces of this f-string"),
+        ("print(f'{x}", 1, None, "quote is missing"),
+        ("x = 1 if 2", 1, None, "needs an 'else'"),
+        ("x = {'a': 1, 'b'}", 1, None, "a key, a ':' and a value"),
+        ("def f(a=): pass", 1, None, "value is missing after '='"),
+        ("def f(a=1, b): pass", 1, None, "come after those without"),
+        ("print(a.b=1)", 1, None, "name of an argument"),
     ],
 )
 def test_syntax_is_explained(source: str, line: int, column: int | None, english: str) -> None:

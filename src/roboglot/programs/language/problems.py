@@ -48,7 +48,7 @@ closing parenthesis '(.)' does not match opening parenthesis '(.)'
 '{0}' cannot close '{1}': the brackets don't match.
 '{0}' 与前面的 '{1}' 不配对。
 
-unterminated (?:triple-quoted |[ft]-)?string
+unterminated (?:triple-quoted )?(?:[ft]-)?string
 The text in quotes does not end: a quote is missing.
 字符串缺少结束引号。
 
@@ -148,11 +148,51 @@ unexpected character after line continuation
 Nothing may follow the '\' at the end of a line.
 行末的 '\' 后面不能再有内容。
 
+f-string: single '(.)' is not allowed
+In an f-string, a '{0}' of the text is written twice.
+f 字符串里，文字中的 '{0}' 要写两遍。
+
+^[ft]-string
+What is in the braces of this f-string is not valid.
+f 字符串的花括号里写得不对。
+
+expected 'else' after 'if'
+An 'if' inside an expression needs an 'else'.
+表达式里的 'if' 后面缺少 'else'。
+
+dictionary key
+An entry of a dictionary is a key, a ':' and a value.
+字典的每一项由键、':' 和值组成。
+
+^'in' expected
+'for' needs an 'in' after its variables.
+'for' 的变量后面缺少 'in'。
+
+expected (?:default|argument) value
+A value is missing after '='.
+'=' 后面缺少值。
+
+(?:without a|non-)\s?default (?:argument )?follows
+Parameters with a default come after those without.
+带默认值的参数要写在不带默认值的后面。
+
+expression cannot contain assignment
+The name of an argument is no expression; to compare two values write '=='.
+参数名不能是表达式；比较两个值请用 '=='。
+
+xpected one or more names after '(\w+)'
+A name is missing after '{0}'.
+'{0}' 后面缺少名字。
+
+^expected (?:one of )?'([^']+)'
+A '{0}' is missing here.
+这里缺少 '{0}'。
+
 null byte
 The program contains an invisible character that does not belong there.
 程序里有不可见的非法字符。
 
-^invalid syntax\. (?:Did you mean|Maybe you meant) '([^']+)'
+^invalid syntax\.\s+(?:Did you mean|Maybe you meant) '([^']+)'
 This is not a valid statement; perhaps '{0}' is meant.
 这里的写法不对，也许应该写成 '{0}'。
 
