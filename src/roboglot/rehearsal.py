@@ -371,6 +371,6 @@ def scene_of(stage: Stage, robot: str, world: str, body: str, others: Sequence[s
     placed = {item.name: item for item in stage.robots}
     here = placed[robot]
     boxes = [(box.pose, box.size) for box in stage.obstacles if box.floor == here.floor]
-    boxes += [(placed[name].pose, (0.5, 0.5, 0.4)) for name in others if placed[name].floor == here.floor]
+    boxes += [(placed[name].pose, (0.35, 0.35, 0.4)) for name in others if placed[name].floor == here.floor]
     people = tuple((person.name, person.pose) for person in stage.people if person.floor == here.floor)
     return Scene(world=world, body=body, start=here.pose, boxes=tuple(boxes), people=people, longest=600.0)

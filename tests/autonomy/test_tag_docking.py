@@ -128,7 +128,7 @@ async def test_what_cannot_be_is_refused(tour):
 async def test_held_before_the_mark(tour):
     action = tour.robot[TagDocking].dock_at(MarkGoal(mark=Mark.BOARD, start=start(tour, 7.0, 2.0, -90)))
     await tour.until(lambda: action.feedback == "docking")
-    tour.world.faults.inject("blocked_path", "a", ahead=0.4)
+    tour.world.faults.inject("blocked_path", "a", ahead=0.4, width=0.2)
     await tour.end_of(action)
     assert isinstance(action.error, Blocked)
 

@@ -10,11 +10,21 @@ import pytest
 
 from roboglot.console.assets import FOLDER
 from roboglot.misfits import FORMS, KINDS, PYTHON
+from roboglot.simulation.world.truth import GAP, IN_THE_WAY
 from tests.console.server_sentences import sentences
 
 KNOWN: dict[str, str] = json.loads((FOLDER / "words" / "server.zh.json").read_text("utf-8"))
 SMALL = {"ahead", "behind", "in", "out "}  # words that fill a gap
-WORDS = {*KINDS.values(), *PYTHON.values(), "a fraction", "a key of {}", "the body", "the value"} - {"None"}
+WORDS = {
+    *KINDS.values(),
+    *PYTHON.values(),
+    "a fraction",
+    "a key of {}",
+    "the body",
+    "the value",
+    GAP,
+    *IN_THE_WAY.values(),
+} - {"None"}
 
 
 def test_each_sentence_of_the_server_has_its_chinese() -> None:

@@ -261,4 +261,4 @@ async def test_reset_puts_one_back_as_it_was(desk: Path, world: World, forward: 
     assert not world.hands.faults
     world.hands.place("a", start.compose(Pose(3.0, 0.0)))
     world.hands.place("b", start)
-    assert "another robot" in (await say(desk, b'{"do": "reset", "robot": "a"}\n'))["error"]
+    assert "b is in the way" in (await say(desk, b'{"do": "reset", "robot": "a"}\n'))["error"]

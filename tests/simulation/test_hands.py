@@ -4,6 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from roboglot.model.components.interaction.armor import Armor, PlatePlace
 from roboglot.model.components.interaction.blaster import Blaster
@@ -12,9 +13,12 @@ from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.components.motion.motion_status import MotionStatus
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.range_sensor import RangeSensors
-from roboglot.model.errors import Collided, NotFound
+from roboglot.model.errors import Collided, NotFound, Refused
 from roboglot.model.events import ArmorHit
 from roboglot.model.geometry import Pose, Twist, Vector3
+from roboglot.simulation.world.description import Box
+from roboglot.simulation.world.world_files import load_world
+from tests.narrowing import known
 
 DOCS = Path(__file__).parents[2] / "docs" / "worlds" / "worlds.md"
 
@@ -102,3 +106,76 @@ async def test_robot_put_elsewhere_has_its_weight(simulate):
     await sim.clock.advance(0.5)
     assert hull.support.sprung
     assert hull.rise == pytest.approx(0.0, abs=1e-3)
+
+
+PLACES = {  # in the office, for a universal of 0.25 m radius
+    "a wall": Pose(15.0, 0.1),
+    "furniture": Pose(4.0, 2.0),
+    "b": Pose(23.4, 8.9),
+    "person 0 0": None,
+}
+
+
+@pytest.mark.parametrize("what", PLACES)
+async def test_no_robot_is_put_into_anything(simulate, what):
+    sim = simulate("office", robots=("a", "b"))
+    world, before = sim.world, sim.pose
+    at = PLACES[what] or world.hands.person(what).pose
+    with pytest.raises(Refused, match=f"{what} is in the way"):
+        world.hands.place("a", at)
+    assert sim.pose == before
+
+
+async def test_robots_may_touch_walls_and_stand_below_boards(simulate):
+    sim = simulate(replace(load_world("empty"), floors=(under_a_board(),)), start=Pose(6.0, 5.0))
+    radius = sim.robot.description.radius
+    sim.world.hands.place("a", Pose(5.0, radius))
+    sim.world.hands.place("a", Pose(4.0, 5.0))  # the board is above it
+    sim.world.start()
+    await sim.clock.advance(2.0)
+    assert sim.pose.distance_to(Pose(4.0, 5.0)) < 0.01
+    assert sim.world.truth.height_of("a") == pytest.approx(0.0, abs=0.01)
+
+
+def under_a_board():
+    board = Box(at=(4.0, 5.0), size=(1.2, 1.2, 0.05), base=1.5)
+    return replace(load_world("empty").floors[0], furniture=(board,))
+
+
+@pytest.mark.parametrize("floor", [0, 1])
+async def test_no_robot_is_put_into_an_empty_shaft(simulate, floor):
+    sim = simulate("office")
+    middle = Pose(*known(sim.world.description.lift).at)
+    if floor == known(sim.world.description.lift).parked_at:
+        sim.world.hands.place("a", middle, floor)
+    else:
+        with pytest.raises(Refused, match="a gap in the floor is in the way"):
+            sim.world.hands.place("a", middle, floor)
+
+
+async def test_nothing_is_put_into_a_robot(simulate):
+    sim = simulate("empty", start=Pose(5.0, 5.0))
+    hands, there = sim.world.hands, Pose(5.2, 5.1)
+    box, name = hands.add_obstacle(Pose(8.0, 8.0)), hands.add_person(Pose(2.0, 2.0))
+    for put in (
+        lambda: hands.add_obstacle(there),
+        lambda: hands.move_obstacle(box, there, 0),
+        lambda: hands.add_person(there),
+        lambda: hands.person(name).place(5.2, 5.1),
+    ):
+        with pytest.raises(Refused, match="a stands there"):
+            put()
+    sim.world.start()
+    await sim.clock.advance(1.0)
+    assert sim.world.truth.height_of("a") == pytest.approx(0.0, abs=0.01)
+
+
+async def test_robot_goes_back_only_to_a_free_start(simulate):
+    sim = simulate("empty", start=Pose(5.0, 5.0))
+    sim.world.hands.place("a", Pose(8.0, 8.0))
+    box = sim.world.hands.add_obstacle(Pose(5.0, 5.0))
+    with pytest.raises(Refused, match="cannot go back to its start: furniture is in the way"):
+        sim.world.hands.reset("a")
+    sim.world.hands.remove_obstacle(box)
+    sim.world.hands.reset("a")
+    assert sim.pose.distance_to(Pose(5.0, 5.0)) < 0.01

@@ -28,9 +28,9 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
             with contextlib.suppress(Collided):
                 robot[Base].set_velocity(WAYS[(second + 2 * number) % len(WAYS)])
         if second == 7:
-            world.hands.place("a", Pose(4.0, 2.0, 1.0))
+            world.hands.place("a", Pose(4.0, 3.5, 1.0))
         if second == 9:
-            world.hands.add_obstacle(Pose(4.5, 2.4, 0.3), (0.4, 0.4, 0.5))
+            world.hands.add_obstacle(Pose(4.6, 4.2, 0.3), (0.4, 0.4, 0.5))
         if second == 12:
             there = world.truth.pose_of("b")
             world.hands.add_person(Pose(there.x + 0.5, there.y + 0.3))
@@ -94,6 +94,7 @@ async def test_robot_at_rest_feels_obstacles(simulate: Simulate, *, compiled: bo
     simulation.world.start()
     await simulation.clock.advance(1.0)
     assert simulation.world._physics._meetings.off
-    simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(0.25)), (0.2, 0.2, 0.5))
+    radius = simulation.robot.description.radius
+    simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(radius + 0.095)), (0.2, 0.2, 0.5))
     await simulation.clock.advance(0.04)
     assert simulation.world._physics.hulls["a"].touches

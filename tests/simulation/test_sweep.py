@@ -57,9 +57,12 @@ async def test_agrees_with_mujoco(simulate, request, name):
     sim.world.hands.add_obstacle(Pose(10, 10, 0.3), (1.0, 0.5, 0.6))
     chance, compared = np.random.default_rng(1), 0
     directions, hits, ids = np.zeros((360, 3)), np.empty(360), np.empty(360, np.int32)
-    for _ in range(60):
+    for _ in range(80):
         pose = Pose(chance.uniform(1, 29), chance.uniform(1, 14), chance.uniform(-3, 3))
-        sim.world.hands.place("a", pose, int(chance.integers(0, len(sim.world.description.floors))))
+        floor = int(chance.integers(0, len(sim.world.description.floors)))
+        if sim.world.truth.in_the_way("a", pose, floor):
+            continue
+        sim.world.hands.place("a", pose, floor)
         height = float(chance.uniform(0.1, 0.9))
         ranges = sim.world._environment.sight.turn(hull, height, 360, 12.0)
         mujoco.mj_forward(physics._model, physics._data)

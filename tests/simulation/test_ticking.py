@@ -58,7 +58,7 @@ def happen(world: World, step: int) -> None:
         40: lambda: hands.person(person).walk_to(8.0, 8.0, speed=1.9),
         45: lambda: hands.remove_person("eve"),
         50: lambda: hands.place("a", Pose(22.0, 10.0, 2.0)),
-        55: lambda: hands.add_obstacle(Pose(21.5, 10.5)),
+        55: lambda: hands.add_obstacle(Pose(21.3, 10.9)),
         60: lambda: put_apart(world),
         61: lambda: world.robot("a")[Gimbal].set_mode(FollowMode.CHASSIS_LEAD),
         65: lambda: turn(world, Twist(0.1, 0.0, 0.6)),

@@ -135,7 +135,7 @@ class StagePerson(ABC):
 
     @abstractmethod
     def place(self, x: float, y: float, facing: float = 0.0) -> None:
-        """Be there at once, looking to ``facing`` degrees, and stand."""
+        """Be there at once, looking to ``facing`` degrees, and stand. Raises Refused in a robot."""
 
 
 class Stage(ABC):
@@ -190,11 +190,14 @@ class Stage(ABC):
 
     @abstractmethod
     def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
-        """Lift a robot and put it elsewhere; its odometry does not notice. Raises ValueError off the floors."""
+        """Lift a robot and put it elsewhere; its odometry does not notice.
+
+        Raises ValueError off the floors, Refused where something stands or the floor has a gap.
+        """
 
     @abstractmethod
     def reset(self, name: str) -> None:
-        """Put a robot back where it started, charged as then, without its faults. Raises Refused if one stands there.
+        """Put a robot back where it started, charged as then, without its faults. Raises Refused if something is there.
 
         It keeps what it knows: like a robot that was carried, it has to find itself on its map.
         """
@@ -246,7 +249,10 @@ class Stage(ABC):
 
     @abstractmethod
     def add_person(self, pose: Pose, floor: int = 0, name: str = "") -> str:
-        """Put one more person there; return their name. Raises ValueError for a taken name, or too many."""
+        """Put one more person there; return their name.
+
+        Raises ValueError for a taken name or too many people, Refused in a robot.
+        """
 
     @abstractmethod
     def remove_person(self, name: str) -> None:
@@ -258,7 +264,7 @@ class Stage(ABC):
 
     @abstractmethod
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
-        """Have a box (x, y, z extent in m) stand there from now on; returns its number."""
+        """Have a box (x, y, z extent in m) stand there from now on; return its number. Raises Refused in a robot."""
 
     @abstractmethod
     def remove_obstacle(self, number: int) -> None:
@@ -266,7 +272,7 @@ class Stage(ABC):
 
     @abstractmethod
     def move_obstacle(self, number: int, pose: Pose, floor: int) -> None:
-        """Put a box elsewhere."""
+        """Put a box elsewhere. Raises Refused in a robot."""
 
     @abstractmethod
     def add_tag(

@@ -354,7 +354,8 @@ async def test_every_floor_of_shipped_worlds_can_be_drawn(name):
     robot = Robot("a", world.description_of("a"), LockstepClock())
     world.equip(robot)
     for floor in range(len(description.floors)):
-        world.hands.place("a", Pose(5.0, 5.0, 1.0), floor)
+        places = (Pose(5.0 + step, 5.0, 1.0) for step in range(10))
+        world.hands.place("a", next(at for at in places if not world.truth.in_the_way("a", at, floor)), floor)
         frame = await robot[Camera].capture()
         assert frame.luma.std() > 10
     world.close()
@@ -374,7 +375,7 @@ async def test_objects_left_out_would_not_be_in_picture(simulate, monkeypatch):
             for places in zip(*[iter(ring)] * 4, strict=False):
                 for name, (angle, away) in zip(names[1:], places, strict=True):
                     at = (5 + away * math.cos(turn * angle), 5 + away * math.sin(turn * angle))
-                    sim.world.hands.place(name, Pose(*at, 1.0))
+                    sim.world._population.hull(name).place(Pose(*at, 1.0), 0)  # even inside of each other
                 seen[cull].append((await sim.robot[Camera].capture()).planes.tobytes())
     assert seen[True] == seen[False]
     assert len(set(seen[True])) == 5  # the last ones show no person on either side

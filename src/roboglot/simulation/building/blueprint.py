@@ -16,6 +16,7 @@ from roboglot.simulation.world.description import (
     Floor,
     Lift,
     Material,
+    Person,
     Shelf,
     Spot,
     Wall,
@@ -210,3 +211,8 @@ def _shaft(lift: Lift, height: float, open_door: bool) -> Iterator[Solid]:
         yield box(deep / 2 + t / 2, side * (lift.door_width + jamb) / 2, t, jamb)
     if not open_door:
         yield box(deep / 2 + t / 2, 0, t, lift.door_width, SolidKind.LANDING_DOOR)
+
+
+def person_solid(person: Person, pose: Pose) -> Solid:
+    """Return a person who stands there."""
+    return Solid(SolidKind.PERSON, pose, (2 * person.radius, 2 * person.radius, person.height), round=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TypeVar
 
 import msgspec
@@ -10,6 +11,7 @@ import msgspec
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import Emotion, Gesture, Sport
 from roboglot.model.stage import StagePerson
+from roboglot.simulation.building.blueprint import Solid, person_solid
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.people.routine import (
     Clap,
@@ -29,11 +31,12 @@ S = TypeVar("S", bound=msgspec.Struct)
 class Actor(StagePerson):
     """One person. Orders are carried out one after the other; then the person stands, until ``resume``.
 
-    All methods raise ValueError for values that a world's file may not have.
+    All methods raise ValueError for values that a world's file may not have. ``check_clear`` raises Refused if a robot
+    stands where a solid is put on a floor.
     """
 
-    def __init__(self, walker: Walker) -> None:
-        self._walker = walker
+    def __init__(self, walker: Walker, check_clear: Callable[[Solid, int], None]) -> None:
+        self._walker, self._check_clear = walker, check_clear
 
     @property
     def pose(self) -> Pose:
@@ -91,8 +94,10 @@ class Actor(StagePerson):
     def place(self, x: float, y: float, facing: float = 0.0) -> None:
         if not all(map(math.isfinite, (x, y, facing))):
             raise ValueError("a place must have finite coordinates")
+        pose = Pose(x, y, math.radians(facing))
+        self._check_clear(person_solid(self._walker.person, pose), self._walker.floor)
         self._walker.drop()
-        self._walker.place(Pose(x, y, math.radians(facing)))
+        self._walker.place(pose)
 
     def _order(self, step: Step) -> None:
         self._walker.order(_checked(step))

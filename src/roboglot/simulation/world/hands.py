@@ -18,6 +18,7 @@ from roboglot.model.geometry import Point, Pose, Vector3
 from roboglot.model.perception import TagKind
 from roboglot.model.sound import Sound
 from roboglot.model.stage import ActiveFault, FaultKind, FloorPlan, HungTag, Obstacle, Placed, Stage
+from roboglot.simulation.building.blueprint import Solid, SolidKind, person_solid
 from roboglot.simulation.building.cards import Card, PrintedTag
 from roboglot.simulation.building.outline import plan_of
 from roboglot.simulation.components.energy.battery import SimulatedBattery
@@ -26,11 +27,13 @@ from roboglot.simulation.components.sensing.adapter import SimulatedSensorAdapte
 from roboglot.simulation.components.sensing.touch import SimulatedTouch
 from roboglot.simulation.people.stage_people import Actor
 from roboglot.simulation.sound.sound import Source
+from roboglot.simulation.world.description import Person
 from roboglot.simulation.world.description_checks import tag_problem
 from roboglot.simulation.world.environment import Environment
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
 from roboglot.simulation.world.saving import snapshot, world_toml
+from roboglot.simulation.world.truth import Truth
 
 if TYPE_CHECKING:
     from roboglot.simulation.faults.faults import Faults
@@ -97,6 +100,8 @@ class Hands(Stage):
         hull = self._population.hull(name)
         floor = hull.floor if floor is None else floor
         self._check_inside(pose, floor)
+        if obstacle := Truth(self._population, self._environment).in_the_way(name, pose, floor):
+            raise Refused(f"{name} cannot stand at ({pose.x:g}, {pose.y:g}) on floor {floor}: {obstacle} is in the way")
         hull.place(pose, floor)
         self._environment.sight.moved()
         if name in self._population.simulated:
@@ -104,10 +109,8 @@ class Hands(Stage):
 
     def reset(self, name: str) -> None:
         hull, (pose, floor) = self._population.hull(name), self._population.starts[name]
-        for other in self._population.hulls.values():
-            reach = other.body.hull.radius + hull.body.hull.radius
-            if other is not hull and other.floor == floor and other.pose.distance_to(pose) < reach:
-                raise Refused(f"another robot stands where {name} started")
+        if obstacle := Truth(self._population, self._environment).in_the_way(name, pose, floor):
+            raise Refused(f"{name} cannot go back to its start: {obstacle} is in the way")
         for fault in self._faults().active:
             if fault.robot == name:
                 self._faults().clear(fault.number)
@@ -151,10 +154,11 @@ class Hands(Stage):
         adapters.apply(adapter, port, voltage)
 
     def person(self, name: str) -> Actor:
-        return Actor(self._population.walker(name))
+        return Actor(self._population.walker(name), self._check_clear)
 
     def add_person(self, pose: Pose, floor: int = 0, name: str = "") -> str:
         self._check_inside(pose, floor)
+        self._check_clear(person_solid(Person(path=((pose.x, pose.y),)), pose), floor)
         name = self._population.add_walker(pose, floor, name).key
         self._environment.sight.moved()
         return name
@@ -170,6 +174,7 @@ class Hands(Stage):
         self._environment.things[name].put(np.array((position.x, position.y, position.z)))
 
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
+        self._check_clear(Solid(SolidKind.FURNITURE, pose, size), floor)
         return self._physics.add_obstacle(pose, size, floor)
 
     def remove_obstacle(self, number: int) -> None:
@@ -177,6 +182,8 @@ class Hands(Stage):
 
     def move_obstacle(self, number: int, pose: Pose, floor: int) -> None:
         self._check_inside(pose, floor)
+        if number in self._physics.obstacles:
+            self._check_clear(replace(self._physics.obstacles[number][1], pose=pose), floor)
         self._physics.move_obstacle(number, pose, floor)
 
     def add_tag(
@@ -231,3 +238,8 @@ class Hands(Stage):
     def _check_inside(self, pose: Pose, floor: int) -> None:
         if not Places(self._environment.description).inside(pose, floor):
             raise ValueError(f"floor {floor} of this world has no place ({pose.x:g}, {pose.y:g}, {pose.yaw:g})")
+
+    def _check_clear(self, solid: Solid, floor: int) -> None:
+        """Raise Refused if a robot stands where something is put: it would be pressed through the floor."""
+        if robot := Truth(self._population, self._environment).robot_in(solid, floor):
+            raise Refused(f"{robot} stands there")

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from roboglot.model.geometry import Pose
+from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.building.blueprint import Solid, SolidKind, person_solid, solids_of
+from roboglot.simulation.building.overlap import overlap
 from roboglot.simulation.building.things import Thing
 from roboglot.simulation.components.motion.gripper import SimulatedGripper
 from roboglot.simulation.world.beads import Landing
 from roboglot.simulation.world.environment import Environment
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
+
+TOUCH = 0.01  # m by which a robot that stands beside something may overlap it
+IN_THE_WAY = {kind: f"a {kind}" for kind in SolidKind} | {SolidKind.FURNITURE: "furniture"}
+GAP = "a gap in the floor"
 
 
 class Truth:
@@ -34,11 +41,40 @@ class Truth:
     def has_room(self, name: str, pose: Pose) -> bool:
         """Return whether a robot could stand there, on its floor, without touching a still solid or another robot."""
         hull = self._population.hull(name)
-        others = (h for h in self._population.hulls.values() if h is not hull and h.floor == hull.floor)
-        radius = hull.body.hull.radius
-        if any(other.pose.distance_to(pose) < radius + other.body.hull.radius for other in others):
-            return False
-        return Places(self._environment.description).free(pose, hull.floor, radius)
+        places = Places(self._environment.description)
+        return places.free(pose, hull.floor, hull.body.hull.radius) and not self.in_the_way(name, pose, hull.floor)
+
+    def in_the_way(self, name: str, pose: Pose, floor: int) -> str:
+        """Return what a robot would be inside of there: a name, or IN_THE_WAY; empty: nothing. Raises NotFound."""
+        hull = self._population.hull(name)
+        wanted = _solid(hull, pose)
+        for key, other in self._population.hulls.items():
+            if other is not hull and other.floor == floor and overlap(wanted, _solid(other, other.pose)):
+                return key
+        for walker in self._population.walkers:
+            if walker.floor == floor and overlap(wanted, person_solid(walker.person, walker.pose)):
+                return walker.key
+        for solid in self._solids(floor):
+            if overlap(wanted, solid):
+                return IN_THE_WAY[solid.kind]
+        elevation = self._population.physics.props.elevation(floor)
+        if self._environment.building.footing.missing(pose.x, pose.y, floor, elevation):
+            return GAP
+        return ""
+
+    def robot_in(self, solid: Solid, floor: int) -> str:
+        """Return the name of a robot that something put there would overlap; empty: none."""
+        hulls = self._population.hulls.items()
+        return next((key for key, hull in hulls if hull.floor == floor and overlap(_solid(hull, hull.pose), solid)), "")
+
+    def _solids(self, floor: int) -> Iterator[Solid]:
+        """Yield everything on a floor that a robot may bump into, but robots, people and small things."""
+        world = self._environment.description
+        # Docks and doors of the lift are props, as they move.
+        yield from (
+            s for s in solids_of(world.floors[floor], world.lift, lift_here=True) if s.kind is not SolidKind.DOCK
+        )
+        yield from self._population.physics.props.on(floor)
 
     @property
     def people(self) -> Sequence[tuple[int, Pose]]:
@@ -58,3 +94,9 @@ class Truth:
     def bead_landings(self) -> Sequence[Landing]:
         """Places where the last gel beads burst, the newest last."""
         return tuple(self._environment.beads.landed)
+
+
+def _solid(hull: Hull, pose: Pose) -> Solid:
+    """Return a robot's outline there; a little narrower, so that robots may touch things."""
+    low, top, width = hull.body.hull.clearance, hull.belly + hull.body.hull.torso_height, hull.body.hull.radius - TOUCH
+    return Solid(SolidKind.FURNITURE, pose, (2 * width, 2 * width, top - low), base=low, round=True)
