@@ -67,7 +67,8 @@ def test_address_moves_first_robot_of_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("worldx = 'office'", "worldx is not a setting"),
+        ("worldx = 'office'", r"^/.*\.toml: worldx is not a setting"),
+        ("[[robots]]\naddress = '300.1.1.1'", "robot a: 300.1.1.1 is not an address"),
         ("address = '127.0.0.5'", r"address is a setting of one robot: it stands below \[\[robots\]\]"),
         ("[slamware]\nprt = 1", r"slamware\.prt is not a setting"),
         ("[[robots]]\nnamex = 'a'", r"robots\.namex is not a setting"),

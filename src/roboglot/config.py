@@ -201,6 +201,15 @@ class Config:
         return tuple(robot for robot in self.robots if not is_loopback(robot.address))
 
 
+def is_address(host: str) -> bool:
+    """Return True for an IP address, False for a name."""
+    try:
+        ip_address(host)
+    except ValueError:
+        return False
+    return True
+
+
 def is_loopback(host: str) -> bool:
     """Return True if ``host`` can only be this machine: 127.0.0.0/8, ::1, localhost and names below it."""
     try:
@@ -246,7 +255,9 @@ def load_config(
     """
     try:
         values: dict[str, object] = tomllib.loads(path.read_text(encoding="utf-8")) if path else {}
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from None
+    except ValueError as error:  # bad TOML, or not UTF-8
         raise ValueError(f"{path}: {error}") from None
     return config_of(values, overrides, doors, origin=str(path or "configuration"))
 
@@ -260,7 +271,10 @@ def config_of(
 ) -> Config:
     """Return the configuration with a file's values; ``origin`` is for errors. Raises ValueError with the key."""
     values = dict(values)
-    _refuse_unknown(values, Config, "", doors)
+    try:
+        _refuse_unknown(values, Config, "", doors)
+    except ValueError as error:
+        raise ValueError(f"{origin}: {error}") from None
     if isinstance(values.get("access"), dict):
         values["access"] = {"on": True} | values["access"]
         if isinstance(values["access"].get("tls"), dict):
@@ -343,6 +357,8 @@ def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
     filled: list[RobotConfig] = []
     for robot in robots:
         address = robot.address or (str(IPv4Address(filled[-1].address) + 1) if filled else "127.0.0.1")
+        if address.replace(".", "").isdigit() and not is_address(address):
+            raise ValueError(f"robot {robot.name}: {address} is not an address")
         filled.append(dataclasses.replace(robot, address=address))
     urls = [r.body for r in filled if r.is_real]  # one owner per connection
     for what, values in (("name", [r.name for r in filled]), ("address", [r.address for r in filled]), ("URL", urls)):

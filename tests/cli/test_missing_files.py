@@ -1,4 +1,4 @@
-"""Commands for recordings name a file that is not there, in plain words."""
+"""Commands name a file that is not there, in plain words."""
 
 from __future__ import annotations
 
@@ -17,9 +17,13 @@ import pytest
         ("replay", "no.mcap", "--against", "slamware://127.0.0.1"),
         ("compare", "no.mcap", "other.mcap"),
         ("rerun", "no.mcap"),
+        ("program", "run", "no.mcap"),
+        ("up", "--config", "no.mcap"),
+        ("test", "no.mcap"),
+        ("map", "build", "no.mcap", "--out", "new.yaml"),
     ],
 )
-def test_missing_recording_is_named(words: tuple[str, ...], tmp_path: Path) -> None:
+def test_missing_file_is_named(words: tuple[str, ...], tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "roboglot", *words],
         cwd=tmp_path,

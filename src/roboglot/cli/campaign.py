@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboglot.extras import MissingExtra
+from roboglot.hosting.reasons import in_words
 from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
@@ -56,14 +57,14 @@ def command(
         trials = list(trials_of(found, folder, range(first_seed, first_seed + seeds)))
         left = [trial for trial in trials if not table.done(trial)]
     except (files.BadScenario, OtherCampaign, OSError) as bad:
-        print(f"roboglot campaign: {visible(str(bad))}", file=sys.stderr)
+        print(f"roboglot campaign: {visible(in_words(bad))}", file=sys.stderr)
         raise typer.Exit(2) from None
     if len(left) < len(trials):
         print(f"{len(trials) - len(left)} of {len(trials)} trials are in {table.path} already")
     try:
         interrupted = _play(left, table, _player(on, [each.path.parent for each in found], workers, longest))
     except (MissingExtra, OSError, ValueError) as bad:
-        print(f"roboglot campaign: {visible(str(bad))}", file=sys.stderr)
+        print(f"roboglot campaign: {visible(in_words(bad))}", file=sys.stderr)
         raise typer.Exit(2) from None
     _write(table, folder, len(trials))
     if interrupted:

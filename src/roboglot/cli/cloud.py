@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboglot.hosting.logs import set_up_logging
+from roboglot.hosting.reasons import in_words
 
 if TYPE_CHECKING:
     from roboglot.storage.cloud import CloudStore
@@ -45,7 +46,7 @@ def command(
     try:
         opened = open_database(data, database)
     except (OSError, ValueError, sqlite3.Error) as error:
-        sys.exit(f"roboglot cloud: {'the database' if database else data} can't be used: {error}")
+        sys.exit(f"roboglot cloud: {'the database' if database else data} can't be used: {in_words(error)}")
     store = CloudStore(opened)
     try:
         if account:

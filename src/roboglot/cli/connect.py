@@ -21,6 +21,7 @@ from roboglot.access.tunnel.dialling import Dialling, OnePlace, Place, Places, U
 from roboglot.config import ROBOTS_MAX, is_loopback
 from roboglot.hosting.event_loop import run
 from roboglot.hosting.logs import set_up_logging
+from roboglot.hosting.reasons import in_words
 from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def command(
         names = robot or ["a"]
         places = addresses(len(names), address, address_range)
     except (OSError, ValueError) as error:
-        sys.exit(f"roboglot connect: {error}")
+        sys.exit(f"roboglot connect: {in_words(error)}")
     if not token.strip():
         sys.exit("roboglot connect: a token is needed: --token-file FILE, or ROBOGLOT_TOKEN")
     for place in places:
@@ -70,7 +71,7 @@ def command(
     except KeyboardInterrupt:
         sys.exit(130)
     except (NotTrusted, Refused, Unusable, OSError, ValueError, sqlite3.Error) as refused:
-        sys.exit(f"roboglot connect: {refused}")
+        sys.exit(f"roboglot connect: {in_words(refused)}")
 
 
 def addresses(count: int, first: str, network: str) -> list[str]:

@@ -19,6 +19,7 @@ from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefu
 from roboglot.clients.cyberdog.values import Grid
 from roboglot.clients.errors import ClientError
 from roboglot.config import load_config
+from roboglot.hosting.reasons import in_words
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Feedback
 
@@ -51,11 +52,11 @@ def command(
     try:
         proof = None if plaintext else Certificates.load(certs or _own(data))
     except OSError as error:
-        sys.exit(f"roboglot cyberdog: no certificates: {error}; `roboglot certs --export DIR` writes them")
+        sys.exit(f"roboglot cyberdog: no certificates: {in_words(error)}; `roboglot certs --export DIR` writes them")
     try:
         asyncio.run(_at(CyberDogClient(robot, proof, app_port=app_port), WORK[what], words or []))
     except (ClientError, OSError, ValueError) as error:  # a TimeoutError has no text
-        sys.exit(f"roboglot cyberdog: {str(error) or 'nothing came in time'}")
+        sys.exit(f"roboglot cyberdog: {in_words(error) or 'nothing came in time'}")
     except KeyboardInterrupt:
         sys.exit(130)
 

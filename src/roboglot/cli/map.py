@@ -16,6 +16,7 @@ from msgspec.structs import astuple
 from roboglot.cli.maps.merge import merged
 from roboglot.cli.maps.ros_map import write_ros_map
 from roboglot.cli.maps.survey import RADIUS, first_pose, surveyed
+from roboglot.hosting.reasons import in_words
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
 from roboglot.simulation.world.world_files import load_world, read_ros_grid
@@ -92,7 +93,7 @@ def command(
                 write_ros_map(grid_in(data), ros_map)
             print(f"{file or robot} -> {ros_map}")
     except (ValueError, OSError) as error:  # BadMap, BadFile and the like carry plain messages
-        sys.exit(f"roboglot map: {error}")
+        sys.exit(f"roboglot map: {in_words(error)}")
 
 
 def _read(path: Path) -> bytes:

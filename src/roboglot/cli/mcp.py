@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from roboglot.hosting.reasons import in_words
+
 
 def command(
     console: Annotated[
@@ -25,7 +27,7 @@ def command(
     try:
         token = token_file.read_text() if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
     except OSError as error:
-        raise typer.BadParameter(str(error)) from None
+        raise typer.BadParameter(in_words(error)) from None
     server = make_server(ConsoleClient(console, token.strip()))
     if http is None:
         server.run("stdio")

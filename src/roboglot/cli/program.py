@@ -21,6 +21,7 @@ from roboglot.cli.stepping import Stepper
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.visual import TextLink
 from roboglot.config import RobotConfig
+from roboglot.hosting.reasons import in_words
 from roboglot.hosting.visible import visible
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.values import dataclass
@@ -93,8 +94,10 @@ def command(
     try:
         if file is not None and what in READING:
             source = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        sys.exit(f"roboglot program: {file}: {error}")
+    except OSError as error:
+        sys.exit(f"roboglot program: {in_words(error)}")
+    except UnicodeDecodeError:
+        sys.exit(f"roboglot program: {file} is not UTF-8 text")
     task = id or re.sub(r"\W", "_", file.stem if file else "", flags=re.ASCII)
     saving = {"mode": "cycle" if cycle else "single", "condition": when, "body": source}
     if interface:
@@ -107,7 +110,7 @@ def command(
             _at(place, Wish(what, task, saving, modules or bool(interface), as_json), _stops(breaks, step=step))
         )
     except (ClientError, Failure, ValueError, OSError) as error:
-        sys.exit(f"roboglot program: {visible(str(error))}" if str(error) else 1)
+        sys.exit(f"roboglot program: {visible(in_words(error))}" if str(error) else 1)
 
 
 def _refuse_misfits(what: What, *, interface: str, modules: bool, as_json: bool) -> None:

@@ -35,6 +35,8 @@ def request(
     """
     try:
         answer = asyncio.run(exchange(path, wish, kind, patience))
+    except (FileNotFoundError, ConnectionRefusedError):
+        sys.exit(f"roboglot {command}: {absent} in {path.parent}")
     except OSError as error:
         sys.exit(f"roboglot {command}: {absent} in {path.parent}: {error.strerror or 'it takes too long'}")
     except msgspec.DecodeError:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboglot.cli.recordings.reasons import in_words
+from roboglot.hosting.reasons import in_words
 
 if TYPE_CHECKING:
     from roboglot.model.tap import Exchange

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from roboglot.cli.recordings.reasons import in_words
 from roboglot.extras import explaining
+from roboglot.hosting.reasons import in_words
 from roboglot.hosting.visible import visible
 
 

@@ -18,9 +18,9 @@ import typer
 from typer.core import TyperGroup
 
 from roboglot.cli.control import running
-from roboglot.cli.recordings.reasons import in_words
 from roboglot.config import default_data_folder
 from roboglot.hosting.event_loop import run
+from roboglot.hosting.reasons import in_words
 from roboglot.protocols.record_desk import NAME, Answer, Request
 
 SWITCH = 0.0002  # s that the thread which writes keeps what passes waiting; Python's own 5 ms can be seen

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboglot.cli.recordings.reasons import in_words
+from roboglot.hosting.reasons import in_words
 from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:

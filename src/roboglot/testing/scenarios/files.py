@@ -215,7 +215,8 @@ def read(path: Path) -> Found:
         _check(scenario)
         scenario.given.wanted(path.parent)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
-        raise BadScenario(f"{path}: {' '.join(misfit(error).split())}") from None
+        why = error.strerror if isinstance(error, OSError) and error.strerror else misfit(error)
+        raise BadScenario(f"{path}: {' '.join(why.split())}") from None
     return Found(path, scenario)
 
 
