@@ -16,7 +16,6 @@ from ipaddress import IPv4Address, ip_address
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
-from zoneinfo import ZoneInfo
 
 import msgspec
 
@@ -312,8 +311,12 @@ def _section(name: str, kind: type, values: object, origin: str) -> object:
 
 def zone_of(name: str) -> tzinfo:
     """Return the time zone with this IANA name. Raises ValueError."""
+    if name == "UTC":
+        return UTC
+    from zoneinfo import ZoneInfo
+
     try:
-        return UTC if name == "UTC" else ZoneInfo(name)
+        return ZoneInfo(name)
     except (KeyError, ValueError, OSError):
         raise ValueError(f"there is no time zone {name!r} on this machine") from None
 

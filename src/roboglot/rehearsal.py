@@ -36,7 +36,7 @@ from roboglot.model.stage import Stage
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Call, Failed, Finished, Limits, Output
 from roboglot.programs.engine.run import Run
-from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.functions import ability_set
 from roboglot.programs.functions.results import refusal
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call as call_function

@@ -18,6 +18,7 @@ from roboglot.console.wire_log import rows
 from roboglot.model.admission import Forbidden
 from roboglot.model.client_context import ask_for
 from roboglot.operations import OperationTable, Right
+from roboglot.programs.functions import prelude  # noqa: F401 - it fills the table
 from roboglot.programs.functions import table as functions
 from roboglot.programs.functions.session import Session
 from roboglot.protocols.cyberdog.table import TABLE as DOG

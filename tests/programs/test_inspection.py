@@ -37,7 +37,7 @@ class Judge:
 
 
 def inspector(judge: Judge) -> Inspector:
-    return Inspector(cast(Engine, judge), ability_set())
+    return Inspector(cast(Engine, judge), ability_set)
 
 
 async def test_same_text_is_judged_once_for_all() -> None:

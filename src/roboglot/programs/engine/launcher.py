@@ -20,7 +20,7 @@ from typing import Literal
 
 import msgspec
 
-from roboglot.programs.worker.zygote import MESSAGE_MAX
+from roboglot.programs.worker.frames import CONTROL_MAX
 from roboglot.values import dataclass
 
 _BOOT = """
@@ -203,7 +203,7 @@ class Launcher:
     def _receive(self) -> None:
         while self._control is not None:
             try:
-                data, handles, _, _ = socket.recv_fds(self._control, MESSAGE_MAX, 1)
+                data, handles, _, _ = socket.recv_fds(self._control, CONTROL_MAX, 1)
             except (BlockingIOError, InterruptedError):
                 return
             except OSError:

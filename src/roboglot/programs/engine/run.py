@@ -40,7 +40,7 @@ from roboglot.programs.engine.shared_page import Page
 from roboglot.programs.engine.stopwatch import Stopwatch
 from roboglot.programs.engine.worker_socket import Wire
 from roboglot.programs.library.program import Program
-from roboglot.programs.worker.child import MESSAGE_MAX
+from roboglot.programs.worker.frames import ERROR_MAX
 
 SHORT_COST = 50e-6
 """Seconds of the server's thread charged for a short frame and its handling."""
@@ -230,7 +230,7 @@ class Run:
         reason = ExitReason.MEMORY if failed.type == "MemoryError" else ExitReason.ERROR
         unit, source = self.position.source_of(failed.unit, failed.line)
         line = failed.line if source else 0
-        self._finish(Failed(failed.type[:NAME_MAX], failed.message[:MESSAGE_MAX], line, source, reason, unit))
+        self._finish(Failed(failed.type[:NAME_MAX], failed.message[:ERROR_MAX], line, source, reason, unit))
 
     def _take_output(self, text: str) -> None:
         self._printed += len(text)

@@ -3,6 +3,18 @@
 Knows robots, no process.
 """
 
-from roboglot.programs.functions.prelude import ability_set, implemented
+from __future__ import annotations
 
-__all__ = ["ability_set", "implemented"]
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from roboglot.programs.worker.prelude import Prelude
+
+
+@cache
+def ability_set() -> Prelude:
+    """Return the prelude of every run; the functions are loaded at the first call, not while doors wait to open."""
+    from roboglot.programs.functions import prelude
+
+    return prelude.ability_set()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from roboglot.programs.engine.engine import (
     Engine,
@@ -25,14 +25,14 @@ Judgement = tuple[list[Problem], frozenset[str]]
 class Inspector:
     """Checks programs against ``prelude``; caches results, as a text is checked while typed, saved and run."""
 
-    def __init__(self, engine: Engine, prelude: Prelude) -> None:
+    def __init__(self, engine: Engine, prelude: Callable[[], Prelude]) -> None:
         self._engine = engine
         self._prelude = prelude
         self._judged: OrderedDict[tuple[str, frozenset[str]], asyncio.Future[Judgement]] = OrderedDict()
 
     def reserved(self, name: str) -> bool:
         """Return whether the language or the robot's functions already use this name."""
-        names = self._prelude.names()
+        names = self._prelude().names()
         return name in BUILTINS or name in names.plain or name in names.roots or name in MODULES
 
     async def inspect(self, source: str, functions: frozenset[str]) -> Judgement:
@@ -55,7 +55,7 @@ class Inspector:
 
     async def _examine(self, source: str, functions: frozenset[str]) -> Judgement:
         try:
-            return await self._engine.examine(source, self._prelude, functions=functions)
+            return await self._engine.examine(source, self._prelude(), functions=functions)
         except ValueError as error:
             raise InvalidBody(str(error)) from None
         except EngineSilent as late:

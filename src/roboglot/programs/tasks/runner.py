@@ -27,7 +27,7 @@ from roboglot.programs.engine.events import (
 )
 from roboglot.programs.engine.journal import Header, Journal, header_of
 from roboglot.programs.errors import CannotExecute, EngineTimeout, ProgramError, StoreError
-from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.functions import ability_set
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LogEntry, StoredProgram, Stores
 from roboglot.programs.tasks.reports import (
@@ -105,7 +105,6 @@ class Runner:
         self._lock = lock
         self._terms = terms
         self._ended = ended
-        self._prelude = ability_set()
         self._supervisors = Background()
 
     async def done(self) -> None:
@@ -191,7 +190,7 @@ class Runner:
     ) -> TaskRun:
         run = await self._engine.start(
             header.body,
-            replace(self._prelude, utc_offset=header.utc_offset),
+            replace(ability_set(), utc_offset=header.utc_offset),
             self._terms.limits,
             modules=header.modules,
             seed=header.seed,

@@ -16,7 +16,7 @@ from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Limits, Stops
 from roboglot.programs.errors import LimitReached, NotAllowed, ProgramError
-from roboglot.programs.functions.prelude import ability_set
+from roboglot.programs.functions import ability_set
 from roboglot.programs.language import Problem
 from roboglot.programs.language.places import Step
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
@@ -61,7 +61,7 @@ class ProgramService:
         self._engine = engine
         self._store = stores.tasks
         self._journals = stores.journals
-        self._inspector = Inspector(engine, ability_set())
+        self._inspector = Inspector(engine, ability_set)
         # Changes of state happen one at a time; slow work (checking a body) is done before taking the lock.
         self._lock = asyncio.Lock()
         self._timetable = Timetable(robot.clock, zone, lambda id, _: self._fires.add(self._fire(id), f"fire {id}"))

@@ -14,6 +14,7 @@ from roboglot.programs.language import Problem, ProblemKind, check, compile_unit
 from roboglot.programs.language.instrument import Marks
 from roboglot.programs.language.places import Places
 from roboglot.programs.worker.environment import build_builtins
+from roboglot.programs.worker.frames import ERROR_MAX
 from roboglot.programs.worker.link import EXIT_MEMORY, HALT, HostLink
 from roboglot.programs.worker.modules import build_modules
 from roboglot.programs.worker.prelude import Prelude
@@ -23,8 +24,6 @@ from roboglot.programs.worker.whereabouts import Whereabouts
 
 EXIT_DONE, EXIT_BROKEN, EXIT_UNTOLD = 0, 70, 72
 """Exit codes: success, a fault of ours, and (of the probe) a Python with an unknown layout of lists."""
-MESSAGE_MAX = 2000
-"""Most characters of an error's text."""
 
 _RESERVE = 512 * 1024
 _OWN_DEPTH = 16
@@ -145,7 +144,7 @@ def _report(error: BaseException) -> dict[str, object]:
 
 
 def _failure(kind: str, message: str, unit: int, line: int) -> dict[str, object]:
-    return {"t": "failed", "type": kind[:200], "message": message[:MESSAGE_MAX], "unit": unit, "line": line}
+    return {"t": "failed", "type": kind[:200], "message": message[:ERROR_MAX], "unit": unit, "line": line}
 
 
 def _place(error: BaseException) -> tuple[int, int]:

@@ -8,6 +8,10 @@ from __future__ import annotations
 FRAME_MAX = 1024 * 1024
 """Most bytes of a frame from a worker; a longer frame ends its run."""
 HEADER = 4
+CONTROL_MAX = 4096
+"""Bytes of one message between server and zygote."""
+ERROR_MAX = 2000
+"""Most characters of an error's text."""
 
 
 class FrameTooLong(ValueError):

@@ -25,11 +25,10 @@ from types import FrameType
 from typing import Any
 
 from roboglot.programs.worker import child, lockdown
+from roboglot.programs.worker.frames import CONTROL_MAX
 from roboglot.programs.worker.seccomp import SOCKET_FD, SeccompUnavailable
 from roboglot.programs.worker.whereabouts import Whereabouts
 
-MESSAGE_MAX = 4096
-"""Bytes of one control message."""
 _DESCRIPTORS = 2
 _PROBE_CPU, _PROBE_MEMORY = 5, 64 * 1024 * 1024
 _CODECS = ("ascii", "latin-1", "utf-16", "utf-32", "gbk", "gb18030", "cp1252", "unicode-escape", "raw-unicode-escape")
@@ -89,7 +88,7 @@ class Zygote:
             return b""
 
     def _answer(self) -> bool:
-        message, descriptors, _, _ = socket.recv_fds(self._control, MESSAGE_MAX, _DESCRIPTORS)
+        message, descriptors, _, _ = socket.recv_fds(self._control, CONTROL_MAX, _DESCRIPTORS)
         if not message:
             return False
         request = json.loads(message)
