@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from roboglot.config import RobotConfig
+from roboglot.config import RobotConfig, StartConfig
 from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
@@ -85,10 +85,9 @@ class Outcome:
 async def leave(seed: int, seconds: float) -> Outcome:
     """Have ten robots of all bodies leave one corridor at once, no matter who stands in whose way."""
     clock, database = LockstepClock(), Database(":memory:")
-    configs = [RobotConfig(f"r{n}", body=BODIES[(n + seed) % len(BODIES)]) for n in range(10)]
+    starts = [StartConfig(0.8 + 0.7 * n, 2.6 if n % 2 else 3.4) for n in range(10)]
+    configs = [RobotConfig(f"r{n}", BODIES[(n + seed) % len(BODIES)], start=at) for n, at in enumerate(starts)]
     fleet = build_fleet(CORRIDOR, configs, clock=clock, seed=seed, database=database)
-    for n, config in enumerate(configs):
-        fleet.world.hands.place(config.name, Pose(0.8 + 0.7 * n, 2.6 if n % 2 else 3.4))
     await fleet.start(wait=True)
     await clock.advance(1.0)
     walkers = []
@@ -128,10 +127,10 @@ def _send(walker: Walker, goal: Pose, here: Pose) -> None:
 async def crowd(seed: int, seconds: float = 20.0) -> Outcome:
     """Have a crowd live for ``seconds`` of robot time."""
     dice, clock, database = random.Random(seed), LockstepClock(), Database(":memory:")
-    configs = [RobotConfig(f"r{n}", body=dice.choice(BODIES)) for n in range(dice.randint(3, 6))]
+    bodies = [dice.choice(BODIES) for _ in range(dice.randint(3, 6))]
+    places = zip(bodies, _places(dice, len(bodies)), strict=False)
+    configs = [RobotConfig(f"r{n}", body, start=StartConfig(at.x, at.y, at.yaw)) for n, (body, at) in enumerate(places)]
     fleet = build_fleet("empty", configs, clock=clock, seed=seed, database=database)
-    for config, pose in zip(configs, _places(dice, len(configs)), strict=False):
-        fleet.world.hands.place(config.name, pose)
     await fleet.start(wait=True)
     await clock.advance(1.0)
     walkers = [_walker(fleet, robot, dice) for robot in fleet.robots.values()]

@@ -150,7 +150,9 @@ async def story(seed: int, *, glides: bool) -> list[list[tuple[bool, float, floa
                 elif what < 0.8:
                     hands.push(name, Vector3(dice.uniform(-8.0, 8.0), dice.uniform(-8.0, 8.0), 0.0))
                 elif what < 0.9:
-                    hands.add_obstacle(near, (0.2, 0.3, dice.choice((0.05, 0.5))))
+                    touching = physics.hulls[name].body.hull.radius + dice.uniform(0.092, 0.105)
+                    beside = pose.compose(Pose(dice.choice((touching, -touching)), 0.0))
+                    hands.add_obstacle(beside, (0.2, 0.3, dice.choice((0.05, 0.5))))
                 else:
                     hands.place(name, near)
         await clock.advance(0.02)
