@@ -7,7 +7,6 @@ and ends when the socket closes, its shards first. Shards die with it even if it
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 import select
 import signal
@@ -15,17 +14,14 @@ import socket
 import sys
 import time
 from collections.abc import Callable
-from types import FrameType
 
 import msgspec
 
 from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, Warm, Wish, encode
-from roboglot.shards.warmth import ENVIRONMENT, refuse_threads, warm
+from roboglot.shards.warmth import ENVIRONMENT, EXIT_BROKEN, ended, fork, wake_at_ends, warm
 
-PR_SET_PDEATHSIG = 1
 LAST_SECONDS = 12.0  # s for shards to close when the nursery ends
 LINK_FD = 3  # of a shard
-EXIT_BROKEN = 70  # of a shard that could not begin
 
 
 class Nursery:
@@ -34,11 +30,8 @@ class Nursery:
     def __init__(self, control: socket.socket, run: Callable[[str, socket.socket], int]) -> None:
         self._control, self._run = control, run
         self._children: dict[int, int] = {}  # shard numbers by process
-        self._wake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self._wake = wake_at_ends()
         os.set_inheritable(control.fileno(), False)
-        self._libc = ctypes.CDLL(None, use_errno=True)
-        signal.signal(signal.SIGCHLD, _ignore)
-        signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
 
     def serve(self) -> None:
         """Serve until the control socket closes."""
@@ -83,23 +76,18 @@ class Nursery:
         return True
 
     def _fork(self, number: int, folder: str, link: int, output: int) -> None:
-        refuse_threads()
-        parent, pid = os.getpid(), os.fork()
+        pid = fork()
         if pid == 0:
-            self._become_shard(parent, folder, link, output)
+            self._become_shard(folder, link, output)
         self._children[pid] = number
         self._send(Born(number, pid))
 
-    def _become_shard(self, parent: int, folder: str, link: int, output: int) -> None:
+    def _become_shard(self, folder: str, link: int, output: int) -> None:
         """Become the shard, in the child; never returns."""
         status = EXIT_BROKEN
         try:
-            signal.set_wakeup_fd(-1)
             for kind in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM):
                 signal.signal(kind, signal.SIG_DFL)
-            self._libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-            if os.getppid() != parent:  # it died before that was set
-                os._exit(EXIT_BROKEN)
             _take_descriptors(link, output)
             status = self._run(folder, socket.socket(fileno=LINK_FD))
         except BaseException:  # noqa: BLE001 - a forked child has no caller to raise to
@@ -118,12 +106,8 @@ class Nursery:
             self._send(Dead(number, status))
 
     def _reap(self) -> list[tuple[int, int]]:
-        dead: list[tuple[int, int]] = []
-        with contextlib.suppress(ChildProcessError):
-            while (ended := os.waitpid(-1, os.WNOHANG))[0]:
-                if (number := self._children.pop(ended[0], None)) is not None:
-                    dead.append((number, os.waitstatus_to_exitcode(ended[1])))
-        return dead
+        dead = [(self._children.pop(pid, None), status) for pid, status in ended()]
+        return [(number, status) for number, status in dead if number is not None]
 
     def _send(self, message: Birth) -> None:
         self._control.send(encode(message))
@@ -138,10 +122,6 @@ def _take_descriptors(link: int, output: int) -> None:
     os.dup2(nothing, 0)
     os.dup2(link, LINK_FD, inheritable=False)
     os.closerange(LINK_FD + 1, os.sysconf("SC_OPEN_MAX") if os.sysconf("SC_OPEN_MAX") < 1 << 16 else 1 << 16)
-
-
-def _ignore(number: int, frame: FrameType | None) -> None:
-    """Do nothing: without a handler, nothing would be written to the wake-up descriptor."""
 
 
 def main(descriptor: int) -> None:

@@ -1,14 +1,18 @@
-"""Imports and kernels that a shard needs, loaded before the first fork, without starting a thread."""
+"""Imports and kernels that a shard needs, loaded before the first fork, without starting a thread; and the fork."""
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import gc
 import importlib
 import os
 import pkgutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from types import FrameType
 
 PACKAGES = ("runtime", "simulation", "autonomy", "storage", "protocols", "programs", "console", "access")
 SELDOM = (  # modules that few shards need, or that are programs of their own
@@ -38,6 +42,8 @@ ENVIRONMENT = {  # of the nursery: keeps libraries from starting threads, and gR
     "GRPC_ENABLE_FORK_SUPPORT": "0",
 }
 TASKS = "/proc/self/task"
+PR_SET_PDEATHSIG = 1
+EXIT_BROKEN = 70  # of a child that could not begin
 
 
 class Threaded(RuntimeError):
@@ -96,6 +102,37 @@ def refuse_threads() -> None:
     """Raise Threaded if this process has more than one thread: a fork would copy their locks and not the threads."""
     if os.path.isdir(TASKS) and len(os.listdir(TASKS)) > 1:
         raise Threaded(f"a module started a thread when it was imported; {len(os.listdir(TASKS))} run")
+
+
+def fork() -> int:
+    """Fork; return 0 in the child, which is killed when this process ends. Raises Threaded."""
+    refuse_threads()
+    parent, pid = os.getpid(), os.fork()
+    if pid == 0:
+        signal.set_wakeup_fd(-1)
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != parent:  # it died before that was set
+            os._exit(EXIT_BROKEN)
+    return pid
+
+
+def wake_at_ends() -> int:
+    """Return a descriptor that can be read when a child has ended."""
+    wake, end = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+    signal.signal(signal.SIGCHLD, _ignore)
+    signal.set_wakeup_fd(end, warn_on_full_buffer=False)
+    return wake
+
+
+def ended() -> Iterator[tuple[int, int]]:
+    """Yield the children that have ended, and their exit status, negative for a signal."""
+    with contextlib.suppress(ChildProcessError):
+        while (found := os.waitpid(-1, os.WNOHANG))[0]:
+            yield found[0], os.waitstatus_to_exitcode(found[1])
+
+
+def _ignore(number: int, frame: FrameType | None) -> None:
+    """Do nothing: without a handler, nothing would be written to the wake-up descriptor."""
 
 
 def modules_of(packages: Iterable[str]) -> Iterator[str]:

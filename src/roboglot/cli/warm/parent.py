@@ -26,8 +26,8 @@ from typing import NoReturn, TypedDict
 from roboglot.cli import main as run_command
 from roboglot.cli import run_to_end
 from roboglot.cli.warm import installation
-from roboglot.cli.warm.command import BROKEN, CODE, DESCRIPTORS_MAX, LENGTH, MESSAGE_MAX
-from roboglot.shards.warmth import ENVIRONMENT, modules_of, refuse_threads, warm
+from roboglot.cli.warm.command import CODE, DESCRIPTORS_MAX, LENGTH, MESSAGE_MAX
+from roboglot.shards.warmth import ENVIRONMENT, ended, fork, modules_of, wake_at_ends, warm
 
 IDLE = 300.0  # s
 SLOW_MAX = 2.0  # s for a caller to say what it wants
@@ -35,7 +35,7 @@ LAST_SECONDS = 3.0  # s between SIGTERM and SIGKILL for a command that has lost 
 CALLERS_MAX = 64
 COMMANDS = ("roboglot.cli.program", "typer.main", "typer.rich_utils")
 PACKAGES = ("clients", "recording")  # beside those of all robots; not the test kit, whose modules pytest rewrites
-PR_SET_NAME, PR_SET_PDEATHSIG = 15, 1
+PR_SET_NAME = 15
 PEER = struct.Struct("3i")  # pid, uid, gid
 OPEN_MAX = 1 << 16
 
@@ -65,10 +65,7 @@ class WarmParent:
         self._rights = installation.rights_of("self")
         self._callers: dict[int, tuple[int, socket.socket]] = {}  # by descriptor: process and connection
         self._ending: dict[int, float] = {}  # process and when it is killed, s
-        self._libc = ctypes.CDLL(None, use_errno=True)
-        self._wake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        signal.signal(signal.SIGCHLD, _ignore)
-        signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+        self._wake = wake_at_ends()
         path.unlink(missing_ok=True)  # of a killed one: we have the lock
         listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         listening.bind(bytes(path))
@@ -149,14 +146,9 @@ class WarmParent:
         return wanted
 
     def _fork(self, wanted: Wanted, descriptors: list[int]) -> int:
-        refuse_threads()
-        parent, pid = os.getpid(), os.fork()
+        pid = fork()
         if pid == 0:
-            signal.set_wakeup_fd(-1)
-            self._libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-            self._libc.prctl(PR_SET_NAME, b"roboglot", 0, 0, 0)
-            if os.getppid() != parent:  # it died before that was set
-                os._exit(BROKEN)
+            ctypes.CDLL(None).prctl(PR_SET_NAME, b"roboglot", 0, 0, 0)
             become(wanted, descriptors)
         return pid
 
@@ -186,16 +178,14 @@ class WarmParent:
 
     def _reap(self) -> list[int]:
         """Report what has ended; return the callers' descriptors."""
-        ended = {}
-        with contextlib.suppress(ChildProcessError):
-            while (found := os.waitpid(-1, os.WNOHANG))[0]:
-                ended[found[0]] = os.waitstatus_to_exitcode(found[1])
-                self._ending.pop(found[0], None)
-        done = [descriptor for descriptor, (pid, _) in self._callers.items() if pid in ended]
+        statuses = dict(ended())
+        for pid in statuses:
+            self._ending.pop(pid, None)
+        done = [descriptor for descriptor, (pid, _) in self._callers.items() if pid in statuses]
         for descriptor in done:
             pid, caller = self._callers[descriptor]
             with contextlib.suppress(OSError):
-                caller.send(ended[pid].to_bytes(LENGTH, signed=True))
+                caller.send(statuses[pid].to_bytes(LENGTH, signed=True))
         return done
 
     def _stop_listening(self) -> None:
@@ -252,10 +242,6 @@ def _signal(pid: int, number: int) -> None:
             os.killpg(pid, number)
         except ProcessLookupError:  # it has not begun yet
             os.kill(pid, number)
-
-
-def _ignore(number: int, frame: types.FrameType | None) -> None:
-    """Do nothing: without a handler, nothing would be written to the wake-up descriptor."""
 
 
 def _limit(kind: int, soft: int, hard: int) -> None:
