@@ -1,13 +1,16 @@
 """Extras beyond the core: the modules of each, and the message if one is missing.
 
 The core (``pip install roboglot``) holds the clients and the commands that need no robot of our own; everything else
-comes with an extra. Imports nothing outside the standard library.
+comes with an extra. Also the version. Imports nothing outside the standard library.
 """
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
@@ -129,3 +132,20 @@ class _Lazy(ModuleType):
 def lazy(module: str) -> object:
     """Return a module that is imported at its first use; that raises MissingExtra if its extra is not installed."""
     return _Lazy(module)
+
+
+@cache
+def own_version() -> str:
+    """Return roboglot's version from the name of its entry among the installed packages.
+
+    ``importlib.metadata`` reads it there as well, but takes 20 ms of a start to load. Raises PackageNotFoundError.
+    """
+    before, after = "roboglot-", ".dist-info"
+    for folder in sys.path:
+        with suppress(OSError):  # not a folder
+            for name in os.listdir(folder or "."):
+                if name.startswith(before) and name.endswith(after):
+                    return name.removeprefix(before).removesuffix(after)
+    from importlib.metadata import version
+
+    return version("roboglot")

@@ -11,7 +11,6 @@ import ssl
 from collections.abc import Awaitable, Coroutine, Sequence
 from datetime import tzinfo
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +22,7 @@ from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.recordings import Recordings
 from roboglot.console.server import Console
 from roboglot.console.studio.programs import FOLDER, ClassHome, Programs, Studio
+from roboglot.extras import own_version
 from roboglot.fleet import build_fleet, clock_of, origin_of
 from roboglot.hosting.exclusive import lock_folder
 from roboglot.model.client_context import concerning
@@ -203,7 +203,7 @@ class Runtime:
             from roboglot.recording.recorder import Recorder
 
             stage = self.fleet.world.hands
-            origin = origin_of(self.config, version("roboglot"), remembers=self._remembers)
+            origin = origin_of(self.config, own_version(), remembers=self._remembers)
             outside = self.fleet.world.outside
             self._recorder = Recorder(self.config.record, self.fleet.robots, stage, self.clock, origin, outside)
         return self._recorder
@@ -287,7 +287,7 @@ class Runtime:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
         bodies = {robot.name: robot.body for robot in self.config.robots}
-        world = ConsoleWorld(self.config.world, version("roboglot"), self.clock, self.config.seed, bodies)
+        world = ConsoleWorld(self.config.world, own_version(), self.clock, self.config.seed, bodies)
         data, home = self.config.data, self._class_home
         folders = (FOLDER, data / "lessons")
         studio = Studio(self._programs, self._rehearsals, self._scene_of, folders, data / "classes", home)

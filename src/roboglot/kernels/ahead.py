@@ -22,7 +22,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
@@ -139,6 +138,8 @@ def _sources(name: str) -> tuple[str, ...]:
 @cache
 def _machine() -> str:
     """Return a description of Numba and the processor, on which compiled code depends besides its source."""
+    from importlib.metadata import PackageNotFoundError, version  # slow to load, and not needed before doors open
+
     versions = []
     for package in ("numba", "llvmlite", "numpy"):
         with contextlib.suppress(PackageNotFoundError):

@@ -9,12 +9,14 @@ import asyncio
 import contextlib
 import logging
 import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache, partial
-from importlib.metadata import version
+from functools import partial
+from typing import cast
 
 import numpy as np
 
+from roboglot.extras import own_version
 from roboglot.kernels import WORLD
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
 from roboglot.model.background import load
@@ -71,9 +73,21 @@ class RobotPlacement:
     floor: int = 0
 
 
-@cache
-def _version() -> str:
-    return version("roboglot")
+@contextlib.contextmanager
+def _no_plugins() -> Iterator[None]:
+    """Keep MuJoCo, while it loads, from searching all installed packages for plugins: that takes 20 ms of a start.
+
+    Where the module that it searches with is loaded already, and others may use it, it may search.
+    """
+    name = "importlib.metadata"
+    hidden = "mujoco" not in sys.modules and name not in sys.modules
+    if hidden:
+        cast("dict[str, object]", sys.modules)[name] = None
+    try:
+        yield
+    finally:
+        if hidden:
+            sys.modules.pop(name, None)
 
 
 class World:
@@ -86,7 +100,8 @@ class World:
     def __init__(
         self, description: WorldDescription, robots: Sequence[RobotPlacement], *, clock: Clock, seed: int = 1
     ) -> None:
-        from roboglot.simulation.world.physics import Physics  # loading MuJoCo takes a quarter of a second
+        with _no_plugins():
+            from roboglot.simulation.world.physics import Physics  # loads MuJoCo
 
         if len(robots) > ROBOTS_MAX:
             raise ValueError(f"{len(robots)} robots are more than {ROBOTS_MAX}")
@@ -152,7 +167,7 @@ class World:
     def description_of(self, name: str) -> Description:
         """Return a robot's name plate."""
         serial = f"{self._serial}-{name}"
-        return self._population.hull(name).body.describe(serial=serial, software_version=_version())
+        return self._population.hull(name).body.describe(serial=serial, software_version=own_version())
 
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body with its id."""
