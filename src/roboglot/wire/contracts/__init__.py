@@ -1,6 +1,6 @@
 """Contracts: one JSON file per protocol with all of its operations, the reference for coverage.
 
-A row is ``{"key", "chapter", "name"}``: the wire name under which a handler registers, the vendor's chapter, and the
+A row is ``["key", "chapter", "name"]``: the wire name under which a handler registers, the vendor's chapter, and the
 vendor's own identifier.
 """
 
@@ -12,7 +12,7 @@ from importlib import resources
 import msgspec
 
 
-class Row(msgspec.Struct, frozen=True):
+class Row(msgspec.Struct, frozen=True, array_like=True):
     """One operation, command, message code or function of a protocol."""
 
     key: str
