@@ -13,7 +13,9 @@ async () => {
     document.body.append(place);
     const workspace = inject(place, { renderer: "zelos", sounds: false, comments: true, media: "/studio/vendor/media/" }), rows = new Map();
     load(workspace);
+    await B.renderManagement.finishQueuedRenders();
     await new Promise((go) => setTimeout(go, 50)); // connections are found by then
+    await B.renderManagement.finishQueuedRenders(); // of what events changed
     name();
     for (const block of workspace.getAllBlocks()) block.recomputeAriaContext(); // Blockly names some before what is in them is there
     for (const element of workspace.getCanvas().querySelectorAll("*")) {
