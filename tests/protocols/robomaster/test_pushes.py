@@ -1,7 +1,13 @@
 """Chassis pushes over UDP."""
 
+import asyncio
+from collections.abc import AsyncIterator
+
 import pytest
 
+from roboglot.model.clock import LockstepClock
+from roboglot.protocols.robomaster.pushes import Pushes
+from roboglot.wire.robomaster.replies import FW70
 from tests.protocols.robomaster.text_client import ADDRESS
 
 
@@ -105,3 +111,22 @@ async def test_every_client_gets_them_at_its_own_address(client, connect, pushes
     await other.close()
     await forward(seconds=1)
     assert (len(elsewhere.texts()), len(pushes.texts())) == (0, 10), "who is gone gets no more, who stays does"
+
+
+class BusyClock(LockstepClock):
+    """Skips every fifth beat, as a busy machine may."""
+
+    async def every(self, period: float) -> AsyncIterator[float]:
+        for beat in range(1, 52):
+            await asyncio.sleep(0)
+            if beat % 5:
+                yield beat * period
+
+
+async def test_pushes_of_skipped_beats_are_sent_late() -> None:
+    sent = list[bytes]()
+    pushes = Pushes(BusyClock(), FW70, sent.append)
+    pushes.offer("chassis", [("position", lambda: (0.0, 0.0))])
+    pushes.switch("chassis", "position", True, 10)
+    await asyncio.gather(*(asyncio.all_tasks() - {asyncio.current_task()}))
+    assert len(sent) == 10

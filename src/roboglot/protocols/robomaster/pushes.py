@@ -12,7 +12,7 @@ from roboglot.values import dataclass
 from roboglot.wire.robomaster.replies import Number, Profile
 
 RATE = 5  # Hz, by default
-ROBOTS_TICK = 50  # Hz at which robots sample; other rates are sent every few ticks
+ROBOTS_TICK = 50  # Hz at which robots sample
 
 Read = Callable[[], tuple[Number, ...]]
 
@@ -84,9 +84,10 @@ class Pushes:
             self.switch(module, name, False, None)
 
     async def _run(self, attributes: list[_Attribute], tick: int) -> None:
-        start = self.clock.time()
+        start, last = self.clock.time(), 0
         async for now in self.clock.every(1 / tick):
-            beat = round((now - start) * tick)
-            due = [each for each in attributes if each.on and beat % max(1, tick // each.rate) == 0]
+            beat = round((now - start) * tick)  # not always the next
+            due = [each for each in attributes if each.on and beat // (step := tick // each.rate) > last // step]
+            last = beat
             for module, together in groupby(due, key=lambda each: each.module):
                 self.send(self.profile.push(module, *((each.name, each.read()) for each in together)))
