@@ -4,6 +4,7 @@ async () => {
   const { table, formsOf, stateOf } = await import("/studio/blocks.js");
   const { languageCategories } = await import("/studio/toolbox.js");
   const { inject, name, together } = await import("/studio/speed.js");
+  const { random } = Math, BUMPED = 400; // ms: blocks that lie close to each other are moved apart after 250 ms, by a random bit
   const LOOKS = ["fill", "stroke", "fill-opacity", "d", "transform", "style", "width", "height", "x", "y", "href", "role", "aria-label"];
 
   /** A workspace of its own (no checker puts warnings there): how often each element is in it, and where connections are found. */
@@ -13,9 +14,12 @@ async () => {
     document.body.append(place);
     const workspace = inject(place, { renderer: "zelos", sounds: false, comments: true, media: "/studio/vendor/media/" }), rows = new Map();
     load(workspace);
-    await B.renderManagement.finishQueuedRenders();
-    await new Promise((go) => setTimeout(go, 50)); // connections are found by then
-    await B.renderManagement.finishQueuedRenders(); // of what events changed
+    Math.random = () => 0.5; // identifiers are made; now it is the bit
+    for (const pause of [0, 0, BUMPED]) { // events are sent after a frame, and may cause others; connections are found by then
+      await new Promise((go) => requestAnimationFrame(() => setTimeout(go, pause)));
+      await B.renderManagement.finishQueuedRenders();
+    }
+    Math.random = random;
     name();
     for (const block of workspace.getAllBlocks()) block.recomputeAriaContext(); // Blockly names some before what is in them is there
     for (const element of workspace.getCanvas().querySelectorAll("*")) {
