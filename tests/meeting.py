@@ -121,7 +121,7 @@ def _places(dice: random.Random, world: str, count: int, room: float) -> list[Po
 
 
 @asynccontextmanager
-async def _opened(world: str, robots: Sequence[RobotConfig], seed: int) -> AsyncIterator[tuple[Fleet, LockstepClock]]:
+async def opened(world: str, robots: Sequence[RobotConfig], seed: int) -> AsyncIterator[tuple[Fleet, LockstepClock]]:
     """The robots in the world without those of its people that walk."""
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet(world, robots, clock=clock, seed=seed, database=database)
@@ -141,7 +141,7 @@ async def survey(world: str) -> OccupancyGrid:
     """The map of a building's lowest floor, in the world's frame, as a careful survey leaves it."""
     from roboglot.autonomy.slam.painting import paint  # needs the kernels
 
-    async with _opened(world, [RobotConfig("surveyor")], 1) as (fleet, clock):
+    async with opened(world, [RobotConfig("surveyor")], 1) as (fleet, clock):
         free, (width, depth) = Places(load_world(world)), load_world(world).floors[0].size
         fleet.robots["surveyor"][Mapping].enable(False)
         fleet.robots["surveyor"][Localization].enable(False)
@@ -164,7 +164,7 @@ async def meet(scene: Scenario, grid: OccupancyGrid | None, alone: int | None = 
     numbers = range(len(scene.bodies)) if alone is None else [alone]
     configs = [RobotConfig(f"r{n}", scene.bodies[n], start=StartConfig(*_numbers(scene.starts[n]))) for n in numbers]
     outcome = Outcome(scene.seed)
-    async with _opened(scene.world, configs, scene.seed) as (fleet, clock):
+    async with opened(scene.world, configs, scene.seed) as (fleet, clock):
         drives = [Drive(config.name, scene.goals[n]) for config, n in zip(configs, numbers, strict=True)]
         frames = {drive.name: _give_map(fleet, drive.name, grid) for drive in drives}
         await clock.advance(1.0)

@@ -285,7 +285,9 @@ class Slam:
         """Judge the pose by the map's support; search everywhere if the scan fits worse than ``usual``."""
         belief = self._belief
         if best.agreement < SURE_QUALITY or best.known < KNOWN_SURE * best.points or self._is_unsure:
-            self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
+            seen = scan.beside(best.pose, belief.others)  # what is known to stand there says nothing about the map
+            if len(seen.points) >= POINTS_MIN or not belief.others:
+                self.whereabouts.judge(supported(belief.map, seen, best.pose), stamp)
         else:
             self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
         fell = best.agreement < DOUBT_SHARE * usual and best.known >= KNOWN_SURE * best.points
