@@ -44,7 +44,7 @@ async def test_robots_start_where_configured_and_others_keep_away() -> None:
     assert truth.pose_of("c") == Pose(5.0, 5.0, 1.0)
     assert all(truth.pose_of(name).distance_to(truth.pose_of("c")) > 0.5 for name in "ab")
     outside = RobotConfig("a", start=StartConfig(1e6, 0.0))
-    with pytest.raises(ValueError, match="cannot stand at"):
+    with pytest.raises(ValueError, match="has no place"):
         build_fleet("empty", [outside], clock=LockstepClock(), seed=1, database=database)
     await fleet.close()
     database.close()

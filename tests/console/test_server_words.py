@@ -10,7 +10,7 @@ import pytest
 
 from roboglot.console.assets import FOLDER
 from roboglot.misfits import FORMS, KINDS, PYTHON
-from roboglot.simulation.world.truth import GAP, IN_THE_WAY
+from roboglot.simulation.world.placing import EDGE, GAP, IN_THE_WAY, ROBOT
 from tests.console.server_sentences import sentences
 
 KNOWN: dict[str, str] = json.loads((FOLDER / "words" / "server.zh.json").read_text("utf-8"))
@@ -22,7 +22,9 @@ WORDS = {
     "a key of {}",
     "the body",
     "the value",
+    EDGE,
     GAP,
+    ROBOT,
     *IN_THE_WAY.values(),
 } - {"None"}
 

@@ -133,7 +133,7 @@ async def test_robots_start_apart_and_on_the_floor(simulate):
     ("placement", "message"),
     [
         (RobotPlacement("a", start=Pose(0.1, 5)), "cannot stand"),
-        (RobotPlacement("a", start=Pose(50, 5)), "cannot stand"),
+        (RobotPlacement("a", start=Pose(50, 5)), "has no place"),
         (RobotPlacement("a", floor=3), "no floor 3"),
         (RobotPlacement("a", body="unicorn"), "no body is named 'unicorn'; there are: .*universal"),
     ],

@@ -14,7 +14,7 @@ from roboglot.model.events import LiftArrived, LiftCalled, LiftDoorClosed, LiftD
 from roboglot.model.geometry import STILL, Pose, Twist
 
 EVENTS = (LiftCalled, LiftArrived, LiftDoorClosed, LiftDoorOpened, LiftFailed)
-BEFORE = Pose(2.6, 10.0, math.pi)  # in front of the lift's door, facing it
+BEFORE = Pose(2.55, 9.95, math.pi)  # in front of the lift's door, facing it
 WITHIN = Pose(0.95, 10.0, 0.0)
 
 

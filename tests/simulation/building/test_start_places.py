@@ -6,9 +6,11 @@ import math
 from dataclasses import replace
 
 import pytest
+from msgspec.structs import replace as replace_parts
 
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.rooms import Rooms, rooms_of
+from roboglot.simulation.world.description import Hole
 from roboglot.simulation.world.placing import AHEAD, BESIDE, DOOR, TOGETHER, Places
 from roboglot.simulation.world.world_files import load_world
 
@@ -60,3 +62,39 @@ def test_doors_part_rooms_and_gaps_join() -> None:
     assert len(rooms.rooms) == 9
     corridor = load_world("tests/autonomy/worlds/one_corridor.toml").floors[0]
     assert len(rooms_of(corridor, None).rooms) == 1  # it opens into a hall
+
+
+WAYS = {  # in the office, for a radius of 0.25 m
+    "a wall": (Pose(15.0, 0.1), 0),
+    "furniture": (Pose(4.0, 2.0), 0),
+    "a person": (Pose(3.2, 10.2), 0),
+    "a dock": (Pose(22.5, 8.88), 0),
+    "a gap in the floor": (Pose(1.15, 10.0), 1),  # the lift's car is below
+    "another robot": (Pose(15.4, 10.0), 0),
+}
+
+
+@pytest.mark.parametrize("what", WAYS)
+def test_no_robot_starts_in_anything(what: str) -> None:
+    places = Places(load_world("office"), _taken=[(Pose(15.0, 10.0), 0, 0.25)])
+    with pytest.raises(ValueError, match=f": {what} is in the way; it can at"):
+        places.next(*WAYS[what], 0.25)
+
+
+@pytest.mark.parametrize("pose", [Pose(math.nan, 5.0), Pose(5.0, math.inf), Pose(5.0, 5.0, math.nan), Pose(-3.0, 5.0)])
+def test_no_robot_starts_outside(pose: Pose) -> None:
+    with pytest.raises(ValueError, match="has no place"):
+        Places(load_world("office")).next(pose, 0, 0.25)
+
+
+def test_robots_without_places_keep_off_people_and_holes() -> None:
+    empty = load_world("empty")
+    (dock,) = empty.floors[0].docks
+    front = dock.pose.compose(Pose(0.255))
+    (person, *_) = load_world("office").floors[0].people
+    for changed in (
+        replace_parts(empty.floors[0], people=(replace_parts(person, path=((front.x, front.y),)),)),
+        replace_parts(empty.floors[0], holes=(Hole(at=(front.x, front.y), size=(0.2, 0.2)),)),
+    ):
+        (pose, _) = Places(replace_parts(empty, floors=(changed,))).next(None, 0, 0.25)
+        assert pose.distance_to(front) > 0.1

@@ -139,7 +139,7 @@ class Walker(PersonState):
     def walk(self, seconds: float, robots: Spots, free: Free) -> bool:
         """Continue for ``seconds`` among the ``robots`` of the floor; return whether the pose changed.
 
-        A kernel does the same for those who only walk or wait (``kernels/walking.py``).
+        A kernel does the same for those who only walk or wait (``kernels/ticks.py``).
         """
         moved, self.displaced, self.walking = self.displaced, False, False
         before = self.pose

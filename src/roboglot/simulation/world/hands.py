@@ -236,8 +236,7 @@ class Hands(Stage):
         self._faults().clear(number)
 
     def _check_inside(self, pose: Pose, floor: int) -> None:
-        if not Places(self._environment.description).inside(pose, floor):
-            raise ValueError(f"floor {floor} of this world has no place ({pose.x:g}, {pose.y:g}, {pose.yaw:g})")
+        Places(self._environment.description).check_inside(pose, floor)
 
     def _check_clear(self, solid: Solid, floor: int) -> None:
         """Raise Refused if a robot stands where something is put: it would be pressed through the floor."""

@@ -13,7 +13,7 @@ from dataclasses import field
 from itertools import pairwise, product
 
 from roboglot.model.geometry import Pose, wrap_angle
-from roboglot.simulation.building.blueprint import Solid, solids_of
+from roboglot.simulation.building.blueprint import Solid, SolidKind, holes_of, shaft_of, solids_of
 from roboglot.simulation.building.rooms import Rooms, rooms_of
 from roboglot.simulation.world.description import Spot, WorldDescription
 from roboglot.values import dataclass
@@ -29,6 +29,8 @@ TURNS = (0.0, math.pi, math.pi / 2, -math.pi / 2)  # from the first robot's yaw,
 CLEAR = 0.3, 0.05  # m around a robot in a crowd, while such places exist
 AHEAD = 0.6  # m that must be free in front of a good place
 NEAR, NEAR_STEP = 3.0, 0.1  # m around an occupied place that are searched for an alternative to suggest, and the step
+IN_THE_WAY = {kind: f"a {kind}" for kind in SolidKind} | {SolidKind.FURNITURE: "furniture"}
+GAP, EDGE, ROBOT = "a gap in the floor", "the edge of the floor", "another robot"
 
 
 def docks_of(world: WorldDescription) -> list[list[Pose]]:
@@ -61,15 +63,24 @@ class Places:
         """Return pose and floor for one more robot. Raises ValueError if ``wanted``, or every place, is taken."""
         if not 0 <= floor < len(self.world.floors):
             raise ValueError(f"there is no floor {floor}; the world has {len(self.world.floors)}")
-        if wanted is not None and not self.free(wanted, floor, radius):
-            free = self._near(wanted, floor, radius)
-            instead = f"; it can at {free.x:z.2f},{free.y:z.2f}" if free is not None else ""
-            raise ValueError(f"a robot cannot stand at ({wanted.x:g}, {wanted.y:g}) on floor {floor}{instead}")
+        if wanted is not None:
+            self._check(wanted, floor, radius)
         for pose, number in [(wanted, floor)] if wanted is not None else self._candidates(floor, radius):
-            if self.free(pose, number, radius) and (wanted is not None or not self._reserved(pose, number, radius)):
+            if wanted is not None or not (
+                self.in_the_way(pose, number, radius) or self._reserved(pose, number, radius)
+            ):
                 self._taken.append((pose, number, radius))
                 return pose, number
         raise ValueError(f"there is no room for another robot on floor {floor}")
+
+    def _check(self, wanted: Pose, floor: int, radius: float) -> None:
+        """Raise ValueError if a robot cannot start there, with what is in the way and a place nearby."""
+        self.check_inside(wanted, floor)
+        if obstacle := self.in_the_way(wanted, floor, radius):
+            free = self._near(wanted, floor, radius)
+            instead = f"; it can at {free.x:z.2f},{free.y:z.2f}" if free is not None else ""
+            place = f"({wanted.x:g}, {wanted.y:g}) on floor {floor}"
+            raise ValueError(f"a robot cannot stand at {place}: {obstacle} is in the way{instead}")
 
     def _candidates(self, floor: int, radius: float) -> Iterator[tuple[Pose, int]]:
         start = self.world.start
@@ -132,7 +143,7 @@ class Places:
         cells = sorted((math.hypot(i, j), i, j) for i in steps for j in steps)
         x, y = round(wanted.x, 1), round(wanted.y, 1)
         places = (Pose(x + i * NEAR_STEP, y + j * NEAR_STEP, wanted.yaw) for _, i, j in cells)
-        return next((place for place in places if self.free(place, floor, radius)), None)
+        return next((place for place in places if not self.in_the_way(place, floor, radius)), None)
 
     def _reserved(self, pose: Pose, floor: int, radius: float) -> bool:
         return any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self.reserved)
@@ -180,17 +191,36 @@ class Places:
         (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
         return x <= pose.x <= x + width and y <= pose.y <= y + depth
 
+    def check_inside(self, pose: Pose, floor: int) -> None:
+        """Raise ValueError if the floor does not exist, or the place is not on it."""
+        if not self.inside(pose, floor):
+            raise ValueError(f"floor {floor} of this world has no place ({pose.x:g}, {pose.y:g}, {pose.yaw:g})")
+
     def free(self, pose: Pose, floor: int, radius: float) -> bool:
-        """True if a robot of this radius (m) can stand there without touching anything."""
+        """True if a robot of this radius (m) can stand there without touching anything but people."""
+        return not self._touched(pose, floor, radius)
+
+    def in_the_way(self, pose: Pose, floor: int, radius: float) -> str:
+        """Return what keeps a robot of this radius (m) from starting there, people and gaps too; empty: nothing."""
+        if touched := self._touched(pose, floor, radius):
+            return touched
+        if any(math.dist((pose.x, pose.y), p.path[0]) < radius + p.radius for p in self.world.floors[floor].people):
+            return IN_THE_WAY[SolidKind.PERSON]
+        lift = self.world.lift
+        shafts = [shaft_of(lift)] if lift is not None and lift.parked_at != floor else []
+        gaps = holes_of(self.world.floors[floor]) + shafts
+        return GAP if any(gap.distance_to(pose.x, pose.y) == 0.0 for gap in gaps) else ""
+
+    def _touched(self, pose: Pose, floor: int, radius: float) -> str:
         storey = self.world.floors[floor]
-        for value, low, size in zip((pose.x, pose.y), storey.origin, storey.size, strict=True):
-            if not low + radius <= value <= low + size - radius:
-                return False
-        if any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self._taken):
-            return False
         if floor not in self._solids:
             self._solids[floor] = solids_of(storey, self.world.lift, lift_here=False)
-        return all(_distance(pose, solid) >= radius for solid in self._solids[floor])
+        for value, low, size in zip((pose.x, pose.y), storey.origin, storey.size, strict=True):
+            if not low + radius <= value <= low + size - radius:
+                return IN_THE_WAY[SolidKind.WALL] if storey.enclosed else EDGE
+        if any(number == floor and pose.distance_to(other) < radius + r for other, number, r in self._taken):
+            return ROBOT
+        return next((IN_THE_WAY[s.kind] for s in self._solids[floor] if _distance(pose, s) < radius), "")
 
 
 def _away(x: float, y: float, path: Sequence[Spot]) -> float:

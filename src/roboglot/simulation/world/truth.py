@@ -12,12 +12,10 @@ from roboglot.simulation.building.things import Thing
 from roboglot.simulation.components.motion.gripper import SimulatedGripper
 from roboglot.simulation.world.beads import Landing
 from roboglot.simulation.world.environment import Environment
-from roboglot.simulation.world.placing import Places
+from roboglot.simulation.world.placing import GAP, IN_THE_WAY, Places
 from roboglot.simulation.world.population import Population
 
 TOUCH = 0.01  # m by which a robot that stands beside something may overlap it
-IN_THE_WAY = {kind: f"a {kind}" for kind in SolidKind} | {SolidKind.FURNITURE: "furniture"}
-GAP = "a gap in the floor"
 
 
 class Truth:
