@@ -87,6 +87,7 @@ async def test_what_was_kept_writes_the_same_program(played: dict[str, Any]) -> 
 async def test_what_is_loaded_quickly_looks_the_same(page: Any) -> None:
     found = await page.evaluate(TOGETHER)
     assert found["elements"] > 1000
+    assert found["moved"] == []
     assert found["unlike"] == []
     assert all(found["connected"])
 
