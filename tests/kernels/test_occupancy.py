@@ -42,8 +42,9 @@ def at(pose: tuple[float, float, float], points: np.ndarray) -> np.ndarray:
 class Room:
     def __init__(self, noise: float = 0.01) -> None:
         self.evidence = np.zeros((120, 160), np.int16)
-        self.surface = np.zeros((120, 160, 5), np.float32)
-        self.marks = np.zeros((120, 160), np.int32)
+        self.slots = np.zeros((120, 160), np.int32)
+        self.surfaces, self.used = np.zeros((120 * 160, 5), np.float32), 1
+        self.marks = np.zeros((120, 160), np.int16)
         rng = np.random.default_rng(1)
         self.scans = 0
         for x in (2.0, 3.0, 4.0, 5.0):
@@ -52,9 +53,8 @@ class Room:
     def add(self, pose: tuple[float, float, float], points: np.ndarray) -> None:
         self.scans += 1
         hit = np.ones(len(points), np.uint8)
-        integrate(
-            self.evidence, self.surface, self.marks, self.scans, at(pose, points), hit, *pose[:2], True, RESOLUTION
-        )
+        arrays, ends = (self.evidence, self.slots, self.surfaces, self.used, self.marks), at(pose, points)
+        self.used = integrate(*arrays, self.scans, ends, hit, *pose[:2], True, RESOLUTION)
 
 
 def test_walls_stand_where_noisy_echoes_scatter_around() -> None:
@@ -63,9 +63,9 @@ def test_walls_stand_where_noisy_echoes_scatter_around() -> None:
     for _ in range(80):
         pose = (rng.uniform(2.0, 6.0), rng.uniform(2.0, 4.0), rng.uniform(-3.0, 3.0))
         room.add(pose, points_of(ranges_in_room(pose, 0.03, rng)))
-    east = [surface_near(room.surface, room.evidence, ROOM[2] + off, y, 1.0, 0.0, RESOLUTION)[0]
+    east = [surface_near(room.slots, room.surfaces, room.evidence, ROOM[2] + off, y, 1.0, 0.0, RESOLUTION)[0]
             for y in np.arange(2.0, 4.0, 0.1) for off in (-0.03, 0.0, 0.03)]  # fmt: skip
-    north = [surface_near(room.surface, room.evidence, x, ROOM[3] + off, 0.0, 1.0, RESOLUTION)[1]
+    north = [surface_near(room.slots, room.surfaces, room.evidence, x, ROOM[3] + off, 0.0, 1.0, RESOLUTION)[1]
              for x in np.arange(2.0, 6.0, 0.1) for off in (-0.03, 0.0, 0.03)]  # fmt: skip
     assert np.mean(east) == pytest.approx(ROOM[2], abs=0.003)
     assert np.mean(north) == pytest.approx(ROOM[3], abs=0.003)
@@ -116,7 +116,7 @@ def test_matching_finds_the_pose_finer_than_the_cells(off: tuple[float, float, f
     prior = np.array(truth) + off
     weak = np.diag([0.2**2, 0.2**2, 0.1**2])
     pose, covariance, strain, fit, known = match(
-        room.surface, room.evidence, points, prior, prior, weak, np.zeros(2), RESOLUTION, 10
+        room.slots, room.surfaces, room.evidence, points, prior, prior, weak, np.zeros(2), RESOLUTION, 10
     )
     assert math.hypot(pose[0] - truth[0], pose[1] - truth[1]) < 0.005
     assert abs(pose[2] - truth[2]) < math.radians(0.2)
@@ -126,11 +126,11 @@ def test_matching_finds_the_pose_finer_than_the_cells(off: tuple[float, float, f
 
 
 def test_a_trusted_prior_stays_where_nothing_is_seen() -> None:
-    empty = np.zeros((50, 50), np.int16)
+    empty, slots, surfaces = np.zeros((50, 50), np.int16), np.zeros((50, 50), np.int32), np.zeros((1, 5), np.float32)
     prior = np.array([1.0, 1.0, 0.3])
     points = np.ones((10, 2)) * 0.4
     pose, covariance, strain, fit, known = match(
-        np.zeros((50, 50, 5), np.float32), empty, points, prior, prior, np.eye(3), np.zeros(2), RESOLUTION, 10
+        slots, surfaces, empty, points, prior, prior, np.eye(3), np.zeros(2), RESOLUTION, 10
     )
     assert pose == pytest.approx(prior)
     assert (fit, known) == (0, 0)
@@ -214,3 +214,10 @@ def test_way_is_free_until_the_hull_would_touch() -> None:
     assert free_way(path, ahead, 0.0, 0.0, 0.3) == pytest.approx(2.0 - math.sqrt(0.3**2 - 0.1**2), abs=0.051)
     assert free_way(path, np.array([[2.0, 0.4]]), 0.0, 0.0, 0.3) == math.inf
     assert free_way(path, np.array([[-0.2, 0.0]]), 0.0, 0.0, 0.3) == math.inf  # leaving the wall behind
+
+
+def test_surfaces_that_another_thread_added_are_left_out() -> None:
+    room, (x, y) = Room(), (ROOM[2], 3.0)
+    none = surface_near(room.slots, room.surfaces[:1], room.evidence, x, y, 1.0, 0.0, RESOLUTION)
+    assert none == (0.0, 0.0, 0.0, 0.0, 0.0)
+    assert surface_near(room.slots, room.surfaces, room.evidence, x, y, 1.0, 0.0, RESOLUTION)[4] > 0.0

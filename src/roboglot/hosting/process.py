@@ -10,7 +10,7 @@ import threading
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # from malloc.h
 SWITCH_SECONDS = 0.001  # s for which other threads (database, pictures) may block the main thread
-KEPT, SPARE = 1 << 20, 1 << 21  # bytes of blocks that come from the heap, and of free heap that is not given back
+KEPT, SPARE = 1 << 19, 1 << 21  # bytes of blocks that come from the heap, and of free heap that is not given back
 LAST_SECONDS = 10.0  # s after a signal; closing takes one or two
 
 

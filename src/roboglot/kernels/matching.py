@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import FloatArray, Int16Array, IntArray, SingleArray
+from roboglot.kernels.arrays import FloatArray, Int16Array, Int32Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.linear import invert
 from roboglot.kernels.occupancy import is_surface
@@ -23,9 +23,16 @@ MOVED = 0.0002  # m of motion after which a point's surface is looked up again: 
 CORRELATION = 0.1  # share of the points' information that is used, since they are not independent
 
 
-@kernel("int64(float32[:,:,::1], int16[:,::1], int64, int64, float64, float64[:,:,::1], int64)")
+@kernel("int64(int32[:,::1], float32[:,::1], int16[:,::1], int64, int64, float64, float64[:,:,::1], int64)")
 def _surfaces(
-    surface: SingleArray, evidence: Int16Array, row: int, col: int, resolution: float, around: FloatArray, i: int
+    slots: Int32Array,
+    surfaces: SingleArray,
+    evidence: Int16Array,
+    row: int,
+    col: int,
+    resolution: float,
+    around: FloatArray,
+    i: int,
 ) -> int:
     """Fill ``around[i]`` with the surfaces in the cells around (row, col); returns how many there are.
 
@@ -34,7 +41,10 @@ def _surfaces(
     count, place = 0, around[np.uintp(i)]
     for r in range(max(0, row - 2), min(evidence.shape[0], row + 3)):
         for c in range(max(0, col - 2), min(evidence.shape[1], col + 3)):
-            cell = surface[np.uintp(r), np.uintp(c)]
+            slot = slots[np.uintp(r), np.uintp(c)]
+            if not 0 < slot < surfaces.shape[0]:  # another thread may have added one
+                continue
+            cell = surfaces[np.uintp(slot)]
             hits = cell[0]
             if hits <= 0.0 or not (evidence[np.uintp(r), np.uintp(c)] > 0 or is_surface(evidence, r, c)):
                 continue
@@ -83,14 +93,21 @@ def _line(
     return x + mean_x, y + mean_y, (aside if xy < 0.0 else -aside), along, total
 
 
-@kernel("UniTuple(float64, 5)(float32[:,:,::1], int16[:,::1], float64, float64, float64, float64, float64)")
+@kernel("UniTuple(float64, 5)(int32[:,::1], float32[:,::1], int16[:,::1], float64, float64, float64, float64, float64)")
 def surface_near(
-    surface: SingleArray, evidence: Int16Array, x: float, y: float, beam_x: float, beam_y: float, resolution: float
+    slots: Int32Array,
+    surfaces: SingleArray,
+    evidence: Int16Array,
+    x: float,
+    y: float,
+    beam_x: float,
+    beam_y: float,
+    resolution: float,
 ) -> tuple[float, float, float, float, float]:
     """The surface around (x, y) as seen along the beam: mean x and y, normal x and y (0, 0: unclear), weight."""
     around = np.empty((1, CELLS, 5))
     row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
-    return _line(around, 0, _surfaces(surface, evidence, row, col, resolution, around, 0), x, y, beam_x, beam_y)
+    return _line(around, 0, _surfaces(slots, surfaces, evidence, row, col, resolution, around, 0), x, y, beam_x, beam_y)
 
 
 @kernel()
@@ -109,7 +126,8 @@ def _add(system: FloatArray, nx: float, ny: float, turn: float, residual: float,
 
 @kernel()
 def _linearise(
-    surface: SingleArray,
+    slots: Int32Array,
+    surfaces: SingleArray,
     evidence: Int16Array,
     points: FloatArray,
     pose: FloatArray,
@@ -146,7 +164,7 @@ def _linearise(
             away = np.sqrt(beam_x * beam_x + beam_y * beam_y) + 1e-9
             if places[i, 0] != row or places[i, 1] != col:
                 places[i, 0], places[i, 1] = row, col
-                places[i, 2] = _surfaces(surface, evidence, row, col, resolution, around, i)
+                places[i, 2] = _surfaces(slots, surfaces, evidence, row, col, resolution, around, i)
             found = _line(around, i, places[i, 2], x, y, beam_x / away, beam_y / away)
             lines[i, 0], lines[i, 1] = x, y
             lines[i, 2], lines[i, 3], lines[i, 4], lines[i, 5], lines[i, 6] = found
@@ -173,10 +191,12 @@ def _linearise(
 
 
 @kernel(
-    "float64[:,::1](float32[:,:,::1], int16[:,::1], float64[:,::1], float64, float64, float64, float64[::1], float64)"
+    "float64[:,::1](int32[:,::1], float32[:,::1], int16[:,::1], float64[:,::1], float64, float64, float64,"
+    " float64[::1], float64)"
 )
 def gaps(
-    surface: SingleArray,
+    slots: Int32Array,
+    surfaces: SingleArray,
     evidence: Int16Array,
     points: FloatArray,
     x: float,
@@ -197,7 +217,7 @@ def gaps(
         away = np.sqrt(beam_x * beam_x + beam_y * beam_y) + 1e-9
         px, py = x + cos * points[i, 0] - sin * points[i, 1], y + sin * points[i, 0] + cos * points[i, 1]
         row, col = int(np.floor(py / resolution)), int(np.floor(px / resolution))
-        count = _surfaces(surface, evidence, row, col, resolution, around, 0)
+        count = _surfaces(slots, surfaces, evidence, row, col, resolution, around, 0)
         mean_x, mean_y, nx, ny, weight = _line(around, 0, count, px, py, beam_x / away, beam_y / away)
         found[i, 1] = weight
         if weight == 0.0:
@@ -223,11 +243,12 @@ def _covariance(information: FloatArray, system: FloatArray, result: FloatArray)
 
 @kernel(
     "Tuple((float64[::1], float64[:,::1], float64, int64, int64))"
-    "(float32[:,:,::1], int16[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1], float64[::1],"
-    " float64, int64)",
+    "(int32[:,::1], float32[:,::1], int16[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1],"
+    " float64[::1], float64, int64)",
 )
 def match(
-    surface: SingleArray,
+    slots: Int32Array,
+    surfaces: SingleArray,
     evidence: Int16Array,
     points: FloatArray,
     start: FloatArray,
@@ -254,7 +275,9 @@ def match(
             information[i, j] = covariance[i, j]
     invert(information)
     reach = ROBUST_START if iterations > 0 else ROBUST
-    fit, known = _linearise(surface, evidence, points, pose, sensor, resolution, reach, lines, places, around, system)
+    fit, known = _linearise(
+        slots, surfaces, evidence, points, pose, sensor, resolution, reach, lines, places, around, system
+    )
     for _ in range(iterations):
         _covariance(information, system, normal)
         for i in range(3):
@@ -268,7 +291,7 @@ def match(
         settled = reach <= ROBUST
         reach = max(ROBUST, reach * 0.5)
         fit, known = _linearise(
-            surface, evidence, points, pose, sensor, resolution, reach, lines, places, around, system
+            slots, surfaces, evidence, points, pose, sensor, resolution, reach, lines, places, around, system
         )
         if settled and abs(step[0]) + abs(step[1]) < 2e-4 and abs(step[2]) < 1e-4:
             break

@@ -1,8 +1,9 @@
 """An occupancy grid from laser scans: evidence per cell, and where within the cell the surface lies.
 
-Arrays: ``evidence`` int16 (rows along y, columns along x; 0 unknown, below free, above occupied); ``surface`` float32
-(rows, columns, 5): number of hits, their summed x and y (m, from the cell's corner) and the summed unit vector from
-the hits towards the sensor; ``marks`` int32: the number of the last scan that touched the cell, or FROZEN: none may.
+Arrays: ``evidence`` int16 (rows along y, columns along x; 0 unknown, below free, above occupied); ``surfaces`` float32
+(n, 5), of each cell that was ever hit: number of hits, their summed x and y (m, from the cell's corner) and the summed
+unit vector from the hits towards the sensor; ``slots`` int32 (rows, columns): the cell's row of these, 0: it has none;
+``marks`` int16: the number (modulo SCANS, from 1) of the last scan that touched the cell, or FROZEN: none may.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ MISS = -50
 EVIDENCE_MAX = 1000
 EVIDENCE_MIN = -1000
 HITS_MAX = 5000.0
-FROZEN = -1
+FROZEN, SCANS = -1, 32767
 NEIGHBOURS = 0.06  # rad between rays that count as neighbours
 BETWEEN_MAX = 6
 GRAZING = 0.35  # sine of the angle below which a ray passes along a surface
@@ -37,20 +38,28 @@ def is_surface(evidence: Int16Array, row: int, col: int) -> bool:
     return False
 
 
-@kernel("boolean(int16[:,::1], float32[:,:,::1], int64, int64, float64, float64, float64)")
+@kernel("boolean(int16[:,::1], int32[:,::1], float32[:,::1], int64, int64, float64, float64, float64)")
 def _is_grazed(
-    evidence: Int16Array, surface: SingleArray, row: int, col: int, dx: float, dy: float, resolution: float
+    evidence: Int16Array,
+    slots: Int32Array,
+    surfaces: SingleArray,
+    row: int,
+    col: int,
+    dx: float,
+    dy: float,
+    resolution: float,
 ) -> bool:
     """Return True if a ray along (dx, dy) grazes the surface in an occupied cell, which then carries no evidence."""
     count = mean_x = mean_y = xx = xy = yy = 0.0
     for r in range(max(0, row - 2), min(evidence.shape[0], row + 3)):
         for c in range(max(0, col - 2), min(evidence.shape[1], col + 3)):
-            if evidence[r, c] <= 0:
+            slot = slots[r, c]
+            if evidence[r, c] <= 0 or slot == 0:
                 continue
-            hits = surface[r, c, 0]
+            hits = surfaces[slot, 0]
             if hits <= 0.0:
                 continue
-            x, y = surface[r, c, 1] / hits + (c - col) * resolution, surface[r, c, 2] / hits + (r - row) * resolution
+            x, y = surfaces[slot, 1] / hits + (c - col) * resolution, surfaces[slot, 2] / hits + (r - row) * resolution
             count += 1.0
             mean_x += x
             mean_y += y
@@ -66,13 +75,14 @@ def _is_grazed(
 
 
 @kernel(
-    "void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64, float64, float64, float64, float64, boolean,"
-    " float64)"
+    "void(int16[:,::1], int32[:,::1], float32[:,::1], int16[:,::1], int64, float64, float64, float64, float64, float64,"
+    " boolean, float64)"
 )
 def _clear_ray(
     evidence: Int16Array,
-    surface: SingleArray,
-    marks: Int32Array,
+    slots: Int32Array,
+    surfaces: SingleArray,
+    marks: Int16Array,
     scan: int,
     end_x: float,
     end_y: float,
@@ -107,7 +117,7 @@ def _clear_ray(
         mark = touched[np.uintp(at)]
         if mark != scan and mark != FROZEN:
             before = evidence[np.uintp(row), np.uintp(col)]
-            if not (before > 0 and (gentle or _is_grazed(evidence, surface, row, col, dx, dy, resolution))):
+            if not (before > 0 and (gentle or _is_grazed(evidence, slots, surfaces, row, col, dx, dy, resolution))):
                 touched[np.uintp(at)] = scan
                 value = max(EVIDENCE_MIN, before + MISS)
                 evidence[np.uintp(row), np.uintp(col)] = value if value != 0 else -1
@@ -123,11 +133,15 @@ def _clear_ray(
             at += down
 
 
-@kernel("void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], int64, float64, float64, float64)")
+@kernel(
+    "void(int16[:,::1], int32[:,::1], float32[:,::1], int16[:,::1], int64, float64[:,::1], int64, float64, float64,"
+    " float64)"
+)
 def _clear_between(
     evidence: Int16Array,
-    surface: SingleArray,
-    marks: Int32Array,
+    slots: Int32Array,
+    surfaces: SingleArray,
+    marks: Int16Array,
     scan: int,
     ends: FloatArray,
     i: int,
@@ -150,17 +164,19 @@ def _clear_between(
     for k in range(1, count + 1):
         share = k / (count + 1.0)
         end_x, end_y = x + shorter * (ax + share * (bx - ax)), y + shorter * (ay + share * (by - ay))
-        _clear_ray(evidence, surface, marks, scan, end_x, end_y, x, y, resolution / apart, True, resolution)
+        _clear_ray(evidence, slots, surfaces, marks, scan, end_x, end_y, x, y, resolution / apart, True, resolution)
 
 
 @kernel(
-    "void(int16[:,::1], float32[:,:,::1], int32[:,::1], int64, float64[:,::1], uint8[::1],"
+    "int64(int16[:,::1], int32[:,::1], float32[:,::1], int64, int16[:,::1], int64, float64[:,::1], uint8[::1],"
     " float64, float64, boolean, float64)",
 )
 def integrate(
     evidence: Int16Array,
-    surface: SingleArray,
-    marks: Int32Array,
+    slots: Int32Array,
+    surfaces: SingleArray,
+    used: int,
+    marks: Int16Array,
     scan: int,
     ends: FloatArray,
     hit: ByteArray,
@@ -168,11 +184,12 @@ def integrate(
     y: float,
     fill: bool,
     resolution: float,
-) -> None:
+) -> int:
     """Add one scan taken at (x, y): ``ends`` are the rays' ends, occupied where ``hit``; metres from the grid's corner.
 
     A cell changes once per scan at most; a hit wins over rays that pass, and those over the gaps between rays, which
-    are cleared if ``fill``. Ends outside the grid are clipped.
+    are cleared if ``fill``. Ends outside the grid are clipped. ``used``: how many rows of ``surfaces`` are in use, with
+    the first one, which no cell has; there must be one more for each hit. Returns how many are in use then.
     """
     height, width = evidence.shape
     for i in range(ends.shape[0]):
@@ -184,26 +201,30 @@ def integrate(
             continue
         if marks[row, col] == FROZEN:
             continue
+        if slots[row, col] == 0:
+            slots[row, col], used = used, used + 1
+        slot = slots[row, col]
         if marks[row, col] != scan:
             marks[row, col] = scan
-            if not is_surface(evidence, row, col):  # whatever stood there has gone
-                for part in range(surface.shape[2]):
-                    surface[row, col, part] = 0.0
+            if not is_surface(evidence, row, col):  # what stood there has gone
+                for part in range(surfaces.shape[1]):
+                    surfaces[slot, part] = 0.0
             evidence[row, col] = min(EVIDENCE_MAX, evidence[row, col] + HIT)
             if evidence[row, col] == 0:
                 evidence[row, col] = 1
-        if surface[row, col, 0] < HITS_MAX:
+        if surfaces[slot, 0] < HITS_MAX:
             dx, dy = x - ends[i, 0], y - ends[i, 1]
             away = max(np.sqrt(dx * dx + dy * dy), 1e-9)
-            surface[row, col, 0] += 1.0
-            surface[row, col, 1] += ends[i, 0] - col * resolution
-            surface[row, col, 2] += ends[i, 1] - row * resolution
-            surface[row, col, 3] += dx / away
-            surface[row, col, 4] += dy / away
+            surfaces[slot, 0] += 1.0
+            surfaces[slot, 1] += ends[i, 0] - col * resolution
+            surfaces[slot, 2] += ends[i, 1] - row * resolution
+            surfaces[slot, 3] += dx / away
+            surfaces[slot, 4] += dy / away
     for i in range(ends.shape[0]):
-        _clear_ray(evidence, surface, marks, scan, ends[i, 0], ends[i, 1], x, y, 0.0, False, resolution)
+        _clear_ray(evidence, slots, surfaces, marks, scan, ends[i, 0], ends[i, 1], x, y, 0.0, False, resolution)
     for i in range(ends.shape[0] if fill else 0):
-        _clear_between(evidence, surface, marks, scan, ends, i, x, y, resolution)
+        _clear_between(evidence, slots, surfaces, marks, scan, ends, i, x, y, resolution)
+    return used
 
 
 WIDE = 3.0  # cells to either side of a ray over which a surface must extend for the ray to cross it

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from roboglot.autonomy.navigation.route import SPACING, Route
 from roboglot.autonomy.slam.evidence import CELLS_MAX, GRID_MAX, RESOLUTION, EvidenceGrid
-from roboglot.autonomy.slam.scan_points import RAYS_MAX, ScanReader
-from roboglot.model.geometry import Pose
+from roboglot.autonomy.slam.painting import paint
+from roboglot.autonomy.slam.scan_points import RAYS_MAX, ScanPoints, ScanReader
+from roboglot.kernels.occupancy import HIT, SCANS
+from roboglot.model.geometry import Point, Pose
 from roboglot.model.sensing import LaserScan
 
 places = st.floats(-300.0, 300.0)
@@ -27,15 +29,17 @@ def test_growing_keeps_cells_in_place_and_stays_bounded(rectangles: list[tuple[f
     row = math.floor(first[1] / RESOLUTION) - grid.first_row
     column = math.floor(first[0] / RESOLUTION) - grid.first_column
     grid.evidence[row, column] = 77
-    grid.surface[row, column] = 5.0
+    grid.make_surfaces(1)
+    grid.slots[row, column], grid.surfaces[1], grid.used = 1, 5.0, 2
     for x0, y0, x1, y1 in rectangles:
         grid.make_room(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
         assert max(grid.evidence.shape) <= GRID_MAX
-        assert grid.evidence.shape == grid.marks.shape == grid.surface.shape[:2]
+        grid.make_surfaces(3)
+        assert grid.evidence.shape == grid.marks.shape == grid.slots.shape
         row = math.floor(first[1] / RESOLUTION) - grid.first_row
         column = math.floor(first[0] / RESOLUTION) - grid.first_column
         assert grid.evidence[row, column] == 77
-        assert grid.surface[row, column, 0] == 5.0
+        assert grid.surfaces[grid.slots[row, column]].tolist() == [5.0] * 5
         assert np.count_nonzero(grid.evidence) == 1
 
 
@@ -160,3 +164,14 @@ def test_wide_map_is_bounded_and_keeps_its_cells() -> None:
     assert grid.full
     assert grid.evidence.size <= CELLS_MAX
     assert int((grid.evidence == 7).sum()) == known
+
+
+def test_every_scan_counts_however_many_there_were() -> None:
+    grid, echo = EvidenceGrid(), np.array([[2.0, 0.0]])
+    scan = ScanPoints(echo, np.ones(1, np.uint8), echo, Point())
+    paint(grid, scan, Pose(), fill=False)
+    row, column = -grid.first_row, math.floor(2.0 / RESOLUTION) - grid.first_column
+    for grid.scans in (*range(SCANS - 3, SCANS + 3), 2 * SCANS - 1):
+        grid.evidence[row, column] = 10
+        paint(grid, scan, Pose(), fill=False)
+        assert grid.evidence[row, column] == 10 + HIT

@@ -20,7 +20,7 @@ DOOR = slice(40, 60)  # rows of the wall in column 50 that the given map shows a
 def walled(given: bool) -> EvidenceGrid:
     grid = EvidenceGrid()
     grid.evidence = np.full((100, 100), -500, np.int16)
-    grid.surface, grid.marks = np.zeros((100, 100, 5), np.float32), np.zeros((100, 100), np.int32)
+    grid.slots, grid.marks = np.zeros((100, 100), np.int32), np.zeros((100, 100), np.int16)
     grid.evidence[:, 50] = 500
     grid.evidence[DOOR, 50] = -500
     if given:

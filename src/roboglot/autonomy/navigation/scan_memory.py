@@ -19,7 +19,10 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 class Cells(Generic[Scalar]):
-    """A number for each cell of a map, 0 at first; grows with the map, and begins anew with another one."""
+    """A number for each cell of a map, 0 at first; grows with the map, and begins anew with another one.
+
+    Pages of memory with zeros only are never written, so that the system need not provide them.
+    """
 
     def __init__(self, kind: type[Scalar]) -> None:
         self._kind = kind
@@ -34,8 +37,8 @@ class Cells(Generic[Scalar]):
             return kept
         cells = np.zeros(shape, self._kind)
         if grid is self._grid:
-            down, along = self._first[0] - first[0], self._first[1] - first[1]
-            cells[down : down + kept.shape[0], along : along + kept.shape[1]] = kept
+            rows, columns = np.nonzero(kept)
+            cells[rows + self._first[0] - first[0], columns + self._first[1] - first[1]] = kept[rows, columns]
         self._grid, self._first, self._cells = grid, first, cells
         return cells
 

@@ -120,7 +120,7 @@ def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
     said = _said(grid, scan, pose, points)
     sensor = np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
-    off, weight = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION).T
+    off, weight = gaps(grid.slots, grid.surfaces, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION).T
     things = _things(points, np.flatnonzero(said == FLOATING))
     rest = np.ones(len(points), bool)
     for thing in things:
@@ -147,7 +147,7 @@ def is_well_painted(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> bool:
     points, corner = np.ascontiguousarray(scan.points[:: max(1, len(scan.points) // PAINTED_POINTS)]), grid.corner
     sensor = np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
-    off, weight = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION).T
+    off, weight = gaps(grid.slots, grid.surfaces, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION).T
     return bool(np.count_nonzero((off < INLIER) & (weight >= PAINTED)) >= PAINTED_SHARE * len(points))
 
 

@@ -165,5 +165,7 @@ def _off(grid: EvidenceGrid, scan: ScanPoints, points: NDArray[np.float64], pose
     """Return each point's distance (m) from the map's surfaces with base_link at ``pose``."""
     corner, sensor = grid.corner, np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
-    off: NDArray[np.float64] = gaps(grid.surface, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION)[:, 0]
+    off: NDArray[np.float64] = gaps(
+        grid.slots, grid.surfaces, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION
+    )[:, 0]
     return np.minimum(off, GAP_MAX)

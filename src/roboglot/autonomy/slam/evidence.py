@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 RESOLUTION = 0.05  # m
 GRID_MAX = 8000  # cells along one side; anything beyond is not mapped
-CELLS_MAX = 8_000_000  # 20,000 m2 at 26 bytes per cell, twice while the map is straightened
+CELLS_MAX = 8_000_000  # 20,000 m2 at 8 bytes per cell and 20 per surface, twice while the map is straightened
 GROWTH = 100  # cells of extra room when the grid grows
 PER_STEP = 8  # evidence per step of the int8 map
 
@@ -33,8 +33,10 @@ class EvidenceGrid:
 
     def __init__(self) -> None:
         self.evidence: NDArray[np.int16] = np.zeros((0, 0), np.int16)
-        self.surface: NDArray[np.float32] = np.zeros((0, 0, 5), np.float32)
-        self.marks: NDArray[np.int32] = np.zeros((0, 0), np.int32)
+        self.slots: NDArray[np.int32] = np.zeros((0, 0), np.int32)
+        self.surfaces: NDArray[np.float32] = np.zeros((1, 5), np.float32)
+        self.used = 1  # rows of the surfaces; no cell has the first one
+        self.marks: NDArray[np.int16] = np.zeros((0, 0), np.int16)
         self.first_column = 0  # of column 0, counted from the map's origin
         self.first_row = 0
         self.scans = 0
@@ -87,24 +89,28 @@ class EvidenceGrid:
         shape = (rows[1] - rows[0], columns[1] - columns[0])
         down, along = self.first_row - rows[0], self.first_column - columns[0]
         old = (slice(down, down + height), slice(along, along + width))
-        evidence, surface, marks = (
-            np.zeros(shape, np.int16),
-            np.zeros((*shape, 5), np.float32),
-            np.zeros(shape, np.int32),
-        )
+        evidence, slots, marks = np.zeros(shape, np.int16), np.zeros(shape, np.int32), np.zeros(shape, np.int16)
         if not empty:
-            evidence[old], surface[old], marks[old] = self.evidence, self.surface, self.marks
-        self.evidence, self.surface, self.marks = evidence, surface, marks
+            evidence[old], slots[old], marks[old] = self.evidence, self.slots, self.marks
+        self.evidence, self.slots, self.marks = evidence, slots, marks
         self.first_row, self.first_column = rows[0], columns[0]
         if self.given is not None:
             given = np.zeros(shape, bool)
             given[old] = self.given
             self.given = given
 
+    def make_surfaces(self, more: int) -> None:
+        """Make room for the surfaces of ``more`` cells."""
+        if self.used + more > len(self.surfaces):
+            surfaces = np.zeros((self.used + more + self.used // 2, 5), np.float32)
+            surfaces[: self.used] = self.surfaces[: self.used]
+            self.surfaces = surfaces
+
     def seen_from(self, column: int, row: int) -> EvidenceGrid:
         """Return a view of this map with its origin at the corner of a cell, counted from the present origin."""
         moved = EvidenceGrid()
-        moved.evidence, moved.surface, moved.marks = self.evidence, self.surface, self.marks
+        moved.evidence, moved.slots, moved.marks = self.evidence, self.slots, self.marks
+        moved.surfaces, moved.used = self.surfaces, self.used
         moved.first_column, moved.first_row = self.first_column - column, self.first_row - row
         moved.scans, moved.full, moved.given = self.scans, self.full, self.given
         return moved
@@ -112,22 +118,23 @@ class EvidenceGrid:
     def copy(self) -> EvidenceGrid:
         """Return an independent copy."""
         copied = self.seen_from(0, 0)
-        copied.evidence, copied.surface, copied.marks = self.evidence.copy(), self.surface.copy(), self.marks.copy()
+        copied.evidence, copied.slots, copied.marks = self.evidence.copy(), self.slots.copy(), self.marks.copy()
+        copied.surfaces = self.surfaces.copy()
         copied.frozen = self.frozen
         return copied
 
     def empty_like(self) -> EvidenceGrid:
         """Return an empty map of the same size and place, for ``copy_rows``."""
         copied = self.seen_from(0, 0)
-        copied.evidence, copied.surface, copied.marks = (
-            np.zeros(array.shape, array.dtype) for array in (self.evidence, self.surface, self.marks)
-        )
+        copied.evidence, copied.marks = (np.zeros_like(array) for array in (self.evidence, self.marks))
+        copied.slots = np.zeros_like(self.slots)
+        copied.surfaces = self.surfaces.copy()  # few: rows of cells have theirs once they are copied
         copied.frozen = self.frozen
         return copied
 
     def copy_rows(self, other: EvidenceGrid, rows: slice) -> None:
         """Copy rows from ``other``, which has the same size."""
-        for mine, its in ((self.evidence, other.evidence), (self.surface, other.surface), (self.marks, other.marks)):
+        for mine, its in ((self.evidence, other.evidence), (self.slots, other.slots), (self.marks, other.marks)):
             mine[rows] = its[rows]
 
     def occupancy(self) -> OccupancyGrid:

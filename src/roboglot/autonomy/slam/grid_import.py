@@ -36,8 +36,8 @@ def evidence_of(grid: OccupancyGrid) -> EvidenceGrid:
     steps = np.abs(cells.astype(np.int16))
     imported.evidence = (np.sign(cells) * ((steps - 1) * PER_STEP + PER_STEP // 2)).astype(np.int16)
     imported.evidence[cells == 0] = 0
-    imported.surface = _surfaces(cells)
-    imported.marks = np.zeros(cells.shape, np.int32)
+    imported.surfaces, imported.slots = _surfaces(cells)
+    imported.used, imported.marks = len(imported.surfaces), np.zeros(cells.shape, np.int16)
     imported.scans = 1  # so that the map does not count as empty
     return imported
 
@@ -67,8 +67,8 @@ def _resampled(grid: OccupancyGrid) -> tuple[NDArray[np.int8], int, int]:
     return np.where(occupied > 0, occupied, free), round(row), round(column)
 
 
-def _surfaces(cells: NDArray[np.int8]) -> NDArray[np.float32]:
-    """Return the surfaces and the sides that they face, in the form of ``kernels.occupancy``."""
+def _surfaces(cells: NDArray[np.int8]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Return the surfaces with the sides that they face, and their slots, in the form of ``kernels.occupancy``."""
     height, width = cells.shape
     free = np.pad(cells < 0, 1).astype(np.float32)
     towards_x, towards_y = np.zeros((2, height, width), np.float32)
@@ -79,10 +79,12 @@ def _surfaces(cells: NDArray[np.int8]) -> NDArray[np.float32]:
                 towards_x += along * there
                 towards_y += down * there
     length = np.maximum(np.hypot(towards_x, towards_y), 1.0)  # a thin wall is seen from both sides
-    surface = np.zeros((height, width, 5), np.float32)
     occupied = cells > 0
-    surface[occupied, 0] = HITS
-    surface[occupied, 1] = surface[occupied, 2] = HITS * RESOLUTION / 2
-    surface[occupied, 3] = HITS * (towards_x / length)[occupied]
-    surface[occupied, 4] = HITS * (towards_y / length)[occupied]
-    return surface
+    count = int(np.count_nonzero(occupied))
+    surfaces, slots = np.zeros((1 + count, 5), np.float32), np.zeros((height, width), np.int32)
+    slots[occupied] = np.arange(1, 1 + count)
+    surfaces[1:, 0] = HITS
+    surfaces[1:, 1] = surfaces[1:, 2] = HITS * RESOLUTION / 2
+    surfaces[1:, 3] = HITS * (towards_x / length)[occupied]
+    surfaces[1:, 4] = HITS * (towards_y / length)[occupied]
+    return surfaces, slots

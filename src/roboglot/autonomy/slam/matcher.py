@@ -119,7 +119,7 @@ def fit(
         first = np.array((start.x - corner.x, start.y - corner.y, prior.yaw + wrap_angle(start.yaw - prior.yaw)))
     sensor = np.array((scan.sensor.x, scan.sensor.y))
     found, narrowed, strain, fitting, known = match(
-        grid.surface, grid.evidence, points, first, centre, covariance, sensor, RESOLUTION, iterations
+        grid.slots, grid.surfaces, grid.evidence, points, first, centre, covariance, sensor, RESOLUTION, iterations
     )
     np.maximum(narrowed, LEAST, out=narrowed)
     x, y, yaw = found.tolist()

@@ -9,7 +9,7 @@ import numpy as np
 from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import ScanPoints
-from roboglot.kernels.occupancy import FROZEN, integrate, placed
+from roboglot.kernels.occupancy import FROZEN, SCANS, integrate, placed
 from roboglot.model.components.mapping.annotations import Area
 from roboglot.model.geometry import Pose
 
@@ -27,7 +27,11 @@ def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maint
     ends -= (corner.x, corner.y)
     sensor = pose.compose(Pose(scan.sensor.x, scan.sensor.y))
     x, y = sensor.x - corner.x, sensor.y - corner.y
-    integrate(grid.evidence, grid.surface, grid.marks, grid.scans, ends, scan.hit, x, y, fill, RESOLUTION)
+    grid.make_surfaces(len(ends))
+    slots, surfaces, marks, number = grid.slots, grid.surfaces, grid.marks, 1 + grid.scans % SCANS
+    grid.used = integrate(
+        grid.evidence, slots, surfaces, grid.used, marks, number, ends, scan.hit, x, y, fill, RESOLUTION
+    )
 
 
 def _freeze(grid: EvidenceGrid, maintained: Sequence[Area]) -> None:
