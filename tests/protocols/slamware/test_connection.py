@@ -7,7 +7,7 @@ import logging
 import httpx
 import pytest
 
-from roboglot.protocols.slamware import http_connection
+from roboglot.protocols.slamware import dispatch, http_connection
 from roboglot.protocols.slamware.http_connection import HEAD_MAX
 from roboglot.protocols.slamware.server import SlamwareDoor
 
@@ -156,3 +156,55 @@ async def test_trailers_let_no_page_in(bare_door: SlamwareDoor) -> None:
     finally:
         writer.close()
     assert b" 403 " in await raw(bare_door, f"{head}{origin}\r\n2\r\n{{}}\r\n0\r\n\r\n".encode())
+
+
+async def test_trailer_in_one_piece_is_no_header(bare_door: SlamwareDoor) -> None:
+    head = f"GET {POIS} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nTransfer-Encoding: chunked\r\n\r\n"
+    trailed = f"{head}2\r\n{{}}\r\n0\r\nOrigin: http://evil.example\r\n\r\n"
+    assert (await raw(bare_door, trailed.encode())).startswith(b"HTTP/1.1 200 ")
+
+
+@pytest.mark.parametrize(
+    ("garbage", "status"),
+    [
+        (b"hello\r\n\r\n", b"400"),
+        (b"GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\nno length\r\n", b"400"),
+        (b"GET / HTTP/1.1\r\nx: " + b"y" * (2 * HEAD_MAX), b"431"),
+    ],
+)
+@pytest.mark.parametrize("before", [0, 1, 3])
+async def test_requests_before_garbage_are_answered_first(
+    bare_door: SlamwareDoor, garbage: bytes, status: bytes, before: int
+) -> None:
+    answers = await raw(bare_door, f"GET {POIS} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode() * before + garbage)
+    assert [answer[:3] for answer in answers.split(b"HTTP/1.1 ")[1:]] == [b"200"] * before + [status]
+
+
+async def test_client_that_says_no_more_gets_its_answer(
+    bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard_all = asyncio.Event()
+    monkeypatch.setattr(dispatch, "late", lambda _robot: heard_all.wait())
+    hear = http_connection.HttpConnection.eof_received
+
+    def note_end(connection: http_connection.HttpConnection) -> bool:
+        heard_all.set()
+        return hear(connection)
+
+    monkeypatch.setattr(http_connection.HttpConnection, "eof_received", note_end)
+    reader, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
+    writer.write(f"GET {POIS} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
+    writer.write_eof()
+    assert (await asyncio.wait_for(reader.read(), 60.0)).endswith(b"\r\n\r\n[]")
+    writer.close()
+
+
+@pytest.mark.parametrize(
+    "begun", [b"", b"GET / HTTP", b"POST " + POIS.encode() + b" HTTP/1.1\r\nContent-Length: 9\r\n\r\n{"]
+)
+async def test_client_gone_within_its_request_is_let_go(bare_door: SlamwareDoor, begun: bytes) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
+    writer.write(begun)
+    writer.write_eof()
+    assert await asyncio.wait_for(reader.read(), 60.0) == b""
+    writer.close()

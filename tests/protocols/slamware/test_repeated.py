@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import AsyncIterator
 from unittest.mock import patch
 
@@ -10,7 +11,7 @@ import pytest
 
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.errors import Refused
-from roboglot.model.inputs.fairness import LENT, Fairness
+from roboglot.model.inputs.fairness import Fairness
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.http_connection import REPEATED_MAX, HttpConnection
 from roboglot.protocols.slamware.server import SlamwareDoor
@@ -126,15 +127,15 @@ async def test_number_of_known_requests_is_limited(wire: Client, bare_door: Slam
     assert 0 < len(connection(bare_door)._said) <= REPEATED_MAX
 
 
-async def test_repeated_requests_count_in_the_share(wire: Client, bare: Robot) -> None:
-    bare.fairness = fairness = Fairness(lambda: 0.0, lambda: 0.0)
+async def test_each_repeated_request_counts_in_the_share(wire: Client, bare: Robot) -> None:
+    time = itertools.count()
+    bare.fairness = fairness = Fairness(lambda: next(time) * 1e-6, lambda: 0.0)
     host, port = wire.writer.get_extra_info("sockname")
-    for _ in range(2 + LENT):
+    use, used = fairness.of(f"{host}:{port}"), [0.0]
+    for _ in range(6):
         await wire.ask(get())
-    use = fairness.of(f"{host}:{port}")
-    assert use.left == 0
-    await wire.ask(get())
-    assert use.left == LENT
+        used.append(use.used)
+    assert used == sorted(set(used))
 
 
 async def test_request_of_each_window_needs_no_parser(wire: Client, bare: Robot, bare_door: SlamwareDoor) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Protocol, cast
 
 import httptools
@@ -114,6 +115,12 @@ def with_reason(head: bytes) -> bytes:
     return head[:_CODE_END] + reason + head[head.index(b"\r\n") : at] + head[end:]
 
 
+def send_last(transport: asyncio.Transport, response: bytes) -> None:
+    """Send a response and close."""
+    transport.write(response)
+    transport.close()
+
+
 class HeadTooLong(Exception):
     """Ends the parsing of a request; never leaves this module."""
 
@@ -134,6 +141,7 @@ class HttpConnection(HttpToolsProtocol):
     _idle = True  # nothing is half received or half answered
     _whole, _last = b"", b""  # the request that is being answered, if it came in one piece, and the one before
     _answered_again = False  # since the keep-alive's timer was set
+    _refusal: Callable[[], None] | None = None  # of what cannot be read, to be sent after the answers under way
 
     def __init__(self, application: Answering, config: Config, state: ServerState) -> None:
         super().__init__(config, state, {}, asyncio.get_running_loop())
@@ -162,6 +170,8 @@ class HttpConnection(HttpToolsProtocol):
             self._read(data)
 
     def _read(self, data: bytes) -> None:
+        if self._refusal is not None:
+            return
         idle, self._idle = self._idle, False
         self._begun, self._whole = 0, b""
         unread: list[bytes | memoryview] = [data]
@@ -171,7 +181,7 @@ class HttpConnection(HttpToolsProtocol):
             if self._in_head:
                 self._head_bytes += len(self._reading)
                 if self._head_bytes > HEAD_MAX:
-                    self._refuse_head()
+                    self._refuse(partial(send_last, self.transport, _TOO_LARGE))
             unread, self._unread = [*self._unread, *unread], ()
         if idle and self._begun == 1 and not self._receiving and len(data) <= REPEATED_BYTES_MAX:
             self._whole = data
@@ -179,9 +189,9 @@ class HttpConnection(HttpToolsProtocol):
     def send_400_response(self, msg: str) -> None:
         """Answer a request that cannot be parsed, or that ``_measure`` stopped; called by uvicorn."""
         if self._parsed_bytes > HEAD_MAX:
-            self._refuse_head()
+            self._refuse(partial(send_last, self.transport, _TOO_LARGE))
         else:
-            super().send_400_response(msg)
+            self._refuse(partial(super().send_400_response, msg))
 
     def on_url(self, url: bytes) -> None:
         self._measure(len(url))
@@ -189,7 +199,8 @@ class HttpConnection(HttpToolsProtocol):
 
     def on_header(self, name: bytes, value: bytes) -> None:
         self._measure(len(name) + len(value))
-        super().on_header(name, value)
+        if self._in_head:  # a trailer comes too late: the request may have been answered
+            super().on_header(name, value)
 
     def _measure(self, more: int) -> None:
         """Count, and stop the parser when it is too much."""
@@ -197,10 +208,19 @@ class HttpConnection(HttpToolsProtocol):
         if self._parsed_bytes > HEAD_MAX:
             raise HeadTooLong
 
-    def _refuse_head(self) -> None:
-        if not self.transport.is_closing():
-            self.transport.write(_TOO_LARGE)
-            self.transport.close()
+    def _refuse(self, refusal: Callable[[], None]) -> None:
+        """Refuse the request that arrives, after those before it were answered."""
+        if self._receiving and not self._in_head:  # its body is wrong: it is answered, or waits as the last one
+            answering = bool(self.pipeline)
+            if answering:
+                self.pipeline.popleft()
+        else:
+            answering = self.cycle is not None and not self.cycle.response_complete
+        if answering:
+            self._refusal = refusal
+            self._guard(WRITE_SECONDS_MAX)
+        elif not self.transport.is_closing():
+            refusal()
 
     def _should_upgrade(self) -> bool:
         """Makes uvicorn pass over a request that asks for another protocol, and call what follows at its end."""
@@ -252,6 +272,8 @@ class HttpConnection(HttpToolsProtocol):
     def on_response_complete(self) -> None:
         assert isinstance(self.transport, ReasonTransport)
         self.transport.flush()  # the answer to a HEAD has no body
+        if self._refusal is not None and not self.pipeline and not self.transport.is_closing():
+            self._refusal()
         super().on_response_complete()
         self._answered_again = False
         if not (self._receiving or self.pipeline or self.flow.write_paused or self.transport.is_closing()):
@@ -259,6 +281,12 @@ class HttpConnection(HttpToolsProtocol):
             if self._whole and self._whole == self._last:
                 self._learn(self._whole)
             self._last = self._whole
+
+    def eof_received(self) -> bool:  # type: ignore[override] # uvicorn drops the answers of one that says no more
+        """Close after the answers under way; return True until then."""
+        if not self._receiving:
+            self.shutdown()
+        return not (self._receiving or self.transport.is_closing())
 
     def _learn(self, request: bytes) -> None:
         """Keep what answers this request, which came twice, one after the other."""
