@@ -218,3 +218,28 @@ def test_threads_may_use_a_class_first() -> None:
             thread.join()
         assert len(made) == 4
         assert len(set(made)) == 1
+
+
+def test_no_signature_is_worded_for_a_method(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library words one for a class without a docstring, which takes as long as all else."""
+    monkeypatch.delattr(inspect, "signature")  # the library then fails
+
+    @values.dataclass(frozen=True)
+    class Plain:
+        """A class like ours, which has a docstring."""
+
+        x: int
+
+    assert repr(Plain(1)) == f"{Plain.__qualname__}(x=1)"
+    assert {Plain(1)} == {Plain(1)}
+
+
+def test_initialisers_can_be_made_ahead() -> None:
+    @values.dataclass(frozen=True, slots=True)
+    class Early:
+        x: int
+
+    values.make_initialisers()
+    assert inspect.isfunction(vars(Early)["__init__"])
+    assert not inspect.isfunction(vars(Early)["__repr__"])
+    assert Early(1) == Early(1)

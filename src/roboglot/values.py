@@ -8,6 +8,7 @@ that library's own, made when they are first looked up. For type checkers it is 
 from __future__ import annotations
 
 import dataclasses
+import gc
 import sys
 from collections.abc import Callable
 from types import MemberDescriptorType
@@ -70,6 +71,13 @@ else:
             return made
 
         return decorate if plain is None else decorate(plain)
+
+
+def make_initialisers() -> None:
+    """Make the ``__init__`` of all classes now, for processes that are forked from this one."""
+    for found in gc.get_objects():
+        if type(found) is _Later and found._name == "__init__" and vars(found._owner).get("__init__") is found:
+            found.__get__(None)
 
 
 def _is_unhashable_by_eq(plain: type) -> bool:
@@ -151,7 +159,7 @@ def _method(owner: type, name: str, *, frozen: bool) -> Callable[..., object]:
         alone = dataclasses.make_dataclass(
             owner.__name__,
             fields,
-            namespace={"__doc__": ""},  # the library would word one, slowly
+            namespace={"__doc__": owner.__doc__ or name},  # the library would word one, slowly
             init=False,
             repr=name == "__repr__",
             eq=name == "__eq__",

@@ -63,11 +63,13 @@ def warm() -> None:
     for name in FOREIGN:
         importlib.import_module(name)
     from roboglot.kernels import MODULES, loading
+    from roboglot.values import make_initialisers
 
     with loading():
         for name in MODULES:
             importlib.import_module(f"roboglot.kernels.{name}")
     _rehearse()
+    make_initialisers()
     gc.collect()
     gc.freeze()
     gc.enable()
