@@ -224,13 +224,14 @@ def refuse_unguarded(config: Config) -> None:
     if config.console.enabled and not is_loopback(config.console.address) and not guarded:
         raise ValueError(
             f"others could open the console on {config.console.address} and drive every robot. Use 127.0.0.1, let"
-            " people in by name (--access), or give --insecure"
+            " people in by name ([access] or --access), or let everyone in (insecure = true or --insecure)"
         )
     if config.opened and not guarded:
         listed = ", ".join(f"{robot.name} on {robot.address}" for robot in config.opened)
         raise ValueError(
             f"others could reach robot {listed}, and its protocols require no password: everyone there could"
-            " drive it. Use an address of 127.0.0.0/8, let people in by name (--access), or give --insecure"
+            " drive it. Use an address of 127.0.0.0/8, let people in by name ([access] or --access), or let everyone in"
+            " (insecure = true or --insecure)"
         )
 
 

@@ -15,6 +15,7 @@ from typing import NamedTuple, cast
 from roboglot.model.admission import Admission, Forbidden, Right
 from roboglot.model.client_context import ask_for
 from roboglot.transport.connections import Connections
+from roboglot.transport.listening import listen
 from roboglot.transport.metered import Metered
 from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort
@@ -71,7 +72,7 @@ class Gate:
         Raises OSError naming an address that is taken.
         """
         gated = self.before(factory, name, right, most)
-        server = await asyncio.get_running_loop().create_server(gated, address, port, backlog=BACKLOG)
+        server = await listen(gated, address, port, BACKLOG)
         self._admission.offer(server, gated)
         return server
 

@@ -19,6 +19,7 @@ from roboglot.access.tunnel.busy_poll import BusyPoll
 from roboglot.access.tunnel.frames import FrameKind
 from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.tunnel import Tunnel
+from roboglot.transport.listening import listen
 from roboglot.transport.tls import TlsCall
 
 log = logging.getLogger(__name__)
@@ -178,7 +179,7 @@ class Connector:
             tunnel = Tunnel(link, first=1, opened=call_back, datagram=pass_on)
             async with contextlib.AsyncExitStack() as stack:
                 for port in words["tcp"]:
-                    server = await loop.create_server(tunnel.accept(int(port)), self._address, int(port))
+                    server = await listen(tunnel.accept(int(port)), self._address, int(port))
                     stack.callback(server.close)
                 ready([int(port) for port in words["tcp"]])
                 beside = asyncio.ensure_future(self._beat_beside(tunnel, str(words.get("beats", ""))))

@@ -145,7 +145,7 @@ def _unusable(error: BaseException, address: str) -> str:
             network = IPv4Network(f"{address}/24", strict=False)
             return f"{address} is no address of this machine; as root: ip route add local {network} dev lo"
         case errno.EADDRINUSE:
-            return f"{error}; --address chooses another one"
+            return f"{getattr(error, 'strerror', error)}; --address chooses another one"
         case errno.EACCES:
-            return str(error)
+            return str(getattr(error, "strerror", error))
     return ""

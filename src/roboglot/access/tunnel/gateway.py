@@ -33,6 +33,7 @@ from roboglot.model.admission import Proof, ProofKind, Right, Unknown
 from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
 from roboglot.transport.connections import Connections
+from roboglot.transport.listening import listen
 from roboglot.transport.metered import Metered
 from roboglot.transport.pipe import join
 from roboglot.transport.seldom import Seldom
@@ -103,8 +104,7 @@ class Gateway:
         def encrypted() -> asyncio.Protocol:
             return TlsPort(lambda: TunnelLink(self._begin, stir), tls, self._guard.may_shake_hands)
 
-        loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(
+        self._server = await listen(
             lambda: _Entry(self._guard, self._connections, self._transports, encrypted), self._host, self.port
         )
         self.port = self._server.sockets[0].getsockname()[1]
@@ -340,6 +340,6 @@ async def _listening(tunnel: Tunnel, robot: Robot, ports: Ports, own: str) -> As
     async with contextlib.AsyncExitStack() as stack:
         stack.callback(robot.tap.listen(take))
         for port in ports.callbacks:
-            server = await asyncio.get_running_loop().create_server(tunnel.accept(port), own, port)
+            server = await listen(tunnel.accept(port), own, port)
             stack.callback(server.close)
         yield

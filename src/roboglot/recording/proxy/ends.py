@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable
 from typing import cast
 
 from roboglot.model.clock import Clock
+from roboglot.transport.listening import listen
 from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsCall, TlsPort
 from roboglot.values import dataclass
@@ -203,7 +204,7 @@ class Crossing:
         def end() -> asyncio.Protocol:
             return End(self.watch, came) if context is None else _TimedPort(came, context, self.watch)
 
-        self._servers.append(await asyncio.get_running_loop().create_server(end, host, port))
+        self._servers.append(await listen(end, host, port))
 
     def cross(self, came: End, to: Place, robot: End, joining: Joining | None = None) -> None:
         """Dial ``to`` as ``robot`` for the incoming end; ``joining`` is awaited before any byte passes."""
