@@ -91,6 +91,9 @@ def test_trials_are_all_tabulated_and_never_played_twice(folder: Path) -> None:
     again = begin(folder, "--seeds", "2")
     said, _ = again.communicate(timeout=200)
     assert "1 of 2 trials are in" in said
+    assert again.returncode == 0, "the other scenario's crash is no trial of this command"
+    assert "2 of 2 trials passed" in said
+    assert "2 of 2 were played" in (folder / "campaign/report.md").read_text()
     assert [row["seed"] for row in rows(folder) if row["scenario"] == "stays.yaml"] == ["1", "2"]
 
 

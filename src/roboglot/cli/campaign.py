@@ -66,10 +66,10 @@ def command(
     except (MissingExtra, OSError, ValueError) as bad:
         print(f"roboglot campaign: {visible(in_words(bad))}", file=sys.stderr)
         raise typer.Exit(2) from None
-    _write(table, folder, len(trials))
+    passed = _write(table, folder, trials)
     if interrupted:
         raise typer.Exit(130)
-    raise typer.Exit(0 if all(row.outcome == "passed" for row in table.rows) else 1)
+    raise typer.Exit(0 if passed else 1)
 
 
 def _player(on: str, folders: Sequence[Path], workers: int, longest: float) -> Player:
@@ -115,16 +115,19 @@ def _play(left: list[Trial], table: Table, player: Player) -> bool:
     return False
 
 
-def _write(table: Table, folder: Path, wanted: int) -> None:
-    """Write the report and, if pyarrow is installed, the table for data tools."""
+def _write(table: Table, folder: Path, trials: Sequence[Trial]) -> bool:
+    """Write the report on ``trials`` and, if pyarrow is installed, the table for data tools; return if all passed."""
     from roboglot.testing.campaign.report import report
     from roboglot.testing.campaign.table import write_parquet
 
+    wanted = {(trial.scenario, trial.seed) for trial in trials}  # the table may hold further ones
+    rows = [row for row in table.rows if (row.scenario, row.seed) in wanted]
     page = table.path.with_name("report.md")
-    page.write_text(report(table.rows, folder, wanted), encoding="utf-8")
+    page.write_text(report(rows, folder, len(trials)), encoding="utf-8")
     written = [str(table.path), str(page)]
     if write_parquet(table.rows, parquet := table.path.with_suffix(".parquet")):
         written.append(str(parquet))
-    passed = sum(row.outcome == "passed" for row in table.rows)
-    print(f"{passed} of {len(table.rows)} trials passed: {', '.join(written)}")
+    passed = sum(row.outcome == "passed" for row in rows)
+    print(f"{passed} of {len(rows)} trials passed: {', '.join(written)}")
     table.close()
+    return passed == len(rows)
