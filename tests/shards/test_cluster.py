@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import os
 import time
+import warnings
 from collections.abc import Iterator
+from concurrent.futures import Future
 from functools import partialmethod
 from pathlib import Path
 
@@ -19,7 +21,7 @@ os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 import ray
 from ray.cluster_utils import Cluster
 
-from roboglot.shards.cluster import ClusterFleet, join, joined
+from roboglot.shards.cluster import ClusterFleet, _answer, join, joined, own_token, refuse_unfenced
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.supervisor import State
 from roboglot.storage.homes import Home, Homes
@@ -123,7 +125,38 @@ def test_failed_client_server_is_named_by_its_reason(monkeypatch: pytest.MonkeyP
         join("ray://head")
 
 
-async def test_a_cluster_without_a_registry_is_refused(tmp_path: Path) -> None:
+def test_silent_head_is_named_with_both_reasons(monkeypatch: pytest.MonkeyPatch) -> None:
+    def time_out(**_: object) -> None:
+        warnings.warn("Ray Client connection timed out.", stacklevel=1)
+        raise ConnectionError("ray client connection timeout")
+
+    monkeypatch.setattr(ray, "init", time_out)
+    with (
+        warnings.catch_warnings(action="error"),
+        pytest.raises(OSError, match=r"^--on ray://head: no Ray head answers there, or it requires a token"),
+    ):
+        join("ray://head")
+
+
+async def test_late_answer_of_a_shard_is_dropped() -> None:
+    answer = Future[bytes]()
+    reference = type("Reference", (), {"future": lambda _: answer})()
+    asking = asyncio.ensure_future(_answer(reference))
+    await asyncio.sleep(0)
+    asking.cancel()
+    await asyncio.gather(asking, return_exceptions=True)
+    answer.set_result(b"")  # raises if the future was cancelled, too
+
+
+def test_token_is_found_where_ray_keeps_it(tmp_path: Path) -> None:
+    assert not own_token({}, tmp_path)
+    assert own_token({"RAY_AUTH_TOKEN": "x"}, tmp_path)
+    (tmp_path / ".ray").mkdir()
+    (tmp_path / ".ray/auth_token").write_text("x")
+    assert own_token({}, tmp_path)
+
+
+def test_a_cluster_without_a_registry_is_refused(tmp_path: Path) -> None:
     plan = plan_fleet(1, 1, {}, tmp_path, first=FIRST)
     with pytest.raises(ValueError, match="needs `database` or `registry`"):
-        ClusterFleet(plan, tmp_path / "fleet", "ray://head")
+        refuse_unfenced(plan, "ray://head")

@@ -11,8 +11,8 @@ import logging
 import os
 import shutil
 import sqlite3
-import time
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,8 +31,18 @@ from roboglot.storage.opening import open_registry
 from roboglot.storage.residence import LEASE
 from roboglot.storage.silence import Silence
 
+TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
+
+
+def own_token(environment: Mapping[str, str], home: Path) -> bool:
+    """Return whether the user has a token for Ray; `ray start --head` then requires it, Ray's client never sends it."""
+    return any(map(environment.get, TOKENS)) or (home / ".ray" / "auth_token").is_file()
+
+
 with explaining("--on", "fleet"):
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # no data leaves the machine unasked
+    if own_token(os.environ, Path(os.path.expanduser("~"))):
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
     import ray
     from ray.exceptions import RayActorError, RayError
 
@@ -66,10 +76,13 @@ def join(where: str) -> None:
             )
             return
         address = f"{where}:{CLIENT_PORT}" if where.startswith("ray://") and where.count(":") == 1 else where
-        ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
+        with warnings.catch_warnings(action="ignore"):  # the error says it
+            ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
     except Exception as error:  # noqa: BLE001 - Ray raises bare ones, too
         lines = str(error).strip().splitlines() or [type(error).__name__]
         why = f"{lines[0]} {lines[-1]}" if lines[0].endswith(":") else lines[0]  # the server's own error is last
+        if why.endswith("connection timeout"):
+            why = "no Ray head answers there, or it requires a token that this user does not have (RAY_AUTH_TOKEN)"
         raise OSError(f"--on {where}: {why}") from None
 
 
@@ -108,9 +121,7 @@ class ClusterFleet:
     """One fleet on a joined cluster. ``lasting``: its shards outlive this program."""
 
     def __init__(self, plan: FleetPlan, folder: Path, where: str, *, lasting: bool = False) -> None:
-        """Raises FolderInUse; ValueError if robots could run twice on this cluster."""
-        if where != LOCAL:
-            _refuse_unfenced(plan)
+        """Raises FolderInUse."""
         self.plan, self.folder, self._lasting, self._local = plan, folder, lasting, where == LOCAL
         self._lock = lock_folder(folder)
         self.shards = {p.name: Shard(n, p, folder / "shards" / p.name) for n, p in enumerate(plan.shards, start=1)}
@@ -134,12 +145,10 @@ class ClusterFleet:
         return self._local
 
     async def start(self) -> float:
-        """Start all shards, or find running ones; return the duration (s) when each is ready or has failed."""
-        began = time.monotonic()
+        """Start all shards, or find running ones; return 0 (s, nothing is loaded here) when each is ready or failed."""
         save(self.plan, self.folder)
         for shard in self.shards.values():
             await asyncio.to_thread(self._begin, shard)
-        passed = time.monotonic() - began
         self._silence = self._loop.create_task(_free_the_silent(self.plan), name="watch over silent homes")
         self._watch = self._loop.create_task(self._look_always(), name="looks at shards")
         try:
@@ -147,7 +156,7 @@ class ClusterFleet:
         except TimeoutError:
             waiting = [shard.plan.name for shard in self.shards.values() if not _settled(shard)]
             log.warning("shards %s are not up yet; perhaps the cluster has no room", ", ".join(waiting))
-        return passed
+        return 0.0
 
     async def close(self) -> None:
         """Stop all shards, unless ``lasting``, and release the folder."""
@@ -170,7 +179,7 @@ class ClusterFleet:
     async def restart(self, shard: Shard) -> None:
         """Restart a shard, or start it; return when it is ready or has failed."""
         await self.stop(shard)
-        shard.reason = ""
+        shard.hopeless, shard.reason = False, ""
         await asyncio.to_thread(self._begin, shard)
         await asyncio.wait_for(self.until(lambda: _settled(shard)), START_MAX)
 
@@ -240,7 +249,8 @@ class ClusterFleet:
     def _missed(self, shard: Shard) -> None:
         if shard.state is State.READY:
             log.warning("shard %s does not answer on %s", shard.plan.name, self._nodes.get(shard.plan.name))
-            shard.reason, shard.ready = "it does not answer; Ray starts it again if its process or node is gone", None
+            shard.reason = "it does not answer; Ray starts it again if its process or node is gone"
+            shard.ready = None
             self._turn_to(shard, State.STARTING)
 
     def _seen(self, shard: Shard, condition: Condition) -> None:
@@ -254,7 +264,7 @@ class ClusterFleet:
         shard.ready = (condition.ready or shard.ready) if condition.up else None
         shard.beat = condition.beat or shard.beat
         if condition.refusal is not None:
-            shard.reason = condition.refusal.reason
+            shard.reason, shard.hopeless = condition.refusal.reason, condition.refusal.lasting
             state = State.FAILED if condition.refusal.lasting else State.STARTING  # Ray retries it
             log.warning("shard %s did not start: %s", name, shard.reason)
         else:
@@ -265,7 +275,7 @@ class ClusterFleet:
             self._turn_to(shard, state)
 
     def _turn_to(self, shard: Shard, state: State) -> None:
-        shard.state, shard.since = state, self._loop.time()
+        shard.turn_to(state, self._loop.time())
         self._changed.set()
 
     async def until(self, condition: Callable[[], bool]) -> None:
@@ -276,7 +286,10 @@ class ClusterFleet:
 
 
 async def _answer(reference: Reference) -> bytes:
-    return await asyncio.wrap_future(reference.future())
+    """Return the answer. Cancelling leaves Ray's own future alone: its late result would end in a traceback."""
+    answer = asyncio.wrap_future(reference.future())
+    answer.add_done_callback(lambda late: late.cancelled() or late.exception())  # also if it comes too late
+    return await asyncio.shield(answer)
 
 
 def _settled(shard: Shard) -> bool:
@@ -311,9 +324,10 @@ def _registry_of(shard: ShardPlan) -> str:
     return str(shard.settings.get("registry") or shard.settings.get("database") or "")
 
 
-def _refuse_unfenced(plan: FleetPlan) -> None:
+def refuse_unfenced(plan: FleetPlan, where: str) -> None:
+    """Raise ValueError if robots could run twice on the cluster ``where``."""
     for shard in plan.shards[:1]:  # they differ only in names and addresses
-        if not _registry_of(shard):
+        if where != LOCAL and not _registry_of(shard):
             raise ValueError(
                 "a fleet on a cluster needs `database` or `registry` in its --template: without one, a robot could run"
                 " on two machines when the network splits"
