@@ -14,7 +14,8 @@ from tests.statements import parsed, statements
 ROOT = Path(roboglot.__file__).parent
 PLACES = (
     "access/", "autonomy/", "conditions.py", "console/", "drivers/", "media/", "model/", "operations.py", "programs/",
-    "protocols/visual/", "recording/", "rehearsal.py", "simulation/", "storage/", "wire/visual/",
+    "protocols/visual/", "recording/", "rehearsal.py", "shards/", "simulation/", "storage/", "transport/",
+    "wire/visual/",
 )  # fmt: skip
 KINDS = {"RobotError", "ProgramError", "BadParameters", "BadCondition", "Problem"}
 OUTSIDE = ("console/", "model/", "rehearsal.py", "simulation/")  # pages show their ValueError and RuntimeError, too
@@ -69,7 +70,10 @@ def _said(tree: ast.Module, errors: set[str], outside: bool) -> Iterator[tuple[s
                 place = LATER.get(name, 0 if name in first else len(node.args))
                 values = node.args[place : place + 1]
                 values += [keyword.value for keyword in node.keywords if keyword.arg in NAMED]
-            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AugAssign(target=ast.Name(id=name)) if name in NAMED:
+            case (
+                ast.Assign(targets=[ast.Name(id=name) | ast.Attribute(attr=name)])
+                | ast.AugAssign(target=ast.Name(id=name))
+            ) if name in NAMED:
                 values = [node.value]
         for value in values:
             yield from ((text, line) for text in _texts(value))

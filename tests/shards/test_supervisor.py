@@ -83,10 +83,13 @@ async def test_few_start_at_a_time_then_the_next(supervisor: Supervisor) -> None
     assert [shard.state for shard in supervisor.shards.values()].count(State.STARTING) == STARTING_MAX
 
 
-async def test_dead_one_returns_at_growing_distances(supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_dead_one_returns_at_growing_distances(
+    supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr(module, "PAUSES", (0.0, 3600.0))
     forks(supervisor).die(1, -signal.SIGKILL)
     await supervisor.until(lambda: forks(supervisor).forked.count(1) == 2)
+    assert "shard w1 is down: killed by SIGKILL; it starts again at once" in caplog.text
     forks(supervisor).die(1, 1)
     assert first(supervisor).state is State.FAILED
     assert first(supervisor).again is not None, "it is tried again"
@@ -98,6 +101,15 @@ async def test_one_with_wrong_settings_is_not_retried(supervisor: Supervisor) ->
     forks(supervisor).die(1, 1)
     shard = first(supervisor)
     assert (shard.state, shard.reason, shard.again) == (State.FAILED, "there is no world 'moon'", None)
+    await supervisor.stop(shard)
+    assert shard.reason == "", "one that was stopped by request has no other reason"
+
+
+async def test_a_reason_of_all_is_logged_once(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:
+    for number in (1, 2):
+        forks(supervisor).say(number, Refusal("there is no world 'moon'", lasting=True))
+        forks(supervisor).die(number, 1)
+    assert [record.getMessage() for record in caplog.records] == ["shard w1 cannot start: there is no world 'moon'"]
 
 
 async def test_one_that_grows_too_large_is_restarted_orderly(supervisor: Supervisor) -> None:

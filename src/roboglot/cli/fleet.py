@@ -21,6 +21,7 @@ import typer
 from roboglot.cli.control import running
 from roboglot.config import default_data_folder
 from roboglot.extras import MissingExtra
+from roboglot.hosting.reasons import in_words
 from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
@@ -40,12 +41,20 @@ Data = Annotated[
 ]
 
 
+class NoWorld(ValueError):
+    """The settings of every world are wrong."""
+
+
 @app.command()
 def up(
-    worlds: Annotated[int, typer.Option(help="Number of worlds; needed at the first start.")] = 0,
-    robots_each: Annotated[int, typer.Option(help="Robots in each world, without a template.")] = 0,
+    worlds: Annotated[int, typer.Option(show_default=False, help="Number of worlds; needed at the first start.")] = 0,
+    robots_each: Annotated[
+        int, typer.Option(show_default=False, help="Robots in each world, without a template; by default one.")
+    ] = 0,
     template: Annotated[Path | None, typer.Option(help="Configuration of every world, as for `roboglot up`.")] = None,
-    first_address: Annotated[str, typer.Option(help="Address of the first robot; the others follow it.")] = "",
+    first_address: Annotated[
+        str, typer.Option(help="Address of the first robot (127.10.0.1); the others follow it.")
+    ] = "",
     memory_max: Annotated[
         int, typer.Option(min=0, help="Memory in MB above which a shard is restarted; 0: no limit.")
     ] = 0,
@@ -63,6 +72,7 @@ def up(
     with launched(wanted=not on) as nursery:  # it loads while we import what a plan needs
         from roboglot.hosting.exclusive import FolderInUse
         from roboglot.hosting.logs import set_up_logging
+        from roboglot.shards.plan import PLAN
 
         set_up_logging(verbose=False)
         folder = _folder(data)
@@ -72,8 +82,13 @@ def up(
             if detached and on in ("", "local"):
                 raise ValueError("--detached is for a cluster: --on ray://HOST")
             where = _Where(on, detached, memory_max << 20, nursery)
-            with _joined(on):
-                sys.exit(asyncio.run(_serve(lambda: _fleet_host(plan, folder, where), folder, began)))
+            new = not (folder / PLAN).exists()
+            with _joined(plan, on):
+                asyncio.run(_serve(lambda: _fleet_host(plan, folder, where), folder, began))
+        except NoWorld as error:
+            if new:  # so that the next start may have another plan
+                (folder / PLAN).unlink(missing_ok=True)
+            sys.exit(f"roboglot fleet: {error}")
         except (ValueError, OSError, FolderInUse, NotWarm, MissingExtra) as error:
             sys.exit(f"roboglot fleet: {error}")
 
@@ -134,7 +149,7 @@ def stop(
     data: Data = None,
 ) -> None:
     """Stop one shard or all; `restart` starts them again."""
-    _print(_ask("stop", data, shard=shard))
+    _print(_ask("stop", data, shard=shard), shard)
 
 
 @app.command()
@@ -143,23 +158,23 @@ def restart(
     data: Data = None,
 ) -> None:
     """Restart one shard or all, with the same addresses and stored data."""
-    _print(_ask("restart", data, shard=shard))
+    _print(_ask("restart", data, shard=shard), shard)
 
 
 @app.command()
 def reset(shard: Annotated[str, typer.Argument(help="A shard, or one of its robots.")], data: Data = None) -> None:
     """Restart a shard empty: programs, maps and places of its robots are deleted."""
-    _print(_ask("reset", data, shard=shard))
+    _print(_ask("reset", data, shard=shard), shard)
 
 
 @app.command()
 def move(
-    robot: Annotated[str, typer.Argument()],
+    robot: Annotated[str, typer.Argument(help="The robot's name.")],
     to: Annotated[str, typer.Argument(help="The shard to move it to.")],
     data: Data = None,
 ) -> None:
     """Move a robot to another shard, with its address and stored data; both shards restart."""
-    _print(_ask("move", data, robot=robot, to=to))
+    _print(_ask("move", data, robot=robot, to=to), robot)
 
 
 @app.command()
@@ -175,7 +190,7 @@ def where(
     from roboglot.storage.transactions import DatabaseError
 
     if not registry:
-        sys.exit("roboglot fleet: which --registry?")
+        sys.exit("roboglot fleet: give the registry's URL or file: --registry, or ROBOGLOT_REGISTRY")
     try:
         database = open_registry(registry)
         homes = asyncio.run(Homes(database).all())
@@ -213,7 +228,7 @@ def logs(
 
 
 def _folder(data: Path | None) -> Path:
-    return (data or default_data_folder(os.environ) / "fleet").absolute()
+    return (data or Path(os.environ.get("ROBOGLOT_DATA") or default_data_folder(os.environ)) / "fleet").absolute()
 
 
 class _Asked(NamedTuple):
@@ -236,7 +251,9 @@ def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
         raise ValueError(f"there is no fleet in {folder} yet: give --worlds")
     try:
         template = tomllib.loads(asked.template.read_text(encoding="utf-8")) if asked.template else {}
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except OSError as error:
+        raise ValueError(in_words(error)) from None
+    except ValueError as error:  # bad TOML, or not UTF-8
         raise ValueError(f"{asked.template}: {error}") from None
     first = asked.first or FIRST_ADDRESS
     plan = plan_fleet(asked.worlds, asked.robots_each, template, folder, first=first)
@@ -256,12 +273,13 @@ class _Where(NamedTuple):
     nursery: Nursery | None
 
 
-def _joined(on: str) -> AbstractContextManager[None]:
-    """Return a context in the cluster ``on``, if given. Raises MissingExtra, OSError."""
+def _joined(plan: FleetPlan, on: str) -> AbstractContextManager[None]:
+    """Return a context in the cluster ``on``, if given. Raises MissingExtra, OSError; ValueError for such a plan."""
     if not on:
         return nullcontext()
-    from roboglot.shards.cluster import joined
+    from roboglot.shards.cluster import joined, refuse_unfenced
 
+    refuse_unfenced(plan, on)
     return joined(on)
 
 
@@ -275,7 +293,8 @@ def _fleet_host(plan: FleetPlan, folder: Path, where: _Where) -> FleetHost:
     return Supervisor(plan, folder, memory_max=where.memory_max, nursery=where.nursery)
 
 
-async def _serve(fleet_host: Callable[[], FleetHost], folder: Path, began: float) -> int:
+async def _serve(fleet_host: Callable[[], FleetHost], folder: Path, began: float) -> None:
+    """Keep the fleet up until a signal. Raises NoWorld."""
     from roboglot.shards.classes import FleetClasses
     from roboglot.shards.desk import FleetDesk
     from roboglot.shards.overview import Overview
@@ -293,6 +312,7 @@ async def _serve(fleet_host: Callable[[], FleetHost], folder: Path, began: float
         await desk.open()
         await asyncio.wait([ending, starting], return_when=asyncio.FIRST_COMPLETED)
         if starting.done():
+            _refuse_hopeless(supervisor)
             page.open()
             print(_up(supervisor, time.monotonic() - began, starting.result(), page.address))
             print("ready", flush=True)
@@ -304,7 +324,12 @@ async def _serve(fleet_host: Callable[[], FleetHost], folder: Path, began: float
         await desk.close()
         await supervisor.close()
         await classes.close()
-    return 0
+
+
+def _refuse_hopeless(fleet_host: FleetHost) -> None:
+    reasons = [shard.reason for shard in fleet_host.shards.values() if shard.hopeless]
+    if len(reasons) == len(fleet_host.shards):
+        raise NoWorld(f"no world can start: {reasons[0]}")
 
 
 def _first_address(fleet_host: FleetHost) -> str:
@@ -318,9 +343,10 @@ def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
     shards = list(fleet_host.shards.values())
     ready, robots = sum(shard.state is State.READY for shard in shards), sum(len(s.plan.robots) for s in shards)
     where = f"; all on one page: {page}" if page else ""
+    loading = f" ({warm:.1f} s of it to load)" if warm else ""
     return (
-        f"{ready} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s"
-        f" ({warm:.1f} s of it to load); robots on {_first_address(fleet_host)} and up{where}."
+        f"{ready} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s{loading};"
+        f" robots on {_first_address(fleet_host)} and up{where}."
         " `roboglot fleet list` shows them."
     )
 
@@ -332,9 +358,11 @@ def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:
     return running.request("fleet", _folder(data) / SOCKET, Request(verb, **wish), Answer, PATIENCE, "no fleet is up")
 
 
-def _print(answer: Answer) -> None:
+def _print(answer: Answer, name: str) -> None:
+    """Print the row of a shard or robot; all rows if ``name`` is empty."""
     for row in answer.shards:
-        print(f"{row.name:6} {row.state:9} {', '.join(robot.name for robot in row.robots)} {_why(row)}".rstrip())
+        if name in ("", row.name, *(robot.name for robot in row.robots)):
+            print(f"{row.name:6} {row.state:9} {', '.join(robot.name for robot in row.robots)} {_why(row)}".rstrip())
 
 
 def _why(row: Row) -> str:

@@ -64,6 +64,7 @@ def plan_fleet(
         raise ValueError(f"between 1 and {WORLDS_MAX} worlds, not {worlds}")
     if not 0 <= robots_each <= ROBOTS_MAX:
         raise ValueError(f"between 1 and {ROBOTS_MAX} robots in each world, not {robots_each}")
+    settings_of(template, origin="the template")
     robots = template.get("robots") or _robots(robots_each or 1)
     if robots_each and template.get("robots") and len(robots) != robots_each:
         raise ValueError(f"the template has {len(robots)} robots in a world, but --robots-each is {robots_each}")

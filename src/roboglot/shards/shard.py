@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import errno
 import logging
 import os
 import resource
@@ -36,9 +35,9 @@ PERIOD = 1.0  # s between two heartbeats
 WEIGHED = 10  # heartbeats between two measurements of memory, which take 3 ms
 
 
-def settings_of(values: dict[str, object]) -> Config:
-    """Return the configuration of a shard from its plan's values. Raises ValueError in plain words."""
-    return config_of(values, doors=sections())
+def settings_of(values: dict[str, object], origin: str = "configuration") -> Config:
+    """Return the configuration of a shard from its plan's values. Raises ValueError that names ``origin``."""
+    return config_of(values, doors=sections(), origin=origin)
 
 
 def run(folder: str, link: socket.socket) -> int:
@@ -125,8 +124,7 @@ async def _serve(config: Config, reporter: Reporter, class_home: ClassHome | Non
         end_in_any_case()
         beating.cancel()
     except OSError as error:
-        taken = "; does another robot use it?" if error.errno == errno.EADDRINUSE else ""
-        reporter.send(Refusal(f"{error.strerror or error}{taken}", lasting=False))
+        reporter.send(Refusal(error.strerror or str(error), lasting=False))
         return 1
     finally:
         await runtime.close()

@@ -61,6 +61,12 @@ class Shard:
         self.link: socket.socket | None = None
         self.again: asyncio.TimerHandle | None = None
 
+    def turn_to(self, state: State, now: float) -> None:
+        """Change the state; one that was stopped by request has no reason."""
+        self.state, self.since = state, now
+        if state is State.STOPPED:
+            self.reason = ""
+
 
 class Supervisor:
     """Supervisor of one fleet in one folder.
@@ -226,7 +232,9 @@ class Supervisor:
             return
         if shard.state is State.READY and self._loop.time() - shard.since > STEADY:
             shard.deaths = 0
-        shard.reason = shard.reason or _in_words(status)
+        shard.reason = shard.reason or (
+            f"killed by {signal.Signals(-status).name}" if status < 0 else f"it ended with status {status}"
+        )
         self._failed(shard)
 
     def _failed(self, shard: Shard) -> None:
@@ -234,11 +242,13 @@ class Supervisor:
         pause = PAUSES[min(shard.deaths, len(PAUSES) - 1)]
         shard.deaths += 1
         if shard.hopeless:
-            log.error("shard %s cannot start: %s", shard.plan.name, shard.reason)
+            if not any(other.reason == shard.reason and other is not shard for other in self.shards.values()):
+                log.error("shard %s cannot start: %s", shard.plan.name, shard.reason)
             self._turn_to(shard, State.FAILED)
             return
         shard.restarts += 1
-        log.warning("shard %s ended: %s; it starts again in %g s", shard.plan.name, shard.reason, pause)
+        when = f"in {pause:g} s" if pause else "at once"
+        log.warning("shard %s is down: %s; it starts again %s", shard.plan.name, shard.reason, when)
         if pause == 0.0:
             self._enqueue(shard)
             return
@@ -271,7 +281,7 @@ class Supervisor:
             self._forks.end(shard.number, signal.SIGTERM)
 
     def _turn_to(self, shard: Shard, state: State) -> None:
-        shard.state, shard.since = state, self._loop.time()
+        shard.turn_to(state, self._loop.time())
         self._changed.set()
         self._wake.set()
 
@@ -280,10 +290,6 @@ class Supervisor:
             self._loop.remove_reader(shard.link)
             shard.link.close()
             shard.link = None
-
-
-def _in_words(status: int) -> str:
-    return f"killed by {signal.Signals(-status).name}" if status < 0 else f"it ended with status {status}"
 
 
 def _open_log(path: Path) -> int:

@@ -37,7 +37,7 @@ def command(
     if take + bool(give) + release > 1:
         raise typer.BadParameter("give one of --take, --give and --release")
     if (take or give or release) and not (robot or all_):
-        raise typer.BadParameter("name a robot")
+        raise typer.BadParameter("name a robot, or give --all")
     if robot and all_:
         raise typer.BadParameter("name a robot, or give --all")
     verb: Verb = "take" if take else "give" if give else "release" if release else "look"

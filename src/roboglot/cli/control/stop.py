@@ -19,4 +19,5 @@ def command(
     if bool(robot) == all_:
         raise typer.BadParameter("name a robot, or give --all")
     answer = wish("stop", Request("stop", robot, all=all_), data)
-    print(f"{f'{len(answer.robots)} robots stand' if all_ else f'{robot} stands'}")
+    count = len(answer.robots)
+    print(f"{count} robots stand" if all_ and count > 1 else f"{robot or answer.robots[0].robot} stands")
