@@ -24,6 +24,7 @@ from roboglot.model.background import load
 from roboglot.model.errors import RobotError
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.gate import Gate
+from roboglot.transport.listening import end_vanished
 from roboglot.transport.tls import Tls
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ class Console:
         loop = asyncio.get_running_loop()
         asking = (robot.admission for robot in self._desk.robots.values() if robot.admission.asks)
         self._gate = Gate(next(asking, Admission()), self._tls)
+        end_vanished(listening)
         gated = self._gate.before(lambda: HttpToolsProtocol(config, state, {}, loop), "console pages")
         self._server = await loop.create_server(gated, sock=listening, backlog=BACKLOG)
         self._tasks.append(loop.create_task(self._beat(self._application), name="console beat"))

@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
+import socket
 from collections.abc import Callable
+
+SILENT_PROBES = (20, 5, 4)  # s of silence before a probe, s between probes, lost probes that end the connection
 
 
 async def listen(
@@ -21,3 +24,16 @@ async def listen(
             why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or str(error)
             reason = f"cannot listen on {address}:{port}: {why}"
         raise OSError(error.errno, reason) from None
+
+
+def end_vanished(listening: socket.socket) -> None:
+    """Have the kernel end connections to a port whose clients vanished, with or without data for them.
+
+    Accepted connections inherit this, and may change it.
+    """
+    idle, interval, lost = SILENT_PROBES
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, idle)
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, interval)
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, lost)
+    listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 1000 * (idle + interval * lost))

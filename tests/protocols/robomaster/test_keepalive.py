@@ -32,9 +32,9 @@ class Line:
     def get_extra_info(self, name: str) -> Any:
         return self if name == "socket" else (self.peer, 4711)
 
-    def setsockopt(self, level: int, option: int, value: int) -> None:
+    def setsockopt(self, _level: int, option: int, value: int) -> None:
         assert option != socket.TCP_KEEPCNT or value > 5.0 / VIGIL_PERIOD, "the kernel would end it in the vigil"
-        assert (level, option) != (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT), "it would end those who do not read"
+        assert option != socket.TCP_USER_TIMEOUT or value == 0, "it would end those who do not read"
 
     def getsockopt(self, *_: int) -> bytes:
         return struct.pack("=3xB20xI28xI", self.probes, self.segments, self.silent)

@@ -38,6 +38,7 @@ def probe_for_life(transport: asyncio.Transport) -> None:
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, idle)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, interval)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, KERNELS_PROBES)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 0)
     peer = transport.get_extra_info("peername")
     if peer and not ip_address(peer[0].partition("%")[0]).is_loopback:
         asyncio.get_running_loop().call_later(LOOK_PERIOD, _look, transport, connection)

@@ -1,0 +1,31 @@
+"""Clients that vanish: the kernel asks silent ones, of every port, for a sign of life."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+
+from roboglot.model.admission import Admission
+from roboglot.protocols.gate import Gate
+from roboglot.transport.listening import SILENT_PROBES
+
+
+async def test_silent_client_of_any_door_is_probed() -> None:
+    accepted: asyncio.Future[asyncio.BaseTransport] = asyncio.get_running_loop().create_future()
+
+    class Door(asyncio.Protocol):
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            accepted.set_result(transport)
+
+    server = await Gate(Admission()).listen(Door, "a door", "127.0.0.1", 0)
+    _, writer = await asyncio.open_connection("127.0.0.1", server.sockets[0].getsockname()[1])
+    try:
+        connection = (await accepted).get_extra_info("socket")
+        assert connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+        assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 40_000
+        options = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+        assert tuple(connection.getsockopt(socket.IPPROTO_TCP, option) for option in options) == SILENT_PROBES
+    finally:
+        writer.close()
+        (await accepted).close()  # type: ignore[attr-defined] # a base transport has it
+        server.close()
