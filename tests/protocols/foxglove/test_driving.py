@@ -74,6 +74,18 @@ async def test_who_goes_away_lets_go(scene: Scene) -> None:
     await viewer.until(lambda: not scene.robot.actions.running(), 5.0)
 
 
+async def test_goal_of_one_that_left_is_dropped(scene: Scene) -> None:
+    viewer, fairness = await publisher(scene, "/goal_pose", "geometry_msgs/PoseStamped"), held(scene.robot)
+    await viewer.settled()
+    fairness.on, counted = True, len(fairness.counted)
+    await viewer.publish(stamped(3.0, 0.0))
+    await viewer.until(lambda: fairness.waited)
+    await viewer.close()
+    fairness.on = False
+    await viewer.until(lambda: len(fairness.counted) > counted)
+    assert not scene.robot.actions.running()
+
+
 async def test_a_goal_is_reached(scene: Scene) -> None:
     viewer = await publisher(scene, "/move_base_simple/goal", "geometry_msgs/PoseStamped")
     await viewer.publish(stamped(0.8, 0.0, math.pi / 2, frame="a/base_link"))

@@ -21,14 +21,17 @@ class Session:
         self.context, self._topics, self._on_close = context, topics, on_close
         self._joining = asyncio.get_running_loop().create_task(self._join(), name="foxglove client")
         self._turn = asyncio.Lock()
+        self._gone = False
 
     async def receive(self, message: str | bytes) -> None:
-        """Handle one message."""
+        """Handle one message; none of a client that left while it waited."""
         async with self._turn:
-            await answer(self.context, message)
+            if not self._gone:
+                await answer(self.context, message)
 
     def close(self) -> None:
         """Handle the client's departure."""
+        self._gone = True
         self._joining.cancel()
         self._on_close(self)
         self.context.close()
