@@ -6,9 +6,11 @@ import asyncio
 import signal
 import sqlite3
 from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
+from threading import Barrier, Event
 
 import numpy as np
 import pytest
@@ -20,7 +22,7 @@ from roboglot.model.events import EventStream, PlacesChanged
 from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
-from roboglot.storage.database import Database
+from roboglot.storage.database import ROBOTS, Database, connect
 from roboglot.storage.maps import StoredMaps
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
@@ -28,6 +30,7 @@ from roboglot.storage.transactions import Connection
 from roboglot.testing.process import child
 
 Open = Callable[[], Database]
+PROGRAMS = 6  # that start at once
 
 
 @pytest.fixture
@@ -45,6 +48,20 @@ async def open_database(tmp_path: Path) -> AsyncIterator[Open]:
 
 def places(database: Database, robot: str = "a") -> StoredPlaces:
     return StoredPlaces(database, robot, LockstepClock(), EventStream())
+
+
+@pytest.mark.parametrize("schema", [ROBOTS, "roboglot.storage.schema.access"])
+def test_programs_may_open_a_new_file_at_once(schema: str, tmp_path: Path) -> None:
+    together = Barrier(PROGRAMS)
+
+    def open_new() -> int:
+        together.wait()
+        with closing(connect(tmp_path / "new.db", schema)) as connection:
+            return int(connection.execute("PRAGMA user_version").fetchone()[0])
+
+    with ThreadPoolExecutor(PROGRAMS) as programs:
+        versions = [opening.result() for opening in [programs.submit(open_new) for _ in range(PROGRAMS)]]
+    assert min(versions) == max(versions) > 0
 
 
 async def test_places_come_back_in_order_and_per_robot(open_database: Open) -> None:

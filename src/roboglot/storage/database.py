@@ -227,14 +227,32 @@ def _empty(schema: str) -> bytes:
 
 
 def _migrate(connection: sqlite3.Connection, schema: str) -> None:
-    """Apply the schema files that this database has not seen yet."""
-    (current,) = connection.execute("PRAGMA user_version").fetchone()
+    """Apply the schema files that this database has not seen yet; other programs may do so at the same time."""
     files = resources.files(schema)
     versions = sorted(int(m[1]) for f in files.iterdir() if (m := re.fullmatch(r"v(\d+)\.sql", f.name)))
-    if current > versions[-1]:
-        raise ValueError(
-            f"the database is of version {current}, this program knows up to {versions[-1]}: use a newer one"
-        )
-    for version in versions[versions.index(current) + 1 if current in versions else 0 :]:
-        script = (files / f"v{version}.sql").read_text(encoding="utf-8")
-        connection.executescript(f"BEGIN IMMEDIATE;\n{script}\nPRAGMA user_version={version};\nCOMMIT;")
+    while (current := _version(connection)) != versions[-1]:
+        if current > versions[-1]:
+            raise ValueError(
+                f"the database is of version {current}, this program knows up to {versions[-1]}: use a newer one"
+            )
+        connection.execute("BEGIN IMMEDIATE")  # an error closes the connection, which undoes it
+        if _version(connection) == current:  # else another program was faster
+            version = next(version for version in versions if version > current)
+            for statement in _statements((files / f"v{version}.sql").read_text(encoding="utf-8")):
+                connection.execute(statement)
+            connection.execute(f"PRAGMA user_version={version}")
+        connection.execute("COMMIT")
+
+
+def _version(connection: sqlite3.Connection) -> int:
+    return int(connection.execute("PRAGMA user_version").fetchone()[0])
+
+
+def _statements(script: str) -> Iterator[str]:
+    """Yield each statement; ``executescript`` would end the transaction."""
+    statement = ""
+    for line in script.splitlines(keepends=True):
+        statement += line
+        if sqlite3.complete_statement(statement):
+            yield statement
+            statement = ""
