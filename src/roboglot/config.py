@@ -24,6 +24,7 @@ from roboglot.values import dataclass
 
 RECORDING = "recording:"  # prefix of the body of a recorded robot
 ROBOTS_MAX = 100
+REMEDY = "let people in by name ([access] or --access), or let everyone in (insecure = true or --insecure)"
 Limit = Annotated[int, msgspec.Meta(ge=1, le=2**40)]
 Port = Annotated[int, msgspec.Meta(ge=0, le=65535)]  # 0: any free port
 
@@ -42,9 +43,9 @@ class StartConfig:
 class RobotConfig:
     """One robot: name, body, and address of all its doors (empty: the one after the previous robot's).
 
-    A body with "://" in it is the URL of a real robot, "slamware://192.168.11.1". ``start`` is for simulated robots;
-    without it, they start on a dock or beside the others. Where communicating robots meet, the one with the higher
-    ``priority`` goes first.
+    A body with "://" in it is the URL of a real robot, "slamware://192.168.11.1". ``start`` and ``serial``
+    are for simulated robots; without a start, they start on a dock or beside the others; without a serial number, it is
+    made of seed and name. Where communicating robots meet, the one with the higher ``priority`` goes first.
     """
 
     name: str = "a"
@@ -52,6 +53,7 @@ class RobotConfig:
     address: str = ""
     start: StartConfig | None = None
     priority: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
+    serial: Annotated[str, msgspec.Meta(max_length=64)] = ""
 
     @property
     def is_real(self) -> bool:
@@ -223,15 +225,13 @@ def refuse_unguarded(config: Config) -> None:
     guarded = config.insecure or config.access.on
     if config.console.enabled and not is_loopback(config.console.address) and not guarded:
         raise ValueError(
-            f"others could open the console on {config.console.address} and drive every robot. Use 127.0.0.1, let"
-            " people in by name ([access] or --access), or let everyone in (insecure = true or --insecure)"
+            f"others could open the console on {config.console.address} and drive every robot. Use 127.0.0.1, {REMEDY}"
         )
     if config.opened and not guarded:
         listed = ", ".join(f"{robot.name} on {robot.address}" for robot in config.opened)
         raise ValueError(
             f"others could reach robot {listed}, and its protocols require no password: everyone there could"
-            " drive it. Use an address of 127.0.0.0/8, let people in by name ([access] or --access), or let everyone in"
-            " (insecure = true or --insecure)"
+            f" drive it. Use an address of 127.0.0.0/8, {REMEDY}"
         )
 
 
@@ -338,6 +338,11 @@ def parse_robot(text: str) -> RobotConfig:
     return RobotConfig(name, body, address, start)
 
 
+def serial_of(seed: int, name: str) -> str:
+    """Return the serial number of a robot that is given none."""
+    return f"RG-{seed:04d}-{name}"
+
+
 def _start(text: str, where: str) -> StartConfig:
     """Return the start place ``x,y``, ``x,y,yaw`` or ``x,y,yaw,floor``. Raises ValueError."""
     numbers = where.split(",")
@@ -364,8 +369,13 @@ def with_addresses(robots: tuple[RobotConfig, ...]) -> tuple[RobotConfig, ...]:
         if address.replace(".", "").isdigit() and not is_address(address):
             raise ValueError(f"robot {robot.name}: {address} is not an address")
         filled.append(dataclasses.replace(robot, address=address))
-    urls = [r.body for r in filled if r.is_real]  # one owner per connection
-    for what, values in (("name", [r.name for r in filled]), ("address", [r.address for r in filled]), ("URL", urls)):
+    kinds = {
+        "name": [r.name for r in filled],
+        "address": [r.address for r in filled],
+        "serial number": [r.serial for r in filled if r.serial],
+        "URL": [r.body for r in filled if r.is_real],  # one owner per connection
+    }
+    for what, values in kinds.items():
         if twice := {value for value in values if values.count(value) > 1}:
             raise ValueError(f"two robots have the {what} {twice.pop()}")
     return tuple(filled)

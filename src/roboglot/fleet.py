@@ -149,9 +149,9 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
 
 def _placement(robot: RobotConfig) -> RobotPlacement:
     if robot.start is None:
-        return RobotPlacement(robot.name, robot.body)
+        return RobotPlacement(robot.name, robot.body, serial=robot.serial)
     start = robot.start
-    return RobotPlacement(robot.name, robot.body, Pose(start.x, start.y, start.yaw), start.floor)
+    return RobotPlacement(robot.name, robot.body, Pose(start.x, start.y, start.yaw), start.floor, robot.serial)
 
 
 def _stand_in(place: str, clock: Clock) -> StandIn:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from roboglot.cli.control import running
+from roboglot.cli.control.lease import wish
 from roboglot.hosting.local_socket import LocalServer
+from roboglot.protocols import lease_desk
 from roboglot.protocols.record_desk import Answer, Request
 
 
@@ -31,3 +34,31 @@ async def test_command_ends_with_a_sentence(line: bytes, reason: str, tmp_path: 
             await asyncio.to_thread(running.request, "record", tmp_path / "s", Request("stop"), Answer, 10.0)
     finally:
         await server.close()
+
+
+async def test_commands_reach_the_worlds_of_a_fleet(tmp_path: Path) -> None:
+    """`stop`, `lease` and `reset` with a fleet's folder ask all its worlds, or the one with that robot."""
+    asked: list[tuple[str, str]] = []
+    servers: list[LocalServer] = []
+    for world, robot in {"w1": "a1", "w2": "a2", "w10": "a10"}.items():
+
+        async def answer(line: bytes, robot: str = robot) -> bytes:
+            request = msgspec.json.decode(line, type=lease_desk.Request)
+            asked.append((request.do, robot))
+            return msgspec.json.encode(lease_desk.Answer([lease_desk.Control(robot, "", "", 0.0, "", "", "")]))
+
+        (tmp_path / "shards" / world / "data").mkdir(parents=True)
+        servers.append(LocalServer(tmp_path / "shards" / world / "data" / lease_desk.NAME, "lease", answer))
+        await servers[-1].open()
+    try:
+        stopped = await asyncio.to_thread(wish, "stop", lease_desk.Request("stop", all=True), tmp_path)
+        assert [control.robot for control in stopped.robots] == ["a1", "a2", "a10"]
+        assert sorted(asked) == [("stop", "a1"), ("stop", "a10"), ("stop", "a2")]
+        asked.clear()
+        await asyncio.to_thread(wish, "reset", lease_desk.Request("reset", "a2"), tmp_path)
+        assert [(verb, robot) for verb, robot in asked if verb != "look"] == [("reset", "a2")]
+        with pytest.raises(SystemExit, match=r"roboglot stop: there is no robot 'b'; there are a1, a2, a10"):
+            await asyncio.to_thread(wish, "stop", lease_desk.Request("stop", "b"), tmp_path)
+    finally:
+        for server in servers:
+            await server.close()

@@ -160,7 +160,10 @@ def test_stopped_stays_stopped_and_restart_brings_it_back(fleet: Fleet) -> None:
 
 def test_robot_moves_with_its_address_and_stored_data(fleet: Fleet) -> None:
     ask(SECOND, "artifact/v1/pois", {**POI, "id": "shelf"})
-    assert fleet.call("move", "b1", "w2").returncode == 0
+    plate = ask(SECOND, "system/v1/robot/info")["deviceID"]
+    moved = fleet.call("move", "b1", "w2")
+    assert (moved.returncode, moved.stdout.split()[:4]) == (0, ["w2", "ready", "a2,", "b2,"])
+    assert ask(SECOND, "system/v1/robot/info")["deviceID"] == plate, "apps know it by its serial number"
     homes = {name: [robot["name"] for robot in row["robots"]] for name, row in fleet.shards().items()}
     assert homes == {"w1": ["a1"], "w2": ["a2", "b2", "b1"]}
     assert pois(SECOND) == ["shelf"]

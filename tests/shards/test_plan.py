@@ -33,6 +33,13 @@ def test_names_and_addresses_are_each_robots_own(worlds: int, each: int) -> None
         (0, 1, {}, FIRST_ADDRESS, "worlds"),
         (1, 101, {}, FIRST_ADDRESS, "robots in each world"),
         (1, 0, {"robots": [{"name": "a", "address": "127.0.0.9"}]}, FIRST_ADDRESS, "must not have addresses"),
+        (
+            2,
+            0,
+            {"robots": [{"name": "a", "serial": "SN1"}]},
+            FIRST_ADDRESS,
+            "must not have .* serial numbers",
+        ),
         (1, 1, {"robots": [{"name": "a"}, {"name": "b"}]}, FIRST_ADDRESS, "--robots-each is 1"),
         (1, 1, {"planet": "moon"}, FIRST_ADDRESS, "the template: planet is not a setting"),
         (1, 1, {"robots": 5}, FIRST_ADDRESS, "the template: robots"),

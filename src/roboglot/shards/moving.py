@@ -1,11 +1,11 @@
-"""Moves a robot from one shard to another, with all its stored data and its address."""
+"""Moves a robot from one shard to another, with all its stored data, its address and its serial number."""
 
 from __future__ import annotations
 
 import asyncio
 from pathlib import Path
 
-from roboglot.config import ROBOTS_MAX
+from roboglot.config import ROBOTS_MAX, serial_of
 from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.plan import ShardPlan, checked, save
 from roboglot.shards.supervisor import State
@@ -29,14 +29,15 @@ async def move_robot(supervisor: FleetHost, robot: str, to: str) -> None:
     if len(new.robots) >= ROBOTS_MAX:
         raise ValueError(f"{new.name} has {ROBOTS_MAX} robots already")
     settings = next(r for r in old.settings["robots"] if r["name"] == robot)
-    checked(ShardPlan(new.name, {**new.settings, "robots": [*new.settings["robots"], settings]}))
+    moved = {"serial": serial_of(old.settings["seed"], robot), **settings}
+    checked(ShardPlan(new.name, {**new.settings, "robots": [*new.settings["robots"], moved]}))
     both = supervisor.shards[old.name], supervisor.shards[new.name]
     running = [shard for shard in both if shard.state is not State.STOPPED]
     await asyncio.gather(*map(supervisor.stop, both))
     try:
         await asyncio.to_thread(copy_robot, robot, _database(old), _database(new))
         old.settings["robots"].remove(settings)
-        new.settings["robots"].append(settings)
+        new.settings["robots"].append(moved)
         await asyncio.to_thread(save, plan, supervisor.folder)
         await asyncio.to_thread(forget_robot, robot, _database(old))
     finally:

@@ -68,8 +68,11 @@ def plan_fleet(
     robots = template.get("robots") or _robots(robots_each or 1)
     if robots_each and template.get("robots") and len(robots) != robots_each:
         raise ValueError(f"the template has {len(robots)} robots in a world, but --robots-each is {robots_each}")
-    if any(robot.get("address") for robot in robots):
-        raise ValueError("robots of a template must not have addresses: each world needs its own; see --first-address")
+    if any(robot.get("address") or robot.get("serial") for robot in robots):
+        raise ValueError(
+            "robots of a template must not have addresses or serial numbers: each world needs its own; see"
+            " --first-address"
+        )
     addresses = _addresses(first, worlds * len(robots))
     shards: list[ShardPlan] = []
     for number in range(1, worlds + 1):

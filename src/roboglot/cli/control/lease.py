@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,7 +15,9 @@ from roboglot.config import default_data_folder
 from roboglot.protocols.lease_desk import NAME, Answer, Control, Request
 
 PATIENCE = 10.0  # s to wait until the robot has braked
-Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` uses.")]
+Data = Annotated[
+    Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` or `roboglot fleet up` uses.")
+]
 Verb = Literal["look", "take", "give", "release"]
 
 
@@ -44,15 +47,36 @@ def command(
     answer = wish("lease", Request(verb, robot, give, all_), data)
     shown = [control for control in answer.robots if robot in ("", control.robot)]
     if not shown:
-        sys.exit(f"roboglot lease: there is no robot {robot!r}; there are {', '.join(c.robot for c in answer.robots)}")
+        sys.exit(f"roboglot lease: there is no robot {robot!r}; there are {', '.join(_names(answer))}")
     for control in shown:
         print(in_words(control))
 
 
 def wish(command: str, request: Request, data: Path | None) -> Answer:
-    """Return the answer of the running `roboglot up`; without one, end the program with a sentence."""
+    """Return the answer of the running `roboglot up`, or of all worlds if the folder is a fleet's.
+
+    Without an answer, end the program with a sentence.
+    """
     folder = data or default_data_folder(os.environ)
-    return running.request(command, folder / NAME, request, Answer, PATIENCE)
+    worlds = sorted(folder.glob(f"shards/*/data/{NAME}"), key=lambda path: (len(path.parts[-3]), path))
+    if not worlds or (folder / NAME).exists():
+        return running.request(command, folder / NAME, request, Answer, PATIENCE)
+    if request.robot:
+        homes = {
+            name: world
+            for world in worlds
+            for name in _names(running.request(command, world, Request(), Answer, PATIENCE))
+        }
+        if request.robot not in homes:
+            sys.exit(f"roboglot {command}: there is no robot {request.robot!r}; there are {', '.join(homes)}")
+        worlds = [homes[request.robot]]
+    with ThreadPoolExecutor(len(worlds)) as together:
+        asked = [together.submit(running.request, command, w, request, Answer, PATIENCE) for w in worlds]
+        return Answer([control for each in asked for control in each.result().robots])
+
+
+def _names(answer: Answer) -> list[str]:
+    return [control.robot for control in answer.robots]
 
 
 def in_words(control: Control) -> str:

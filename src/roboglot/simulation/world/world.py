@@ -16,6 +16,7 @@ from typing import cast
 
 import numpy as np
 
+from roboglot.config import serial_of
 from roboglot.extras import own_version
 from roboglot.kernels import WORLD
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
@@ -71,6 +72,7 @@ class RobotPlacement:
     body: str = "universal"
     start: Pose | None = None
     floor: int = 0
+    serial: str = ""
 
 
 @contextlib.contextmanager
@@ -107,7 +109,7 @@ class World:
             raise ValueError(f"{len(robots)} robots are more than {ROBOTS_MAX}")
         self.description = description
         self._clock = clock
-        self._serial = f"RG-{seed:04d}"
+        self._serials = {robot.name: robot.serial or serial_of(seed, robot.name) for robot in robots}
         bodies = {placement.name: load_body(placement.body) for placement in robots}
         if len(bodies) < len(robots):
             raise ValueError("two robots have the same name")
@@ -166,8 +168,7 @@ class World:
 
     def description_of(self, name: str) -> Description:
         """Return a robot's name plate."""
-        serial = f"{self._serial}-{name}"
-        return self._population.hull(name).body.describe(serial=serial, software_version=own_version())
+        return self._population.hull(name).body.describe(serial=self._serials[name], software_version=own_version())
 
     def equip(self, robot: Robot) -> None:
         """Give ``robot`` the simulated components of the body with its id."""
