@@ -189,6 +189,12 @@ async def test_a_full_disk_is_only_read(database: Transactions) -> None:
     await StoredSettings(database, "b").put("x", 3)  # another robot's disk has room
 
 
+def test_an_absent_server_is_named_in_one_line() -> None:
+    with pytest.raises(OSError, match=r"[Cc]onnection refused") as refused:
+        open_database(Path(), "postgresql://127.0.0.1:1/none")
+    assert "\n" not in str(refused.value)
+
+
 @needs_postgresql
 async def test_a_robot_is_served_once(server: PostgreSQLServer, tmp_path: Path) -> None:
     server.empty()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TypeVar, cast
 
 import psycopg
@@ -100,6 +102,30 @@ async def test_robot_that_is_renewed_is_refused_to_others(
         await new.take()
     assert new.why_not("a")
     assert not old.why_not("a")
+
+
+@pytest.mark.parametrize("keeper", ["program", "fleet"])
+async def test_unreachable_registry_is_logged_seldom(
+    keeper: str, watch: Watch, caplog: pytest.LogCaptureFixture
+) -> None:
+    tries = 0
+
+    async def fail(*_: object) -> None:
+        nonlocal tries
+        tries += 1
+        raise DatabaseError("connection refused")
+
+    broken = cast("Homes", SimpleNamespace(renew=fail, signs=fail))
+    if keeper == "program":
+        trying = asyncio.create_task(Residence(broken, {"a": ""}, "x", print, watch)._renew_always())
+    else:
+        trying = asyncio.create_task(Silence(broken, ["a"], watch).look_always())
+    while tries < 5:
+        await asyncio.wait((trying,), timeout=0)
+        assert not trying.done() or trying.result()
+    trying.cancel()
+    warnings = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
+    assert warnings == ["cannot reach the registry of robots: connection refused"]
 
 
 async def test_a_program_gives_up_before_another_may_begin(database: Transactions, watch: Watch) -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from roboglot.storage.homes import Homes, Occupied
 from roboglot.storage.transactions import DatabaseError
+from roboglot.transport.seldom import Seldom
 
 log = logging.getLogger(__name__)
 PERIOD, HOLD, LEASE = 0.5, 2.5, 4.0  # s between renewals; see above
@@ -150,12 +151,13 @@ class Residence:
                 self._lost(robot)
 
     async def _renew_always(self) -> None:
+        seldom = Seldom(log)
         while True:
             await asyncio.sleep(PERIOD)
             try:
                 await self.renew()
             except DatabaseError as error:
-                log.warning("cannot reach the registry of robots: %s", error)
+                seldom.warning("registry", "cannot reach the registry of robots: %s", error)
 
     async def _watch(self) -> None:
         """Detect the end of the lease, even while a renewal waits for an answer."""

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection
 from roboglot.storage.homes import Homes
 from roboglot.storage.residence import LEASE, PERIOD, uptime
 from roboglot.storage.transactions import DatabaseError
+from roboglot.transport.seldom import Seldom
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -62,9 +63,10 @@ class Silence:
 
     async def look_always(self) -> None:
         """Check regularly, even after failures of the registry."""
+        seldom = Seldom(log)
         while True:
             try:
                 await self.look()
             except DatabaseError as error:
-                log.warning("cannot reach the registry of robots: %s", error)
+                seldom.warning("registry", "cannot reach the registry of robots: %s", error)
             await asyncio.sleep(PERIOD)
