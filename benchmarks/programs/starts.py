@@ -68,7 +68,7 @@ class Place:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "PYTHONWARNINGS": "ignore"}
-        self.socket = socket_path(self.environment)
+        self.socket = Path(socket_path(self.environment))
 
     def surroundings(self, *, warm: bool) -> dict[str, str]:
         return self.environment | {installation.WARM: "1" if warm else "0"}

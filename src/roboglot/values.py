@@ -77,7 +77,7 @@ def make_initialisers() -> None:
     """Make the ``__init__`` of all classes now, for processes that are forked from this one."""
     for found in gc.get_objects():
         if type(found) is _Later and found._name == "__init__" and vars(found._owner).get("__init__") is found:
-            found.__get__(None)
+            _Later.__get__(found, None)
 
 
 def _is_unhashable_by_eq(plain: type) -> bool:

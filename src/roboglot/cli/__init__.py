@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import functools
 import gc
 import importlib
 import io
@@ -10,11 +11,11 @@ import os
 import sys
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NoReturn
 
-from roboglot.extras import explained
-
+TYPE_CHECKING = False  # and no ``typing``: what starts warm is to be found in few milliseconds
 if TYPE_CHECKING:
+    from typing import NoReturn
+
     import typer
 
 COMMANDS = {
@@ -96,6 +97,8 @@ def main() -> None:
     try:
         _obey(name)
     except ImportError as missing:
+        from roboglot.extras import explained
+
         words = explained(missing, f"roboglot {name}", EXTRAS.get(name, ""))
         if words is None:
             raise
@@ -116,10 +119,10 @@ def _obey(name: str) -> None:
 
         print("\n".join(about()))
     elif name in COMMANDS:
-        app = loaded(name)
+        command = built(name)
         sys.argv[:2] = [f"roboglot {name}"]
         gc.enable()
-        app(prog_name=f"roboglot {name}")
+        command(prog_name=f"roboglot {name}")
     else:
         sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")
 
@@ -144,6 +147,14 @@ def _print_usage() -> None:
     for command, meaning in COMMANDS.items():
         print(f"  {command:12} {meaning}")
     print("\nroboglot COMMAND --help lists the options of a command.")
+
+
+@functools.cache
+def built(name: str) -> Callable[..., object]:
+    """Return one of COMMANDS, to be called."""
+    from typer.main import get_command
+
+    return get_command(loaded(name))
 
 
 def loaded(name: str) -> typer.Typer:

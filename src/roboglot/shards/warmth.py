@@ -31,6 +31,9 @@ FOREIGN = (
     "uvicorn.protocols.http.httptools_impl",
     "uvicorn.protocols.websockets.wsproto_impl",
     "uvloop",
+    "websockets.asyncio.client",
+    "websockets.extensions.permessage_deflate",
+    "websockets.proxy",
     "websockets.server",
     "wsproto",
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import sys
 from collections.abc import AsyncIterator, Callable, Generator, Iterator, Sequence
 from pathlib import Path
@@ -73,16 +74,16 @@ def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes(specs: list[object]) -> None:
     """Start pytest-xdist's local workers in forks of the warm parent, which have everything imported."""
-    from roboglot.cli.warm import installation
-    from roboglot.cli.warm.command import PYTHON
+    from roboglot.cli.warm import command, installation
 
     if not installation.is_wanted(os.environ):
         return
     import execnet
 
+    python = shlex.join([sys.executable, "-m", command.__name__])
     for number, spec in enumerate(specs):
         if getattr(spec, "popen", None) and not getattr(spec, "python", None):
-            specs[number] = execnet.XSpec(f"{spec}//python={PYTHON}")
+            specs[number] = execnet.XSpec(f"{spec}//python={python}")
 
 
 @pytest.fixture

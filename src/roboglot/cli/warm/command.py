@@ -8,22 +8,21 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import json
 import os
 import resource
-import shlex
 import signal
 import socket
 import sys
-from pathlib import Path
-from types import FrameType
 
 from roboglot.cli.warm import installation
+
+TYPE_CHECKING = False  # not from ``typing``: nothing large is loaded before the parent is asked
+if TYPE_CHECKING:
+    from types import FrameType
 
 COMMAND, CODE = "command", "code"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2)
 LIMITS = (resource.RLIMIT_NOFILE, resource.RLIMIT_CPU, resource.RLIMIT_AS, resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)
-PYTHON = f"{shlex.quote(sys.executable)} -m {__spec__.name if __spec__ else __name__}"  # instead of ``python``
 LENGTH = 8  # bytes before a message, its length
 MESSAGE_MAX = 4 << 20
 DESCRIPTORS_MAX, HIGHEST = 64, 255  # of the files that a command inherits; with others it starts cold
@@ -59,15 +58,15 @@ def end_like(status: int) -> None:
     os._exit(status)
 
 
-def launch(path: Path) -> None:
+def launch(path: str) -> None:
     """Start a parent for the next command, unless one is being started. It ends by itself."""
     import subprocess
 
-    with contextlib.suppress(OSError), open(path.with_suffix(".log"), "wb") as log:
-        if _is_locked(path.with_suffix(".lock")):
+    with contextlib.suppress(OSError), open(f"{path}.log", "wb") as log:
+        if _is_locked(f"{path}.lock"):
             return
         subprocess.Popen(
-            [sys.executable, "-m", "roboglot.cli.warm.parent", str(path)],
+            [sys.executable, "-m", "roboglot.cli.warm.parent", path],
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
@@ -76,7 +75,7 @@ def launch(path: Path) -> None:
         ).returncode = 0  # it outlives us
 
 
-def _is_locked(path: Path) -> bool:
+def _is_locked(path: str) -> bool:
     with open(path, "a", encoding="utf-8") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -85,13 +84,13 @@ def _is_locked(path: Path) -> bool:
     return False
 
 
-def _connected(path: Path, kind: str, words: list[str]) -> socket.socket | None:
+def _connected(path: str, kind: str, words: list[str]) -> socket.socket | None:
     """Return a connection on which the command was started; None if no parent has these sources."""
     parent = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        parent.connect(bytes(path))
+        parent.connect(path)
         descriptors = _inherited()
-        wish = json.dumps(_wish(kind, words, descriptors)).encode()
+        wish = ascii(_wish(kind, words, descriptors)).encode()
         socket.send_fds(parent, [len(wish).to_bytes(LENGTH)], descriptors)
         parent.sendall(wish)
         if parent.recv(1) == b"+":
@@ -126,7 +125,7 @@ def _wish(kind: str, words: list[str], descriptors: list[int]) -> dict[str, obje
         "environment": dict(os.environ),
         "path": sys.path,
         "umask": umask,
-        "ignored": [number for number in SIGNALS if signal.getsignal(number) == signal.SIG_IGN],
+        "ignored": [int(number) for number in SIGNALS if signal.getsignal(number) == signal.SIG_IGN],
         "limits": [(kind, *resource.getrlimit(kind)) for kind in LIMITS],
         "processors": sorted(os.sched_getaffinity(0)),
     }

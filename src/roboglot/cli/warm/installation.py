@@ -5,15 +5,14 @@ Imports little, because every command that may start warm reads it first.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import stat
 import sys
+from _blake2 import blake2b  # hashlib, which has it from there, would load OpenSSL
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 WARM = "ROBOGLOT_WARM"  # 0: no command starts warm; 1: even where CI is set
-PACKAGE = Path(__file__).parents[2]
+PACKAGE = __file__.rsplit(os.sep, 3)[0]
 # What changes an interpreter or a library while it is loaded, so that a fork with other values would differ.
 OF_THE_INTERPRETER = (
     *("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_"),
@@ -34,31 +33,31 @@ def is_wanted(environment: Mapping[str, str]) -> bool:
     )
 
 
-def folder_of(environment: Mapping[str, str]) -> Path:
+def folder_of(environment: Mapping[str, str]) -> str:
     """Return the folder for sockets, which only its owner can open. Raises OSError if another user made it."""
     runtime = environment.get("XDG_RUNTIME_DIR")
-    folder = Path(runtime) / "roboglot" if runtime else Path("/tmp") / f"roboglot-{os.getuid()}"
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    found = folder.lstat()
+    folder = f"{runtime}/roboglot" if runtime else f"/tmp/roboglot-{os.getuid()}"
+    os.makedirs(folder, mode=0o700, exist_ok=True)
+    found = os.lstat(folder)
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
         raise PermissionError(f"{folder} is not a folder of our own")
     return folder
 
 
-def socket_path(environment: Mapping[str, str]) -> Path:
+def socket_path(environment: Mapping[str, str]) -> str:
     """Return the socket of this installation's parent. Raises OSError, also if its path is too long for one."""
-    path = folder_of(environment) / f"{name_of(environment)}.socket"
-    if len(bytes(path)) > PATH_MAX:
+    path = f"{folder_of(environment)}/{name_of(environment)}.socket"
+    if len(os.fsencode(path)) > PATH_MAX:
         raise OSError(f"{path} is too long for a socket")
     return path
 
 
 def name_of(environment: Mapping[str, str]) -> str:
     """Return the name of the parent for this installation, user, interpreter settings, priority and rights."""
-    parts = [sys.prefix, sys.executable, sys.version, str(PACKAGE)]
+    parts = [sys.prefix, sys.executable, sys.version, PACKAGE]
     parts += sorted(f"{key}={value}" for key, value in environment.items() if key.startswith(OF_THE_INTERPRETER))
     parts += [str(os.getpriority(os.PRIO_PROCESS, 0)), str(os.sched_getscheduler(0)), *rights_of("self")]
-    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()[:16]
+    return blake2b(os.fsencode("\0".join(parts)), digest_size=8).hexdigest()
 
 
 def rights_of(process: int | str) -> list[str]:
@@ -72,7 +71,7 @@ def rights_of(process: int | str) -> list[str]:
 def stamp() -> str:
     """Return a text that changes when a file of the package or an installed library changes."""
     count = size = newest = 0
-    for entry in _sources(str(PACKAGE)):
+    for entry in _sources(PACKAGE):
         found = entry.stat()
         count, size, newest = count + 1, size + found.st_size, max(newest, found.st_mtime_ns)
     libraries = [str(os.stat(path).st_mtime_ns) for path in sys.path if path.endswith("site-packages")]

@@ -7,11 +7,11 @@ its commands end with it, and each with its connection, however they end.
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import ctypes
 import fcntl
 import importlib
-import json
 import os
 import select
 import signal
@@ -20,11 +20,10 @@ import struct
 import sys
 import time
 import types
-from pathlib import Path
 from typing import NoReturn, TypedDict
 
+from roboglot.cli import built, run_to_end
 from roboglot.cli import main as run_command
-from roboglot.cli import run_to_end
 from roboglot.cli.warm import installation
 from roboglot.cli.warm.command import CODE, DESCRIPTORS_MAX, LENGTH, MESSAGE_MAX
 from roboglot.shards.warmth import ENVIRONMENT, ended, fork, modules_of, wake_at_ends, warm
@@ -33,7 +32,8 @@ IDLE = 300.0  # s
 SLOW_MAX = 2.0  # s for a caller to say what it wants
 LAST_SECONDS = 3.0  # s between SIGTERM and SIGKILL for a command that has lost its caller
 CALLERS_MAX = 64
-COMMANDS = ("roboglot.cli.program", "typer.main", "typer.rich_utils")
+COMMANDS = ("program", "test", "lesson")
+MODULES = ("encodings.utf_8_sig", "typer._click.decorators", "typer.main", "typer.rich_utils")  # loaded late by these
 PACKAGES = ("clients", "recording")  # beside those of all robots; not the test kit, whose modules pytest rewrites
 PR_SET_NAME = 15
 PEER = struct.Struct("3i")  # pid, uid, gid
@@ -59,16 +59,17 @@ class Wanted(TypedDict):
 class WarmParent:
     """The listening socket and the running commands, each with its caller."""
 
-    def __init__(self, path: Path, lock: int, stamp: str) -> None:
+    def __init__(self, path: str, lock: int, stamp: str) -> None:
         """Listen at ``path``; ``lock`` is held while we do; ``stamp`` is of the sources that were loaded."""
         self._path, self._lock, self._stamp = path, lock, stamp
         self._rights = installation.rights_of("self")
         self._callers: dict[int, tuple[int, socket.socket]] = {}  # by descriptor: process and connection
         self._ending: dict[int, float] = {}  # process and when it is killed, s
         self._wake = wake_at_ends()
-        path.unlink(missing_ok=True)  # of a killed one: we have the lock
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(path)  # of a killed one: we have the lock
         listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        listening.bind(bytes(path))
+        listening.bind(path)
         listening.listen(CALLERS_MAX)
         self._listening: socket.socket | None = listening
 
@@ -117,7 +118,7 @@ class WarmParent:
                 poll.register(caller, select.POLLIN)
                 caller.send(b"+")
                 return
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError, KeyError, TypeError, SyntaxError, RecursionError, MemoryError) as error:
             sys.stderr.write(f"cannot start a command: {error}\n")
         finally:
             for descriptor in descriptors:
@@ -140,7 +141,7 @@ class WarmParent:
             if not (more := caller.recv(min(1 << 16, length - len(text)))):
                 raise ValueError("the caller has gone")
             text += more
-        wanted: Wanted = json.loads(text)
+        wanted: Wanted = ast.literal_eval(text.decode())
         if wanted["descriptors"][:3] != [0, 1, 2] or len(given) != len(wanted["descriptors"]):
             raise ValueError("files are missing")
         return wanted
@@ -190,7 +191,8 @@ class WarmParent:
 
     def _stop_listening(self) -> None:
         assert self._listening is not None
-        self._path.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(self._path)
         self._listening.close()
         self._listening = None
         os.close(self._lock)
@@ -252,7 +254,7 @@ def _limit(kind: int, soft: int, hard: int) -> None:
 
 
 def _run_command(words: list[str]) -> None:
-    sys.argv = [str(installation.PACKAGE / "__main__.py"), *words]
+    sys.argv = [f"{installation.PACKAGE}/__main__.py", *words]
     run_command()
 
 
@@ -267,9 +269,9 @@ def _run_code(words: list[str]) -> None:
     exec(compile(code, "<string>", "exec"), module.__dict__)
 
 
-def main(path: Path) -> None:
+def main(path: str) -> None:
     """Load everything unless another parent is there or comes, then serve."""
-    lock = os.open(path.with_suffix(".lock"), os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+    lock = os.open(f"{path}.lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -277,13 +279,16 @@ def main(path: Path) -> None:
     for kind in (signal.SIGINT, signal.SIGHUP):
         signal.signal(kind, signal.SIG_IGN)
     stamp = installation.stamp()
-    for name in (*COMMANDS, *modules_of(PACKAGES)):
+    for name in (*MODULES, *modules_of(PACKAGES)):
         with contextlib.suppress(ModuleNotFoundError):  # of an extra that is not installed
             importlib.import_module(name)
+    for name in COMMANDS:
+        with contextlib.suppress(ModuleNotFoundError):
+            built(name)
     warm()
     WarmParent(path, lock, stamp).serve()
 
 
 if __name__ == "__main__":
     os.environ |= ENVIRONMENT  # before numpy is imported
-    main(Path(sys.argv[1]))
+    main(sys.argv[1])
