@@ -17,6 +17,8 @@ from roboglot.shards.warmth import ENVIRONMENT
 from roboglot.storage.database import connect
 from roboglot.storage.transfer import copy_robot, forget_robot
 
+BODIES = "b.toml+hard", "hermes+hard", "recording:r.mcap", "slamware://10.0.0.1"
+
 
 @given(st.integers(1, 40), st.integers(1, 30))
 def test_names_and_addresses_are_each_robots_own(worlds: int, each: int) -> None:
@@ -59,6 +61,25 @@ def test_plans_that_cannot_be_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=reason):
         plan_fleet(worlds, each, template, Path("/nowhere"), first=first)
+
+
+def test_files_of_a_template_are_found_from_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    template = {
+        "world": "w.toml",
+        "registry": "homes.db",
+        "access": {"tls": {"certificate": "c.pem", "key": "/etc/k.pem"}},
+        "robots": [{"name": name, "body": body} for name, body in zip("abcd", BODIES, strict=True)],
+    }
+    plan = plan_fleet(1, 0, template, tmp_path)
+    assert plan.request["template"] == template
+    settings = plan.shards[0].settings
+    assert (settings["world"], settings["registry"]) == (f"{tmp_path}/w.toml", f"{tmp_path}/homes.db")
+    assert settings["access"]["tls"] == {"certificate": f"{tmp_path}/c.pem", "key": "/etc/k.pem"}
+    there = [f"{tmp_path}/b.toml+hard", "hermes+hard", f"recording:{tmp_path}/r.mcap", "slamware://10.0.0.1"]
+    assert [robot["body"] for robot in settings["robots"]] == there
+    server = plan_fleet(1, 1, {"world": "yard", "registry": "postgresql://host/name"}, tmp_path).shards[0].settings
+    assert (server["world"], server["registry"]) == ("yard", "postgresql://host/name")
 
 
 def test_a_plan_is_kept(tmp_path: Path) -> None:

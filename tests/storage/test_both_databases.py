@@ -8,6 +8,7 @@ from pathlib import Path
 
 import httpx
 import numpy as np
+import psycopg
 import pytest
 
 from roboglot.config import Config, ConsoleConfig, RobotConfig
@@ -32,6 +33,7 @@ from roboglot.storage.members import StoredMembers
 from roboglot.storage.opening import open_database
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.places import StoredPlaces
+from roboglot.storage.postgresql import in_one_line
 from roboglot.storage.programs import DatabaseProgramStore
 from roboglot.storage.settings import StoredSettings
 from roboglot.storage.transactions import Connection, DatabaseError, DiskFull, Transactions
@@ -189,10 +191,9 @@ async def test_a_full_disk_is_only_read(database: Transactions) -> None:
     await StoredSettings(database, "b").put("x", 3)  # another robot's disk has room
 
 
-def test_an_absent_server_is_named_in_one_line() -> None:
-    with pytest.raises(OSError, match=r"[Cc]onnection refused") as refused:
-        open_database(Path(), "postgresql://127.0.0.1:1/none")
-    assert "\n" not in str(refused.value)
+def test_an_error_of_the_server_is_one_line() -> None:
+    error = psycopg.OperationalError("connection failed: Connection refused\n\tIs the server running?")
+    assert in_one_line(error) == "connection failed: Connection refused Is the server running?"
 
 
 @needs_postgresql

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from ipaddress import IPv4Address, ip_address
 from pathlib import Path
@@ -10,12 +11,14 @@ from typing import Any
 
 import msgspec
 
-from roboglot.config import ROBOTS_MAX, Config, ConsoleConfig, is_loopback, refuse_unguarded
+from roboglot.config import RECORDING, ROBOTS_MAX, Config, ConsoleConfig, is_loopback, refuse_unguarded
 from roboglot.shards.shard import settings_of
 
 WORLDS_MAX = 500
 FIRST_ADDRESS = "127.10.0.1"
 PLAN = "fleet.json"
+FILES = {"registry", "people", "certificate", "key", "to", "cloud", "uart", "ca"}  # settings, of sections, too
+NAMES_OR_FILES, SUFFIX = {"world", "body"}, re.compile(r"\.(toml|ya?ml)(\+|$)")
 NAMES = "abcdefghijklmnopqrstuvwxyz"
 
 
@@ -65,6 +68,8 @@ def plan_fleet(
     if not 0 <= robots_each <= ROBOTS_MAX:
         raise ValueError(f"between 1 and {ROBOTS_MAX} robots in each world, not {robots_each}")
     settings_of(template, origin="the template")
+    request = {"worlds": worlds, "first_address": first, "template": template}
+    template = _anchored(template)
     robots = template.get("robots") or _robots(robots_each or 1)
     if robots_each and template.get("robots") and len(robots) != robots_each:
         raise ValueError(f"the template has {len(robots)} robots in a world, but --robots-each is {robots_each}")
@@ -86,9 +91,7 @@ def plan_fleet(
         settings["console"] = _console(template, settings["robots"][0]["address"], number)
         settings["seed"] = int(template.get("seed", 1)) + number - 1
         shards.append(ShardPlan(f"w{number}", settings))
-    plan = FleetPlan(
-        {"worlds": worlds, "robots_each": len(robots), "first_address": first, "template": template}, shards
-    )
+    plan = FleetPlan({**request, "robots_each": len(robots)}, shards)
     for shard in plan.shards[:1]:  # they differ only in names and addresses
         refuse_unguarded(checked(shard))
     return plan
@@ -117,6 +120,21 @@ def load(folder: Path) -> FleetPlan | None:
         return None
     except (OSError, msgspec.DecodeError) as error:
         raise ValueError(f"{folder / PLAN} cannot be read: {error}") from None
+
+
+def _anchored(value: Any, name: str = "") -> Any:
+    """Return settings with absolute names of files: the next `fleet up` may run in another folder."""
+    match value:
+        case dict():
+            return {name: _anchored(inner, name) for name, inner in value.items()}
+        case list():
+            return [_anchored(inner, name) for inner in value]
+        case str() if name == "body" and value.startswith(RECORDING):
+            return RECORDING + str(Path(value.removeprefix(RECORDING)).absolute())
+        case str() if value and "://" not in value:
+            is_file = name in FILES or (name in NAMES_OR_FILES and SUFFIX.search(value))
+            return str(Path(value).absolute()) if is_file else value
+    return value
 
 
 def _robots(count: int) -> list[dict[str, object]]:

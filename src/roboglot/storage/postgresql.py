@@ -60,7 +60,7 @@ class PostgreSQL:
         except BaseException as error:
             self.close()
             if isinstance(error, DatabaseError):
-                raise OSError(str(error).strip().splitlines()[0]) from None
+                raise OSError(str(error)) from None
             raise
 
     def on(self, disk: Disk) -> PostgreSQL:
@@ -98,13 +98,13 @@ class PostgreSQL:
         except psycopg.errors.ReadOnlySqlTransaction as error:
             if full:
                 raise DiskFull("the disk is full") from None
-            raise DatabaseError(_in_one_line(error)) from error
+            raise DatabaseError(in_one_line(error)) from error
         except psycopg.IntegrityError as error:
-            raise AlreadyThere(_in_one_line(error)) from error
+            raise AlreadyThere(in_one_line(error)) from error
         except psycopg.errors.DiskFull as error:
             raise DiskFull("the database's disk is full") from error
         except psycopg.Error as error:
-            raise DatabaseError(_in_one_line(error)) from error
+            raise DatabaseError(in_one_line(error)) from error
 
     def _committed(self, work: Callable[[Connection], T], *, read_only: bool) -> T:
         connection = self._begin(b"BEGIN READ ONLY" if read_only or self._only_read else b"BEGIN")
@@ -225,7 +225,7 @@ def _restored(row: Sequence[object]) -> tuple[object, ...]:
     )
 
 
-def _in_one_line(error: psycopg.Error) -> str:
+def in_one_line(error: psycopg.Error) -> str:
     """Return libpq's text without line breaks: it stands in log lines and doors' answers."""
     return " ".join(str(error).split())
 
