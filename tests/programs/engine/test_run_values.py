@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import random
 
 import pytest
@@ -14,8 +15,9 @@ from roboglot.programs.engine.events import (
     Finished,
 )
 from roboglot.programs.engine.run import Run
+from roboglot.programs.worker.frames import frame
 from roboglot.programs.worker.values import Record
-from tests.programs.playing import PRELUDE, answers, echo, play
+from tests.programs.playing import PRELUDE, answers, echo, last, play
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -147,3 +149,38 @@ async def test_misspelt_names_say_what_was_meant(engine: Engine) -> None:
 async def test_surrogates_and_controls_are_only_text(engine: Engine) -> None:
     played = await play(engine, r"print('a\udc80b\0\x1b狗', cyberdog.echo('\ud800'))")
     assert played.output == "a?b\0\x1b狗 ?\n"
+
+
+async def test_short_calls_are_answered_as_they_come(engine: Engine) -> None:
+    source = "for i in range(3):\n    cyberdog.echo(i)\ncyberdog.echo([3])\ncyberdog.echo('x' * 300)\n"
+    run, at_once, read = await engine.start(source, PRELUDE), list[object](), list[object]()
+
+    def answer(call: Call) -> None:
+        at_once.append(call.args)
+        run.calls.reply(call.id)
+
+    run.calls.asked = answer
+    async for event in run:
+        if isinstance(event, Call):
+            read.append((event.args, event.line))
+            run.calls.reply(event.id)
+    assert at_once[-2:] == [(1,), (2,)]  # the first may have come before
+    assert read[-2:] == [(([3],), 3), (("x" * 300,), 4)]
+    assert run.exit_reason is ExitReason.FINISHED
+
+
+async def test_two_calls_at_once_are_a_violation(engine: Engine) -> None:
+    run = await engine.start("while True:\n    pass\n", PRELUDE)
+    asked = list[Call]()
+    run.calls.asked = asked.append
+    reading = asyncio.create_task(last(run))
+    await asyncio.sleep(0)
+    call = b'{"t":"call","id":%d,"name":"cyberdog.echo","args":[],"kwargs":{}}'
+    run.wire.data_received(frame(call % 1))
+    assert [call.id for call in asked] == [1]
+    run.calls.reply(1)
+    run.wire.data_received(frame(call % 2) + frame(call % 3))
+    assert [call.id for call in asked] == [1]
+    end = await reading
+    assert isinstance(end, Failed)
+    assert end.reason is ExitReason.PROTOCOL

@@ -8,28 +8,26 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import partial
 from typing import Protocol
 
 import msgspec
 
 from roboglot.programs.engine.events import Answer, Call, ExitReason, Halted, Replayed
-from roboglot.programs.engine.messages import NAME_MAX, CallMessage, ProtocolViolation
+from roboglot.programs.engine.messages import NAME_MAX, SHORT, CallMessage, PlainCall, ProtocolViolation
 from roboglot.programs.engine.position import Position
 from roboglot.programs.engine.share import STEP, Account
-from roboglot.programs.worker.frames import frame
-from roboglot.programs.worker.link import HALT, REPLY_MAX
+from roboglot.programs.worker.frames import HEADER, frame
+from roboglot.programs.worker.link import HALT, NOTHING, REPLY_MAX
 from roboglot.programs.worker.values import drained, pack
 
 BURST = 0.1
 """Burst that the call rate allows, in seconds of calls."""
 CALL_BYTES_RATE_MAX = 2 * 1024 * 1024
 """Bytes of arguments a second."""
-SHORT = 256
-"""Largest frame, in bytes, whose cost is not measured: reading the clock twice would take as long."""
-NONE_REPLY = b'{"t":"value","value":null}'  # the answer to most calls
-Values = tuple[tuple[object, ...], dict[str, object]]
+NONE_REPLY = NOTHING[HEADER:]
+Values = tuple[tuple[object, ...], Mapping[str, object]]
 
 
 class CallHost(Protocol):
@@ -41,6 +39,10 @@ class CallHost(Protocol):
 
     def write(self, data: bytes) -> None:
         """Send a frame to the worker."""
+
+    @property
+    def awaited(self) -> bool:
+        """True while the reader waits for an event, and no further frame has come."""
 
     def put(self, event: Call | Halted | Replayed) -> None:
         """Hand an event to the reader."""
@@ -64,9 +66,9 @@ class CallRate:
 
     def delay(self, size: int = 0) -> float:
         """Count a call of ``size`` bytes; return its delay in seconds, 0 or less for none."""
-        now = self._loop.time()
-        cost = max(self._call_cost, size / CALL_BYTES_RATE_MAX)
-        self._paid_until = max(self._paid_until, now - BURST) + cost
+        now, cost, bytes_cost = self._loop.time(), self._call_cost, size / CALL_BYTES_RATE_MAX
+        paid, least = self._paid_until, now - BURST
+        self._paid_until = (paid if paid > least else least) + (cost if cost > bytes_cost else bytes_cost)
         return self._paid_until - now
 
 
@@ -90,6 +92,8 @@ class Calls:
         self._history = deque(history)
         self._loop = asyncio.get_running_loop()
         self._waiting: Call | Halted | None = None
+        self.asked: Callable[[Call], None] | None = None
+        """Called at once with a short call, without its line, while the reader waits; otherwise the reader gets it."""
         self.answered: Callable[[str, bytes], None] | None = None
         """Called with the call's name and each answer sent, to continue the program after a crash."""
         self.keeps_last = False
@@ -102,7 +106,10 @@ class Calls:
         Raises TypeError or ValueError for values that cannot be sent (the call still waits), LookupError if no such
         call waits.
         """
-        self._answer(id, NONE_REPLY if value is None else msgspec.json.encode({"t": "value", "value": pack(value)}))
+        if value is None:
+            self._answer(id, NONE_REPLY, NOTHING)
+        else:
+            self._answer(id, msgspec.json.encode({"t": "value", "value": pack(value)}))
 
     def fail(self, id: int, type: str, message: str) -> None:
         """Answer a call with an error: the name of a built-in exception, or another, made a subclass of RobotError."""
@@ -115,20 +122,34 @@ class Calls:
         if kept and not self._host.over:
             self._host.write(kept)
 
-    def take(self, call: CallMessage, size: int) -> None:
+    def take(self, call: CallMessage | PlainCall, size: int) -> None:
         """Take a call of ``size`` bytes. Raises ProtocolViolation."""
         if self._waiting is not None:
             raise ProtocolViolation("a call before the reply to the last one")
-        if call.name == HALT and self._position.watched:
-            self._halt(call)
-            return
-        if call.name not in self._names:
-            raise ProtocolViolation(f"a call of '{call.name[:NAME_MAX]}', which was not offered")
-        self._waiting = Call(call.id, call.name, (), {}, 0)  # its values have not been read yet
-        if size <= SHORT:
-            self._deliver(call, size, call.plain() or drained(call.values()))
+        name = call.name
+        if name not in self._names:
+            if name != HALT or not self._position.watched:
+                raise ProtocolViolation(f"a call of '{name[:NAME_MAX]}', which was not offered")
+            self._halt(call.id)
+        elif isinstance(call, PlainCall):
+            asked, delay = self.asked, None
+            if (
+                asked is not None
+                and not self._history
+                and self._host.awaited
+                and not self._account.spent
+                and (delay := self._rate.delay(size)) <= 0
+            ):
+                self._waiting = event = Call(call.id, name, call.args, call.kwargs, 0)
+                asked(event)
+            else:
+                self._deliver(call, size, call.args, call.kwargs, delay)
         else:
-            self._read(call, size, call.values())
+            self._waiting = Call(call.id, name, (), {}, 0)  # its values have not been read yet
+            if size <= SHORT:
+                self._deliver(call, size, *drained(call.values()))
+            else:
+                self._read(call, size, call.values())
 
     def _read(
         self, call: CallMessage, size: int, values: Generator[None, None, Values], *, in_turn: bool = False
@@ -151,11 +172,17 @@ class Calls:
         if read is None:
             self._account.queue(partial(self._read, call, size, values, in_turn=True))
         else:
-            self._deliver(call, size, read)
+            self._deliver(call, size, *read)
 
-    def _deliver(self, call: CallMessage, size: int, values: Values) -> None:
-        """Hand a call to the reader once the call rate allows it."""
-        args, kwargs = values
+    def _deliver(
+        self,
+        call: CallMessage | PlainCall,
+        size: int,
+        args: tuple[object, ...],
+        kwargs: Mapping[str, object],
+        delay: float | None = None,
+    ) -> None:
+        """Hand a call to the reader once the call rate allows it, or after ``delay`` if that was asked already."""
         interrupted = False
         if self._history:
             interrupted = self._history[0].body is None
@@ -163,7 +190,8 @@ class Calls:
                 return
         unit, line = self._position.now
         self._waiting = event = Call(call.id, call.name, args, kwargs, line, unit, interrupted)
-        delay = self._rate.delay(size)
+        if delay is None:
+            delay = self._rate.delay(size)
         if delay > 0:
             self._loop.call_later(delay, self._account.go_on, partial(self._put, event))
         elif self._account.spent:
@@ -171,16 +199,16 @@ class Calls:
         else:
             self._host.put(event)
 
-    def _halt(self, call: CallMessage) -> None:
+    def _halt(self, id: int) -> None:
         """Report a halt, except during a replay."""
-        self._waiting = halted = Halted(call.id, self._position.line, self._position.unit)
+        self._waiting = halted = Halted(id, self._position.line, self._position.unit)
         if self._history:
-            self.reply(call.id)
+            self.reply(id)
             return
         self._position.clear_step()
         self._loop.call_later(max(0.0, self._rate.delay()), self._put, halted)
 
-    def _replay(self, call: CallMessage, args: tuple[object, ...], kwargs: dict[str, object]) -> bool:
+    def _replay(self, call: CallMessage | PlainCall, args: tuple[object, ...], kwargs: Mapping[str, object]) -> bool:
         """Answer a call from the history; return True if it was interrupted there and needs a new answer."""
         known = self._history.popleft()
         if known.name != call.name:
@@ -201,7 +229,7 @@ class Calls:
         if not self._host.over:
             self._host.put(event)
 
-    def _answer(self, id: int, body: bytes) -> None:
+    def _answer(self, id: int, body: bytes, framed: bytes = b"") -> None:
         if len(body) > REPLY_MAX:
             raise ValueError("the value is too large for a program")
         if self._host.over:
@@ -211,4 +239,4 @@ class Calls:
         waited, self._waiting = self._waiting, None
         if isinstance(waited, Call) and self.answered is not None:
             self.answered(waited.name, body)
-        self._host.write(frame(body))
+        self._host.write(framed or frame(body))

@@ -18,14 +18,14 @@ OUTPUT_MAX = 4 * OUTPUT_EVENT_MAX
 class Inbox:
     """A queue that never blocks its writer: the writer should pause while ``full``."""
 
-    __slots__ = ("_events", "_loop", "_pieces", "_reader", "_size", "_unread", "closed")
+    __slots__ = ("_events", "_loop", "_pieces", "_size", "_unread", "closed", "reader")
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._events: deque[Event] = deque()
         self._pieces: list[str] = []
         self._size = self._unread = 0
-        self._reader: asyncio.Future[None] | None = None  # the waiting reader; a future is cheaper than an Event
+        self.reader: asyncio.Future[None] | None = None  # the waiting reader; a future is cheaper than an Event
         self.closed = False
 
     @property
@@ -70,16 +70,16 @@ class Inbox:
                 break
             if self.closed:
                 return None
-            self._reader = self._loop.create_future()
-            await self._reader
+            self.reader = self._loop.create_future()
+            await self.reader
         event = self._events.popleft()
         if isinstance(event, Output):
             self._unread -= len(event.text)
         return event
 
     def _wake(self) -> None:
-        if self._reader is not None and not self._reader.done():
-            self._reader.set_result(None)
+        if self.reader is not None and not self.reader.done():
+            self.reader.set_result(None)
 
     def _join(self) -> None:
         self._events.append(Output("".join(self._pieces)))

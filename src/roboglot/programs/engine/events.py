@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 
 import msgspec
@@ -90,7 +91,7 @@ class Call(msgspec.Struct, frozen=True):  # one per call: a frozen dataclass tak
     id: int
     name: str
     args: tuple[object, ...]
-    kwargs: dict[str, object]
+    kwargs: Mapping[str, object]
     line: int
     unit: str = ""
     interrupted: bool = False
@@ -111,7 +112,7 @@ class Replayed:
 
     name: str
     args: tuple[object, ...]
-    kwargs: dict[str, object]
+    kwargs: Mapping[str, object]
     answer: bytes
 
 

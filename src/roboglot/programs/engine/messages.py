@@ -18,9 +18,12 @@ NAME_MAX = 200
 """Characters of a call's or an error type's name."""
 ARGUMENTS_MAX = 64
 """Most positional arguments of one call, and most keyword arguments."""
+SHORT = 256
+"""Largest frame, in bytes, whose cost is not measured: reading the clock twice would take as long."""
 VALUES_MAX = SEPARATORS_MAX + 2  # including the brackets around the arguments
 
 
+Plain = bool | int | float | str | None
 VariableName = Annotated[str, msgspec.Meta(max_length=VARIABLE_NAME_MAX)]
 VariableText = Annotated[str, msgspec.Meta(max_length=TEXT_MAX)]
 
@@ -60,25 +63,19 @@ class CallMessage(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fiel
             raise ProtocolViolation(str(error)[:200]) from None
         return tuple(args), kwargs
 
-    def plain(self) -> tuple[tuple[object, ...], dict[str, object]] | None:
-        """Return the arguments of a short call if all are positional and none contains others, which is usual.
-
-        None for all other arguments, and for what is no list: ``values`` checks them.
-        """
-        if bytes(self.kwargs) != b"{}":
-            return None
-        try:
-            packed = _list(self.args)
-        except (msgspec.MsgspecError, ValueError, RecursionError):
-            return None
-        if len(packed) > ARGUMENTS_MAX or not _PLAIN.issuperset(map(type, packed)):
-            return None
-        return tuple(packed), {}
-
     @property
     def size(self) -> int:
         """Bytes of the arguments."""
         return len(self.args) + len(self.kwargs)
+
+
+class PlainCall(msgspec.Struct, tag_field="t", tag="call", forbid_unknown_fields=True):
+    """A short host call whose arguments contain no others, which is usual: they are what they stand for."""
+
+    id: int
+    name: str
+    args: Annotated[tuple[Plain, ...], msgspec.Meta(max_length=ARGUMENTS_MAX)]
+    kwargs: Annotated[dict[str, Plain], msgspec.Meta(max_length=ARGUMENTS_MAX)]
 
 
 class VariablesMessage(msgspec.Struct, tag_field="t", tag="variables", forbid_unknown_fields=True):
@@ -107,16 +104,23 @@ class CheckedMessage(msgspec.Struct, tag_field="t", tag="checked", forbid_unknow
     uses: list[str]
 
 
-Message = OutputMessage | CallMessage | VariablesMessage | FinishedMessage | FailedMessage | CheckedMessage
-_decoder: msgspec.json.Decoder[Message] = msgspec.json.Decoder(Message)
+_Tagged = OutputMessage | CallMessage | VariablesMessage | FinishedMessage | FailedMessage | CheckedMessage
+Message = _Tagged | PlainCall
+_decoder: msgspec.json.Decoder[_Tagged] = msgspec.json.Decoder(_Tagged)
 _ALONE = {bool, float, str, type(None)}  # types whose values are sent unpacked
-_PLAIN = _ALONE | {int}  # a short call has no room for a number that is too large
+_CALL = b'{"t":"call"'  # begins an intact worker's call
+_decode_plain = msgspec.json.Decoder(PlainCall).decode
 _list = msgspec.json.Decoder(list).decode
 _dict = msgspec.json.Decoder(dict).decode
 
 
 def decode(body: bytes) -> Message:
     """Return the message of a frame. Raises ProtocolViolation."""
+    try:
+        if len(body) <= SHORT and body.startswith(_CALL):  # it has no room for a number that is too large
+            return _decode_plain(body)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
+        pass  # it may contain others
     try:
         return _decoder.decode(body)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:

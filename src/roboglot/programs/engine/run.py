@@ -11,7 +11,7 @@ import signal
 import time
 from collections.abc import Callable, Iterable
 
-from roboglot.programs.engine.calls import SHORT, CallRate, Calls
+from roboglot.programs.engine.calls import CallRate, Calls
 from roboglot.programs.engine.event_queue import Inbox
 from roboglot.programs.engine.events import (
     Answer,
@@ -24,11 +24,13 @@ from roboglot.programs.engine.events import (
 from roboglot.programs.engine.launcher import Worker
 from roboglot.programs.engine.messages import (
     NAME_MAX,
+    SHORT,
     CallMessage,
     FailedMessage,
     FinishedMessage,
     Message,
     OutputMessage,
+    PlainCall,
     ProtocolViolation,
     VariablesMessage,
     decode,
@@ -71,6 +73,8 @@ class Run:
         self._worker: Worker | None = None
         self._ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._ending: Finished | Failed | None = None
+        self.over = False
+        """True once the run has ended or is being ended."""
         self._clock = Stopwatch(limits.wall, self._over_time)
         self._printed = 0
         self._switch = asyncio.Lock()
@@ -106,11 +110,6 @@ class Run:
     def suspended(self) -> bool:
         """True while the process is stopped."""
         return self._worker is not None and self._worker.stopped and not self._worker.died.done()
-
-    @property
-    def over(self) -> bool:
-        """True once the run has ended or is being ended."""
-        return self._ending is not None
 
     @property
     def exit_reason(self) -> ExitReason | None:
@@ -165,18 +164,24 @@ class Run:
 
     def take(self, body: bytes) -> bool:
         """Take one frame of the worker; return False when no more frames matter. Raises ProtocolViolation."""
-        if self._ending is not None:
+        if self.over:
             return False
         size = len(body)
         began = time.thread_time() if size > SHORT else 0.0
         message = decode(body)
-        if isinstance(message, CallMessage):
+        if isinstance(message, PlainCall) or isinstance(message, CallMessage):  # noqa: SIM101 - twice as fast
             self.calls.take(message, size)
         else:
             self._take_message(message)
         cost = OUTPUT_COST if isinstance(message, OutputMessage) else SHORT_COST
         self.account.charge(cost + (time.thread_time() - began if began else 0.0))
-        return self._ending is None
+        return not self.over
+
+    @property
+    def awaited(self) -> bool:
+        """True while the reader waits for an event, and no further frame has come."""
+        reader = self._inbox.reader
+        return reader is not None and not reader.done() and not self.wire.frames
 
     @property
     def full(self) -> bool:
@@ -245,6 +250,6 @@ class Run:
 
     def _finish(self, ending: Finished | Failed) -> None:
         if self._ending is None:
-            self._ending = ending
+            self._ending, self.over = ending, True
             if self._worker:
                 self._worker.signal(signal.SIGKILL)  # a worker may report its end and not exit

@@ -38,7 +38,8 @@ class Share:
 
     def charge(self, seconds: float, now: float) -> None:
         """Count ``seconds`` of work for any program."""
-        self._paid_until = max(self._paid_until, now - BURST) + seconds / SHARE_MAX
+        paid, least = self._paid_until, now - BURST
+        self._paid_until = (paid if paid > least else least) + seconds / SHARE_MAX
 
     def queue(self, turn: Callable[[], None]) -> None:
         """Append ``turn`` to the queue; it is never called at once."""
@@ -63,23 +64,25 @@ class Share:
 class Account:
     """Account of one program's time: ``charge`` work to it; ``go_on`` continues when the program may."""
 
-    __slots__ = ("_loop", "_paid_until", "_share")
+    __slots__ = ("_loop", "_share", "paid_until")
 
     def __init__(self, share: Share) -> None:
         self._share = share
         self._loop = asyncio.get_running_loop()
-        self._paid_until = 0.0
+        self.paid_until = 0.0
+        """Time of the loop until which the program has to wait for its turn."""
 
     def charge(self, seconds: float) -> None:
         """Count ``seconds`` of work for this program."""
         now = self._loop.time()
         self._share.charge(seconds, now)
-        self._paid_until = max(self._paid_until, now - LIGHT_BURST) + seconds / LIGHT
+        paid, least = self.paid_until, now - LIGHT_BURST
+        self.paid_until = (paid if paid > least else least) + seconds / LIGHT
 
     @property
     def spent(self) -> bool:
         """True if the program has to wait for its turn."""
-        return self._paid_until > self._loop.time()
+        return self.paid_until > self._loop.time()
 
     def go_on(self, work: Callable[[], None]) -> None:
         """Do ``work`` now, or when it is this program's turn."""
@@ -92,7 +95,7 @@ class Account:
         """Do ``work`` when it is this program's turn, after everything else that is ready."""
 
         def turn() -> None:
-            self._paid_until = self._loop.time() - STEP / LIGHT  # a step costs nothing
+            self.paid_until = self._loop.time() - STEP / LIGHT  # a step costs nothing
             work()
 
         self._share.queue(turn)

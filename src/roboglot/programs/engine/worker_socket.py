@@ -43,7 +43,8 @@ class Wire(asyncio.Protocol):
         self._listener = listener
         self._account = account or Share().account()
         self._reader = FrameReader()
-        self._bodies: deque[bytes] = deque()
+        self.frames: deque[bytes] = deque()
+        """Bodies that have come and wait for their turn."""
         self._transport: asyncio.Transport | None = None
         self._loop = asyncio.get_running_loop()
         self.paused = self._throttled = False
@@ -63,7 +64,7 @@ class Wire(asyncio.Protocol):
 
     def drop(self) -> None:
         """Close without reading the rest."""
-        self._bodies.clear()
+        self.frames.clear()
         if self._transport is not None:
             self._transport.abort()
 
@@ -73,8 +74,12 @@ class Wire(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Take bytes of the worker."""
+        if not self.frames and (body := self._reader.whole(data)) is not None:
+            self._pass_on(body)
+            self._pace(1)
+            return
         try:
-            self._bodies += self._reader.feed(data)
+            self.frames += self._reader.feed(data)
         except FrameTooLong as error:
             self._take_all()
             self._break(error)
@@ -83,12 +88,16 @@ class Wire(asyncio.Protocol):
 
     def _take(self) -> None:
         """Pass on as many frames as allowed, then decide whether to read on."""
-        taken = self._take_some()
+        self._pace(self._take_some())
+
+    def _pace(self, taken: int) -> None:
+        """Count so many frames; pause reading if it has to wait."""
         if self.closed or self._transport is None:
             return
         now = self._loop.time()
-        self._paid_until = max(self._paid_until, now - _BURST) + taken / FRAME_RATE_MAX
-        if not self._throttled and (self._paid_until > now or self._bodies or self._account.spent):
+        paid, least = self._paid_until, now - _BURST
+        self._paid_until = paid = (paid if paid > least else least) + taken / FRAME_RATE_MAX
+        if not self._throttled and (paid > now or self.frames or self._account.paid_until > now):
             self._throttled = True
             self._loop.call_later(max(0.0, self._paid_until - now), self._account.go_on, self._unthrottle)
         if not self.paused and (self._listener.full or self._throttled):
@@ -97,19 +106,21 @@ class Wire(asyncio.Protocol):
 
     def _take_some(self) -> int:
         taken = 0
+        while self.frames and not (taken and self._account.spent):
+            taken += 1
+            self._pass_on(self.frames.popleft())
+        return taken
+
+    def _pass_on(self, body: bytes) -> None:
         try:
-            while self._bodies and not (taken and self._account.spent):
-                taken += 1
-                if not self._listener.take(self._bodies.popleft()):
-                    self.drop()
-                    break
+            if not self._listener.take(body):
+                self.drop()
         except ProtocolViolation as error:
             self._break(error)
-        return taken
 
     def _take_all(self) -> None:
         """Take the frames that came before the end."""
-        while self._bodies:
+        while self.frames:
             self._take_some()
 
     def _break(self, error: Exception) -> None:
@@ -125,6 +136,6 @@ class Wire(asyncio.Protocol):
 
     def _unthrottle(self) -> None:
         self._throttled = False
-        if self._bodies:
+        if self.frames:
             self._take()
         self.read_on()

@@ -6,9 +6,12 @@ Knows no table of states and no task store: the runner that started it stores it
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Awaitable, Callable
+from contextvars import Context, copy_context
 from dataclasses import replace
+from functools import partial
 
 from roboglot.model.client_context import ask_for
 from roboglot.model.errors import RobotError
@@ -53,6 +56,7 @@ from roboglot.programs.tasks.reports import (
 from roboglot.programs.tasks.run_host import RunHost
 from roboglot.programs.tasks.run_log import RunLog
 from roboglot.programs.tasks.states import TaskOperation, TaskState
+from roboglot.transport.eager import begin
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -160,6 +164,7 @@ class TaskRun:
         """Answer the program's calls until it ends, then cancel the actions that it started."""
         outcome = Outcome(ExitReason.LOST, "the program was lost")
         ask_for(f"visual {self.task.id}", identity=self.task.owner)
+        self._run.calls.asked = partial(self._asked, copy_context())
         self.control.start()
         self.time.begin()
         try:
@@ -173,7 +178,7 @@ class TaskRun:
                     case Call():
                         if event.interrupted:
                             await self._followed()
-                        self._answering = asyncio.create_task(self._answer_metered(event), name=f"call {event.name}")
+                        self._asked(copy_context(), event)
                     case Halted():
                         self._answering = asyncio.create_task(self._halt(event), name=f"halt {self.task.id}")
                     case Finished():
@@ -270,12 +275,18 @@ class TaskRun:
         self._run.calls.reply(halted.id)
         self.time.ask(False)
 
-    async def _answer_metered(self, request: Call) -> None:
-        self.time.ask(True)
-        try:
-            await metered(self._answer(request), self._run.account.charge)
-        finally:
-            self.time.ask(False)
+    def _asked(self, context: Context, request: Call) -> None:
+        """Answer a call at once, or in a task if that has to wait; charge the time that it takes."""
+
+        async def answer() -> None:
+            self.time.ask(True)
+            try:
+                await metered(self._answer(request), self._run.account.charge)
+            finally:
+                self.time.ask(False)
+
+        with contextlib.suppress(asyncio.CancelledError):  # as in a task
+            self._answering = begin(answer(), f"call {request.name}", context.copy())
 
     async def _value(self, request: Call) -> object:
         """Make the call; return its value once the program may continue."""

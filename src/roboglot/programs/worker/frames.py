@@ -32,10 +32,15 @@ class FrameReader:
         self._limit = limit
         self._pending = bytearray()
 
+    def whole(self, data: bytes) -> bytes | None:
+        """Return the body of a piece that is one whole frame, which is usual; None for others: ``feed`` takes them."""
+        size = len(data) - HEADER
+        if self._pending or size > self._limit or size < 0 or int.from_bytes(data[:HEADER], "big") != size:
+            return None
+        return data[HEADER:]
+
     def feed(self, data: bytes) -> list[bytes]:
         """Return the bodies completed by this piece. Raises FrameTooLong as soon as a header exceeds the limit."""
-        if not self._pending and len(data) == HEADER + int.from_bytes(data[:HEADER], "big") <= HEADER + self._limit:
-            return [data[HEADER:]]  # one whole frame: the usual case
         self._pending += data
         bodies: list[bytes] = []
         start = 0

@@ -11,7 +11,7 @@ from typing import Any
 
 from roboglot.programs.language.names import EXCEPTIONS
 from roboglot.programs.worker.environment import RobotError
-from roboglot.programs.worker.frames import FRAME_MAX, FrameReader, frame
+from roboglot.programs.worker.frames import FRAME_MAX, HEADER, FrameReader, frame
 from roboglot.programs.worker.records import Records
 from roboglot.programs.worker.values import SEPARATORS, SEPARATORS_MAX, pack, separators, unpack
 
@@ -21,6 +21,8 @@ TEXT_MAX = 128 * 1024
 """Most characters of an output frame; longer text is sent in pieces."""
 HALT = "$halt"
 """Call by which a watched program halts before a statement; not a name that a program can use."""
+NOTHING = frame(b'{"t":"value","value":null}')
+"""Frame of the answer None, which most calls get."""
 EXIT_LOST, EXIT_MEMORY = 0, 71
 """Exit codes when the host is gone, and when memory runs out where no report is possible."""
 
@@ -31,7 +33,6 @@ _pieces = json.encoder.c_make_encoder(  # type: ignore[attr-defined]  # not in t
 )
 _scan = json.JSONDecoder().scan_once  # type: ignore[attr-defined]  # the host's messages have nothing around them
 _quote = json.encoder.encode_basestring  # in C
-_NOTHING = b'{"t":"value","value":null}'  # the answer to most calls
 _TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
 _ESCAPES = {character: f"\\u{character:04x}" for character in SEPARATORS}
 _HEADROOM = 100
@@ -46,6 +47,7 @@ class HostLink:
         self._reader = FrameReader(REPLY_MAX)
         self._bodies: list[bytes] = []
         self._calls = 0
+        self._heads: dict[str, str] = {}  # of calls, by name
         self.records = Records({})
 
     def receive(self) -> dict[str, Any]:
@@ -66,13 +68,13 @@ class HostLink:
         self._send("".join(_pieces(message, 0)))
 
     def _send(self, text: str) -> None:
-        body = text.encode("utf-8", "replace")
-        if len(body) > FRAME_MAX:
+        data = frame(text.encode("utf-8", "replace"))
+        size = len(data)
+        if size > HEADER + FRAME_MAX:
             raise ValueError("the values are too large to be passed to the robot")
-        data = frame(body)
         try:
             sent = os.write(self._descriptor, data)
-            while sent < len(data):
+            while sent < size:
                 sent += os.write(self._descriptor, memoryview(data)[sent:])
         except (BrokenPipeError, ConnectionResetError):
             os._exit(EXIT_LOST)
@@ -88,7 +90,7 @@ class HostLink:
         sys.setrecursionlimit(limit + _HEADROOM)  # a program at its depth limit must not fail in the middle of a call
         try:
             body = self._ask(name, args, kwargs)
-            if body == _NOTHING:
+            if body is None:
                 return None
             reply = _scan(body.decode(), 0)[0]
         finally:
@@ -97,8 +99,18 @@ class HostLink:
             raise _exception(reply["type"], reply["message"])
         return self.records.enrich(unpack(reply["value"], self.records.join))
 
-    def _ask(self, name: str, args: tuple[object, ...], kwargs: dict[str, object]) -> bytes:
-        packed, named = self._json(args) if args else "", self._json_named(kwargs) if kwargs else ""
+    def _ask(self, name: str, args: tuple[Any, ...], kwargs: dict[str, object]) -> bytes | None:
+        """Return the body of the answer; None for the answer None."""
+        packed, named = "", self._json_named(kwargs) if kwargs else ""
+        for value in args:  # short numbers and texts, the usual ones, bypass ``pack`` for speed
+            kind = type(value)
+            if kind is int and -_SMALL < value < _SMALL:
+                text = repr(value)
+            elif kind is str:
+                text = _quote(value)
+            else:
+                text = "".join(_pieces(pack(value, self.records.split), 0))
+            packed = f"{packed},{text}" if packed else text
         if len(packed) + len(named) > SEPARATORS_MAX:
             packed, named = _sparse(packed), _sparse(named)
             if (
@@ -107,24 +119,18 @@ class HostLink:
             ):
                 raise ValueError("more values than can be passed to the robot at once")
         self._calls += 1
-        self._send(f'{{"t":"call","id":{self._calls},"name":{_quote(name)},"args":[{packed}],"kwargs":{{{named}}}}}')
+        head = self._heads.get(name) or self._heads.setdefault(name, f',"name":{_quote(name)},"args":[')
+        self._send(f'{{"t":"call","id":{self._calls}{head}{packed}],"kwargs":{{{named}}}}}')
         try:
+            data = os.read(self._descriptor, _READ)
+            if data == NOTHING:
+                return None
+            if not data:
+                os._exit(EXIT_LOST)
+            self._bodies = self._reader.feed(data)
             return self._body()
         except MemoryError:
             os._exit(EXIT_MEMORY)  # without the reply, program and host would be out of step
-
-    def _json(self, values: tuple[Any, ...]) -> str:
-        """Return arguments as JSON; short numbers and texts, the usual ones, bypass ``pack`` for speed."""
-        texts = []
-        for value in values:
-            kind = type(value)
-            if kind is int and -_SMALL < value < _SMALL:
-                texts.append(repr(value))
-            elif kind is str:
-                texts.append(_quote(value))
-            else:
-                texts.append("".join(_pieces(pack(value, self.records.split), 0)))
-        return ",".join(texts)
 
     def _json_named(self, values: dict[str, object]) -> str:
         return "".join(_pieces({key: pack(value, self.records.split) for key, value in values.items()}, 0))[1:-1]

@@ -66,12 +66,12 @@ def program(machine: str) -> bytes:
         _instruction(_RETURN, 0, 0, _KILL_PROCESS),
         _instruction(_LOAD, 0, 0, _NUMBER),
     ]
+    for socket_numbers in _ON_SOCKET.values():  # first, as each call of the host makes two of these
+        code += _if_number(socket_numbers[column], 0, _instruction(_EQUAL, 0, 1, SOCKET_FD), allow_first=True)
     for numbers in _FREE.values():
         number = numbers[column]
         if number is not None:
             code += [_instruction(_EQUAL, 0, 1, number), _instruction(_RETURN, 0, 0, _ALLOW)]
-    for socket_numbers in _ON_SOCKET.values():
-        code += _if_number(socket_numbers[column], 0, _instruction(_EQUAL, 0, 1, SOCKET_FD), allow_first=True)
     for memory_numbers in _NOT_EXECUTABLE.values():
         code += _if_number(memory_numbers[column], 2, _instruction(_BITS, 0, 1, _PROT_EXEC), allow_first=False)
     code.append(_instruction(_RETURN, 0, 0, _ERRNO | errno.EPERM))
