@@ -101,6 +101,15 @@ def test_status_words_and_output_are_the_commands(place: Place) -> None:
     assert place.start("raise SystemExit('no')").communicate(timeout=PATIENCE) == ("", "no\n")
 
 
+@pytest.mark.parametrize(("closed", "name"), [("<&-", "stdin"), (">&-", "stdout"), ("2>&-", "stderr")])
+def test_file_that_is_closed_stays_closed(place: Place, tmp_path: Path, closed: str, name: str) -> None:
+    found = tmp_path / "found"
+    code = f"import pathlib, sys; pathlib.Path({str(found)!r}).write_text(str(sys.{name})); sys.exit(3)"
+    words = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-m", "roboglot.cli.warm.command", "-c", code]
+    done = subprocess.run(words, env=place.environment, timeout=PATIENCE, check=False)
+    assert (done.returncode, found.read_text()) == (3, "None")
+
+
 def test_a_command_has_its_callers_folder_and_environment(place: Place, tmp_path: Path) -> None:
     code = "import os, time; print(time.tzname[0], os.getcwd(), os.environ['WORD'], oct(os.umask(0)), "
     code += "os.environ.get('GRPC_VERBOSITY'))"

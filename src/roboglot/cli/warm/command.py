@@ -85,17 +85,17 @@ def _is_locked(path: str) -> bool:
 
 
 def _connected(path: str, kind: str, words: list[str]) -> socket.socket | None:
-    """Return a connection on which the command was started; None if no parent has these sources."""
+    """Return a connection on which the command was started; None if no parent has these sources. Raises OSError."""
+    descriptors = _inherited()  # first: a socket would get the number of one that is closed
+    wish = ascii(_wish(kind, words, descriptors)).encode()  # a parent that is connected waits for it
     parent = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         parent.connect(path)
-        descriptors = _inherited()
-        wish = ascii(_wish(kind, words, descriptors)).encode()
         socket.send_fds(parent, [len(wish).to_bytes(LENGTH)], descriptors)
         parent.sendall(wish)
         if parent.recv(1) == b"+":
             return parent
-    except OSError:  # none listens, it ends just now, or one of our descriptors is closed
+    except OSError:  # none listens, or it ends just now
         pass
     parent.close()
     return None
@@ -104,6 +104,8 @@ def _connected(path: str, kind: str, words: list[str]) -> socket.socket | None:
 def _inherited() -> list[int]:
     """Return the descriptors that a program inherits: a shell gives more than three for ``<(…)``. Raises OSError."""
     found = [0, 1, 2]
+    for number in found:
+        os.fstat(number)
     for number in sorted(int(name) for name in os.listdir("/proc/self/fd")):
         with contextlib.suppress(OSError):  # that of the listing itself
             if number > 2 and os.get_inheritable(number):
