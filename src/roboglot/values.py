@@ -77,7 +77,7 @@ def make_initialisers() -> None:
     """Make the ``__init__`` of all classes now, for processes that are forked from this one."""
     for found in gc.get_objects():
         if type(found) is _Later and found._name == "__init__" and vars(found._owner).get("__init__") is found:
-            _Later.__get__(found, None)
+            _Later.__get__(found, None)  # type: ignore[arg-type] # mypy takes it for what it is compared with
 
 
 def _is_unhashable_by_eq(plain: type) -> bool:
