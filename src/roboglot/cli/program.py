@@ -346,9 +346,10 @@ async def own_robot(body: str, world: str, speed: float) -> AsyncIterator[str]:
     from roboglot.storage.database import Database
     from roboglot.storage.programs import program_stores
 
-    database, engine = Database(":memory:"), Engine()  # nothing of it is kept: no disk to wait for
+    engine = Engine()
     engine.open_soon()
     await asyncio.sleep(0)  # its process loads while we build the world
+    database = Database(":memory:")  # nothing of it is kept: no disk to wait for
     robots = (RobotConfig(body=body),)
     fleet = build_fleet(world, robots, clock=PatientClock(speed), seed=1, database=database)
     robot = fleet.robots[robots[0].name]
