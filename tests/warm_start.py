@@ -9,7 +9,6 @@ Commands with an environment for another interpreter, and all other programs, st
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import ctypes
 import importlib
@@ -27,9 +26,12 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 from execnet.gateway_io import popen_bootstrapline
+
+from roboglot.cli.warm.command import surroundings
+from roboglot.shards.warmth import end_with, fork
 
 COLD = "ROBOGLOT_TESTS_COLD"
 WORKER = [sys.executable, "-u", "-c", popen_bootstrapline]
@@ -46,8 +48,7 @@ PLAIN = {
 }
 OF_THE_INTERPRETER = ("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_")
 MESSAGE_MAX = 1 << 20
-PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
-SERVER_FD_LIMIT = 4096
+PR_SET_CHILD_SUBREAPER = 36
 
 _execute_cold: Any = subprocess.Popen._execute_child  # type: ignore[attr-defined]
 _signature = inspect.signature(_execute_cold)
@@ -109,10 +110,11 @@ def _execute(process: Any, *arguments: Any, **named: Any) -> None:
         return
     ends = [wanted[name] for name in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")]
     given = [end if end != -1 else own for own, end in enumerate((ends[0], ends[3], ends[5]))]
-    wish = {
+    wish = surroundings() | {
         "words": [str(os.fspath(word)) for word in wanted["args"][1:]],
         "folder": str(wanted["cwd"] or Path.cwd()),
         "environment": dict(os.environ if wanted["env"] is None else wanted["env"]),
+        "descriptors": [0, 1, 2],
         "session": bool(wanted["start_new_session"]),
         "parent": os.getpid(),
     }
@@ -158,8 +160,7 @@ def serve(line: socket.socket) -> None:
         if not message:
             return
         reading, writing = os.pipe()
-        middle = os.fork()
-        if middle == 0:
+        if (middle := fork()) == 0:
             middle = os.getpid()
             if (pid := os.fork()) == 0:
                 while os.getppid() == middle:  # it outlives us
@@ -173,49 +174,15 @@ def serve(line: socket.socket) -> None:
             os.close(descriptor)
 
 
-def end_with(parent: int) -> None:
-    """Be killed when the process that started this one ends, however it does."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:  # it ended before that was set
-        os._exit(1)
-
-
-def _become(wish: Any, descriptors: list[int]) -> None:
+def _become(wish: Any, descriptors: list[int]) -> NoReturn:
     """Become the wanted process, in the fork."""
-    status = 70
-    try:
-        end_with(wish["parent"])
-        for number, descriptor in enumerate([os.dup(given) for given in descriptors]):
-            os.dup2(descriptor, number)
-        os.closerange(3, SERVER_FD_LIMIT)
-        if wish["session"]:
-            os.setsid()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        os.chdir(wish["folder"])
-        os.environ.clear()
-        os.environ.update(wish["environment"])
-        # A fork of a fork drops these, but not their pipes.
-        sys.stdin = os.fdopen(0, encoding="utf-8", closefd=False)
-        sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
-        sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)
-        _run(wish["words"], wish["folder"])
-        status = 0
-    except SystemExit as end:
-        status = end.code if isinstance(end.code, int) else 1 if end.code else 0
-        if isinstance(end.code, str):
-            print(end.code, file=sys.stderr)
-    except KeyboardInterrupt:
-        status = 130
-    except BaseException:  # noqa: BLE001 - a forked child has no caller to raise to
-        sys.excepthook(*sys.exc_info())
-        status = 1
-    finally:
-        threading._shutdown()  # type: ignore[attr-defined]  # as at the end of a process
-        atexit._run_exitfuncs()
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, ValueError):
-                stream.flush()
-        os._exit(status)
+    from roboglot.cli.warm.parent import become
+
+    end_with(wish["parent"])
+    if wish["session"]:
+        os.setsid()
+    wish["path"] = sys.path
+    become(wish, descriptors, lambda words: _run(words, wish["folder"]))
 
 
 def _run(words: list[str], folder: str) -> None:
@@ -225,9 +192,9 @@ def _run(words: list[str], folder: str) -> None:
             package = importlib.import_module("roboglot")
             sys.argv = [str(Path(str(package.__file__)).with_name("__main__.py")), *arguments]
             sys.path[0] = folder
-            from roboglot.cli import run_process
+            from roboglot.cli import main as run_command
 
-            run_process()
+            run_command()
         case ["-m", module, *arguments]:
             sys.argv, sys.path[0] = [module, *arguments], folder
             runpy.run_module(module, run_name="__main__", alter_sys=True)

@@ -33,6 +33,12 @@ serve = warm_parent.WarmParent.serve
 warm_parent.WarmParent.serve = lambda parent: (print("up", flush=True), serve(parent))
 warm_parent.main(sys.argv[1])
 """
+FORKS_ONLY = """
+import signal
+from roboglot.cli.warm import parent as warm_parent
+fork = warm_parent.fork
+warm_parent.fork = lambda: fork() and signal.pause() or 0
+"""
 ANNOUNCE = "import os, signal\nsignal.signal(signal.SIGINT, lambda *_: os.write(1, b'heard\\n'))\n"
 
 
@@ -51,9 +57,9 @@ class Place:
         pipe = subprocess.PIPE
         return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=whole, pass_fds=files)
 
-    def open(self) -> int:
+    def open(self, before: str = "") -> int:
         """Start a parent that has loaded nothing, wait until it listens; return its process id."""
-        command = [sys.executable, "-c", LIGHT, socket_path(self.environment)]
+        command = [sys.executable, "-c", before + LIGHT, socket_path(self.environment)]
         parent = subprocess.Popen(command, env=self.environment, stdout=subprocess.PIPE, text=True)
         self.parents.append(parent)
         assert parent.stdout is not None
@@ -202,6 +208,19 @@ def test_killed_parent_leaves_no_command_no_lock(place: Place) -> None:
         assert "has ended" in process.stderr.read()
     until(lambda: not is_running(pid))
     assert place.open() == place.parent() != parent  # the dead one's socket is still there
+
+
+def test_a_command_that_has_begun_is_not_started_again(tmp_path: Path) -> None:
+    """The parent is killed before it could do more than fork."""
+    place = Place(tmp_path)
+    parent = place.open(FORKS_ONLY)
+    with place.start(WAIT) as process:
+        assert process.stdout is not None
+        assert int(process.stdout.readline().split()[0]) == parent
+        os.kill(parent, signal.SIGKILL)
+        assert process.stdout.read() == ""
+        assert process.wait(PATIENCE) == command.BROKEN
+    place.close()
 
 
 def test_changed_sources_end_the_parent(place: Place) -> None:

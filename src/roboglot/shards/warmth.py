@@ -115,10 +115,15 @@ def fork() -> int:
     parent, pid = os.getpid(), os.fork()
     if pid == 0:
         signal.set_wakeup_fd(-1)
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-        if os.getppid() != parent:  # it died before that was set
-            os._exit(EXIT_BROKEN)
+        end_with(parent)
     return pid
+
+
+def end_with(parent: int) -> None:
+    """Be killed when the process that started this one ends, however it does."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:  # it died before that was set
+        os._exit(EXIT_BROKEN)
 
 
 def wake_at_ends() -> int:

@@ -24,9 +24,9 @@ from roboglot.programs.errors import ProgramError
 from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.programs.tasks.states import TaskState
+from roboglot.shards.warmth import end_with
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
-from tests.warm_start import end_with
 
 SPEED = 600.0
 STEPS = 8

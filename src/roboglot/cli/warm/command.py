@@ -117,12 +117,14 @@ def _inherited() -> list[int]:
 
 def _wish(kind: str, words: list[str], descriptors: list[int]) -> dict[str, object]:
     """Return all that the command would have inherited from this process. Raises OSError."""
+    what = {"stamp": installation.stamp(), "kind": kind, "words": words, "descriptors": descriptors}
+    return what | surroundings()
+
+
+def surroundings() -> dict[str, object]:
+    """Return what a program started by this process inherits, but its files."""
     os.umask(umask := os.umask(0o077))
     return {
-        "stamp": installation.stamp(),
-        "kind": kind,
-        "words": words,
-        "descriptors": descriptors,
         "folder": os.getcwd(),
         "environment": dict(os.environ),
         "path": sys.path,

@@ -20,6 +20,7 @@ import struct
 import sys
 import time
 import types
+from collections.abc import Callable
 from typing import NoReturn, TypedDict
 
 from roboglot.cli import built, run_to_end
@@ -113,10 +114,9 @@ class WarmParent:
                 self._stop_listening()  # before the answer: the next one may start then
                 caller.send(b"-")
             elif len(self._callers) < CALLERS_MAX:
-                pid = self._fork(wanted, descriptors)
+                pid = self._fork(wanted, descriptors, caller)
                 self._callers[caller.fileno()] = (pid, caller)
                 poll.register(caller, select.POLLIN)
-                caller.send(b"+")
                 return
         except (OSError, ValueError, KeyError, TypeError, SyntaxError, RecursionError, MemoryError) as error:
             sys.stderr.write(f"cannot start a command: {error}\n")
@@ -146,11 +146,13 @@ class WarmParent:
             raise ValueError("files are missing")
         return wanted
 
-    def _fork(self, wanted: Wanted, descriptors: list[int]) -> int:
+    def _fork(self, wanted: Wanted, descriptors: list[int], caller: socket.socket) -> int:
         pid = fork()
         if pid == 0:
+            caller.send(b"+")  # before the command does anything: else, if we are killed now, its caller does it again
             ctypes.CDLL(None).prctl(PR_SET_NAME, b"roboglot", 0, 0, 0)
-            become(wanted, descriptors)
+            os.setpgid(0, 0)  # in our session, so that the commands of one caller share its part of the processors
+            become(wanted, descriptors, _run_code if wanted["kind"] == CODE else _run_command)
         return pid
 
     def _hear(self, descriptor: int) -> bool:
@@ -198,10 +200,9 @@ class WarmParent:
         os.close(self._lock)
 
 
-def become(wanted: Wanted, descriptors: list[int]) -> NoReturn:
-    """Become the command, in the fork: with all that its caller would have given it."""
+def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], None]) -> NoReturn:
+    """Become the command, in the fork: with all that its caller would have given it; ``run`` does what it does."""
     try:
-        os.setpgid(0, 0)  # in our session, so that the commands of one caller share its part of the processors
         _take(descriptors, wanted["descriptors"])
         for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}:
             with contextlib.suppress(OSError, ValueError):
@@ -217,12 +218,14 @@ def become(wanted: Wanted, descriptors: list[int]) -> NoReturn:
         os.environ.update(wanted["environment"])
         time.tzset()
         sys.path[:] = wanted["path"]
-        sys.stdin, sys.stdout = os.fdopen(0, encoding="utf-8"), os.fdopen(1, "w", buffering=1, encoding="utf-8")
-        sys.stderr = os.fdopen(2, "w", buffering=1, encoding="utf-8", errors="backslashreplace")
-        run_to_end(lambda: (_run_code if wanted["kind"] == CODE else _run_command)(wanted["words"]))
+        sys.stdin = os.fdopen(0, encoding="utf-8", closefd=False)  # a fork of a fork drops it, not the file
+        sys.stdout = os.fdopen(1, "w", buffering=1, encoding="utf-8", closefd=False)
+        sys.stderr = os.fdopen(2, "w", buffering=1, encoding="utf-8", errors="backslashreplace", closefd=False)
+        run_to_end(lambda: run(wanted["words"]))
     except BaseException as error:  # noqa: BLE001 - a forked child has no caller to raise to
         sys.excepthook(*sys.exc_info())
-        os._exit(130 if isinstance(error, KeyboardInterrupt) else 1)
+        status = 130 if isinstance(error, KeyboardInterrupt) else 1
+        run_to_end(lambda: sys.exit(status))
 
 
 def _take(descriptors: list[int], numbers: list[int]) -> None:
