@@ -15,7 +15,7 @@ from typing import NamedTuple, cast
 from roboglot.model.admission import Admission, Forbidden, Right
 from roboglot.model.client_context import ask_for
 from roboglot.transport.connections import Connections
-from roboglot.transport.listening import end_vanished, listen
+from roboglot.transport.listening import listen
 from roboglot.transport.metered import Metered
 from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort
@@ -73,8 +73,6 @@ class Gate:
         """
         gated = self.before(factory, name, right, most)
         server = await listen(gated, address, port, BACKLOG)
-        for listening in server.sockets:
-            end_vanished(listening)
         self._admission.offer(server, gated)
         return server
 

@@ -16,7 +16,7 @@ async def listen(
 ) -> asyncio.Server:
     """Listen at a port. Raises OSError whose ``strerror`` names it, in the same words under each Python and loop."""
     try:
-        return await asyncio.get_running_loop().create_server(factory, address, port, backlog=backlog)
+        server = await asyncio.get_running_loop().create_server(factory, address, port, backlog=backlog)
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             reason = f"{address}:{port} is in use by another program"
@@ -24,6 +24,9 @@ async def listen(
             why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or str(error)
             reason = f"cannot listen on {address}:{port}: {why}"
         raise OSError(error.errno, reason) from None
+    for listening in server.sockets:
+        end_vanished(listening)
+    return server
 
 
 def end_vanished(listening: socket.socket) -> None:

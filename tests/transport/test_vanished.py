@@ -5,19 +5,17 @@ from __future__ import annotations
 import asyncio
 import socket
 
-from roboglot.model.admission import Admission
-from roboglot.protocols.gate import Gate
-from roboglot.transport.listening import SILENT_PROBES
+from roboglot.transport.listening import SILENT_PROBES, listen
 
 
-async def test_silent_client_of_any_door_is_probed() -> None:
+async def test_silent_client_of_any_port_is_probed() -> None:
     accepted: asyncio.Future[asyncio.BaseTransport] = asyncio.get_running_loop().create_future()
 
     class Door(asyncio.Protocol):
         def connection_made(self, transport: asyncio.BaseTransport) -> None:
             accepted.set_result(transport)
 
-    server = await Gate(Admission()).listen(Door, "a door", "127.0.0.1", 0)
+    server = await listen(Door, "127.0.0.1", 0)
     _, writer = await asyncio.open_connection("127.0.0.1", server.sockets[0].getsockname()[1])
     try:
         connection = (await accepted).get_extra_info("socket")
