@@ -210,7 +210,7 @@ def test_killed_parent_leaves_no_command_no_lock(place: Place) -> None:
     assert place.open() == place.parent() != parent  # the dead one's socket is still there
 
 
-def test_a_command_that_has_begun_is_not_started_again(tmp_path: Path) -> None:
+def test_command_that_began_is_not_started_again(tmp_path: Path) -> None:
     """The parent is killed before it could do more than fork."""
     place = Place(tmp_path)
     parent = place.open(FORKS_ONLY)
