@@ -24,7 +24,8 @@ from roboglot.programs.worker.frames import CONTROL_MAX
 from roboglot.values import dataclass
 
 _BOOT = """
-import os, sys
+import gc, os, sys
+gc.disable()  # until all is loaded: that leaves hardly any garbage
 sys.path.insert(0, sys.argv[1])
 from roboglot.programs.worker import zygote
 zygote.main(int(sys.argv[2]), filter_required=sys.argv[3] == "filter")
@@ -32,7 +33,7 @@ os._exit(0)  # all is said: to take the interpreter apart would only let the ser
 """
 # With our own environment these are equivalent to -I, but allow a fixed hash seed: two runs of a program then
 # iterate its sets in the same order.
-_FLAGS = ["-s", "-S", "-P", "-B"]
+_FLAGS = ["-s", "-S", "-P"]
 _ENVIRONMENT = {"PYTHONHASHSEED": "0"}
 EXIT_MAX = 5.0
 """Longest wait for the zygote to end by itself, in the machine's seconds."""

@@ -217,8 +217,8 @@ def main(descriptor: int, *, filter_required: bool) -> None:
         control.send(json.dumps({"event": "unavailable", "message": str(error)}).encode())
         return
     child.rehearse()
-    gc.collect()
     gc.freeze()
+    gc.enable()
     try:
         control.send(json.dumps({"event": "ready", "pid": os.getpid(), "layers": layers}).encode())
         zygote.serve()
