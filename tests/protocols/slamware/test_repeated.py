@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import AsyncIterator
+from random import Random
 from unittest.mock import patch
 
 import pytest
@@ -157,3 +158,32 @@ async def test_client_that_repeats_itself_is_kept(wire: Client, bare_door: Slamw
     connection(bare_door).timeout_keep_alive_handler()
     async with asyncio.timeout(PATIENCE):
         assert await wire._reader.read() == b""
+
+
+CHUNKED = "Transfer-Encoding: chunked\r\n"
+STREAM = (
+    get(),
+    get("/api/core/system/v1/robot/info", "Accept: text/plain\r\n"),
+    get("/nowhere"),
+    get(more="Origin: http://evil.example\r\n"),
+    get(more=CHUNKED) + "2\r\n{}\r\n0\r\nOrigin: http://evil.example\r\n\r\n",
+    get(more="Connection: Upgrade\r\nUpgrade: h2c\r\n"),
+    get().replace("GET", "OPTIONS"),
+    get() + "\r\n",
+)
+
+
+@pytest.mark.parametrize("seed", range(4))
+async def test_answers_do_not_depend_on_pieces(wire: Client, bare_door: SlamwareDoor, seed: int) -> None:
+    random = Random(seed)
+    requests = random.choices(random.sample(STREAM, 3), k=9)
+    one_by_one = [await wire.ask(text) for text in requests]
+    whole = "".join(requests) + get(more="Connection: close\r\n")
+    for pieces in ([whole], whole, [whole[i : i + 37] for i in range(0, len(whole), 37)]):
+        reader, writer = await asyncio.open_connection("127.0.0.1", bare_door.port)
+        for piece in pieces:
+            writer.write(piece.encode())
+            await asyncio.sleep(0)
+        answers = await asyncio.wait_for(reader.read(), PATIENCE)
+        writer.close()
+        assert answers.startswith(b"".join(one_by_one) + b"HTTP/1.1 200 ")
