@@ -40,6 +40,7 @@ LOOK = 0.05  # s between two samples of all robots
 TOUCHES = 0.002  # m between two hulls that counts as a touch
 START_ROOM, GOAL_ROOM = 0.6, 1.1  # m around a place: a robot passes beside one that stands at its goal
 STAYS = 0.5  # m: a robot that stays within has not moved
+WIDEST = 0.27  # m: the largest radius of these bodies
 APART = 1.6  # m between two goals, and between two starts
 STANDING, WALKING = (Pose(4.6, 3.4),), ("person 0 0", "person 0 1")  # of the office's people
 SURVEYED = 1.5  # m between two places of the survey
@@ -115,9 +116,14 @@ def _places(dice: random.Random, world: str, count: int, room: float) -> list[Po
         pose = Pose(dice.uniform(0.0, width), dice.uniform(0.0, depth), dice.uniform(-math.pi, math.pi))
         in_lift = world == "office" and pose.x < 2.5 and 8.5 < pose.y < 11.5
         apart = all(pose.distance_to(other) > APART for other in (*found, *(STANDING if world == "office" else ())))
-        if apart and not in_lift and free.free(pose, 0, room):
+        if apart and not in_lift and free.free(pose, 0, room) and not (room == START_ROOM and _in_person(free, pose)):
             found.append(pose)
     return found
+
+
+def _in_person(free: Places, pose: Pose) -> bool:
+    """Return whether a robot cannot start there because of a person that leaves the building afterwards."""
+    return bool(free.in_the_way(pose, 0, WIDEST))
 
 
 @asynccontextmanager
