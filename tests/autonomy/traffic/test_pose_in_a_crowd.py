@@ -78,3 +78,22 @@ async def test_only_what_is_unknown_contradicts_a_pose(
         assert bool(losses.drain()) is lost
         if not carried:
             assert robot[Localization].pose.distance_to(HALL) < 0.02
+
+
+@pytest.mark.asyncio(loop_scope="module")
+async def test_map_loaded_in_a_crowd_is_confirmed(building: OccupancyGrid, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Announcements count while the robot itself is in doubt, and says nothing."""
+    start = StartConfig(HALL.x, HALL.y, HALL.yaw)
+    async with opened(TIGHT, [RobotConfig("a", start=start)], 1) as (fleet, clock):
+        robot = fleet.robots["a"]
+        robot[Mapping].load(building, HALL)
+        await clock.advance(2.0)
+        announce_from(robot, ring(), clock, monkeypatch)
+        for pose in ring():
+            fleet.world.hands.add_obstacle(pose, (1.6 * RADIUS, 1.6 * RADIUS, 1.0))
+        confirmed, losses = robot.events.subscribe(PoseConfirmed), robot.events.subscribe(LocalizationLost)
+        robot[Mapping].load(building, HALL)
+        await clock.advance(SECONDS)
+        assert confirmed.drain()
+        assert not losses.drain()
+        assert robot[Localization].quality > 0.5

@@ -177,7 +177,8 @@ class Slam:
         way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
         if way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD and not self._is_unsure:
             return
-        scan = belief.reader.read(event.scan)
+        # What is known to stand there says nothing about the map.
+        scan = belief.reader.read(event.scan).beside(belief.map_to_odom.compose(odometry), belief.others)
         if len(scan.points) < POINTS_MIN:
             belief.quality *= 1.0 - QUALITY_GAIN
             return
@@ -285,9 +286,7 @@ class Slam:
         """Judge the pose by the map's support; search everywhere if the scan fits worse than ``usual``."""
         belief = self._belief
         if best.agreement < SURE_QUALITY or best.known < KNOWN_SURE * best.points or self._is_unsure:
-            seen = scan.beside(best.pose, belief.others)  # what is known to stand there says nothing about the map
-            if len(seen.points) >= POINTS_MIN or not belief.others:
-                self.whereabouts.judge(supported(belief.map, seen, best.pose), stamp)
+            self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
         else:
             self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
         fell = best.agreement < DOUBT_SHARE * usual and best.known >= KNOWN_SURE * best.points

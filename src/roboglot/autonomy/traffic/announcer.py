@@ -47,9 +47,9 @@ class Announcer:
         return self._belief.frame if speaks else ""
 
     def heard(self, stamp: float) -> list[Announcement]:
-        """Return others' announcements that are recent, near, and on the same map."""
-        frame = self.frame
-        if not frame:
+        """Return others' announcements that are recent, near, and on the same map; one in doubt listens, too."""
+        frame = self._belief.frame
+        if not frame or TrafficRadio not in self._robot:
             return []
         here = self._belief.pose
         return [
