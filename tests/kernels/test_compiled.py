@@ -9,9 +9,19 @@ import pytest
 from numba import njit
 from numba.core.registry import cpu_target
 
+from roboglot.kernels.ahead import compile_ahead
 from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.compiled import CHECKED, LeanLibrary, kernel
 from roboglot.kernels.linear import invert
+from roboglot.testing.process import child
+
+LOAD_ALL = """
+import importlib, sys
+from roboglot.kernels import MODULES
+for name in MODULES:
+    importlib.import_module(f"roboglot.kernels.{name}")
+print("numba.np.arrayobj" in sys.modules)
+"""
 
 
 def test_a_cached_kernel_links_into_a_new_one() -> None:
@@ -41,3 +51,13 @@ def test_a_cached_kernel_needs_no_declarations(monkeypatch: pytest.MonkeyPatch) 
     cached(matrix)
     assert matrix.tolist() == np.diag([0.5, 0.25, 0.125]).tolist()
     refresh.assert_not_called()
+    (overload,) = vars(cached)["overloads"].values()
+    assert overload.type_annotation == ""  # 20 kB for each kernel
+
+
+def test_cached_kernels_import_no_lowering_of_arrays() -> None:
+    """Each names ``arrayobj`` as the place of its environments; it takes 6 MB."""
+    compile_ahead()
+    with child(LOAD_ALL) as process:
+        assert process.stdout is not None
+        assert process.stdout.read() == "False\n"

@@ -8,6 +8,7 @@ divides only by what cannot be 0, or asks for CHECKED.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import partial
 from typing import TypeVar, cast
@@ -15,7 +16,7 @@ from typing import TypeVar, cast
 import numpy as np
 from llvmlite.binding import ModuleRef, parse_bitcode
 from numba import njit, types
-from numba.core import dispatcher
+from numba.core import dispatcher, environment
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompileResult
@@ -72,6 +73,7 @@ class LeanCache(FunctionCache):
         with self._guard_against_spurious_io_errors():
             found: CompileResult | None = self._load_overload(signature, context)
         if found is not None:
+            found = found._replace(type_annotation="")  # 3 MB of all
             found.library._shared_module = None
             found.library.stored = partial(self._bitcode, self._index_key(signature, context.codegen()))
         return found
@@ -84,5 +86,17 @@ class LeanCache(FunctionCache):
         return cast("bytes", bitcode)
 
 
+def _rebuild_env(module: str, constants: list[object], name: str) -> environment.Environment:
+    """Return a function's environment without importing its module (``arrayobj``: 6 MB) for object mode."""
+    found = environment.lookup_environment(name)
+    if found is None:
+        found = environment.Environment(vars(sys.modules[module]) if module in sys.modules else {"__name__": module})
+        found.consts[:], found.env_name = constants, name
+        environment.Environment._memo[name] = found
+    return found
+
+
+_rebuild_env.__module__ = environment.__name__  # pickles name Numba's
+vars(environment)["_rebuild_env"] = _rebuild_env
 JITCPUCodegen._library_class = LeanLibrary
 vars(dispatcher)["FunctionCache"] = LeanCache

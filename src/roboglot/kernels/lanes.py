@@ -17,7 +17,6 @@ from numba.core.base import BaseContext as Context
 from numba.core.types import Type
 from numba.core.typing import Signature
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
 
 LANES = 16
 MARGIN = 2 * LANES  # elements that rows have behind their end, because vectors reach beyond it
@@ -112,7 +111,7 @@ class _Row:
     """A contiguous array while a kernel is compiled; its elements count from its first, whatever its shape."""
 
     def __init__(self, context: Context, builder: ir.IRBuilder, kind: Type, array: ir.Value) -> None:
-        self._builder, self._start = builder, make_array(kind)(context, builder, array).data
+        self._builder, self._start = builder, context.make_array(kind)(context, builder, array).data
 
     def load(self, at: ir.Value, count: int = LANES, kind: ir.Type = INT) -> ir.Value:
         """Return ``count`` numbers of this kind from element ``at`` on."""

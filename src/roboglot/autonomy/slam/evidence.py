@@ -119,17 +119,15 @@ class EvidenceGrid:
         """Return an independent copy."""
         copied = self.seen_from(0, 0)
         copied.evidence, copied.slots, copied.marks = self.evidence.copy(), self.slots.copy(), self.marks.copy()
-        copied.surfaces = self.surfaces.copy()
-        copied.frozen = self.frozen
+        copied.surfaces, copied.frozen = self.surfaces.copy(), self.frozen
         return copied
 
     def empty_like(self) -> EvidenceGrid:
         """Return an empty map of the same size and place, for ``copy_rows``."""
         copied = self.seen_from(0, 0)
-        copied.evidence, copied.marks = (np.zeros_like(array) for array in (self.evidence, self.marks))
-        copied.slots = np.zeros_like(self.slots)
+        copied.evidence, copied.marks = np.zeros_like(self.evidence), np.zeros_like(self.marks)
+        copied.slots, copied.frozen = np.zeros_like(self.slots), self.frozen
         copied.surfaces = self.surfaces.copy()  # few: rows of cells have theirs once they are copied
-        copied.frozen = self.frozen
         return copied
 
     def copy_rows(self, other: EvidenceGrid, rows: slice) -> None:

@@ -68,7 +68,8 @@ class Match:
     @property
     def sigma(self) -> float:
         """Standard deviation (m) of the position in its worst direction."""
-        return math.sqrt(float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]))
+        (along, both, _), (_, across, _), _ = self.covariance.tolist()
+        return math.sqrt((along + across) / 2 + math.hypot((along - across) / 2, both))
 
     @property
     def quality(self) -> float:
