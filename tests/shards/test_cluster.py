@@ -94,13 +94,13 @@ async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster
             states = {(shard.state, shard.reason) for shard in fleet.shards.values()}
             assert states == {(State.READY, "")}
             before = await asyncio.to_thread(homes, registry)
-            where = {name: fleet.node_of(name) for name in fleet.shards}
+            where = {name: fleet._nodes.get(name, "") for name in fleet.shards}
             victim = where["w1"]
             began = time.monotonic()
             cluster.remove_node(nodes[victim], allow_graceful=False)
             moved = [shard for name, shard in fleet.shards.items() if where[name] == victim]
             await fleet.until(
-                lambda: all(s.state is State.READY and fleet.node_of(s.plan.name) != victim for s in moved)
+                lambda: all(s.state is State.READY and fleet._nodes.get(s.plan.name) != victim for s in moved)
             )
             print(f"robots of a killed node are back after {time.monotonic() - began:.1f} s")
             after = await asyncio.to_thread(homes, registry)

@@ -189,10 +189,6 @@ class ClusterFleet:
         await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
         await self.restart(shard)
 
-    def node_of(self, name: str) -> str:
-        """Return the node on which a shard was last seen; empty: none yet."""
-        return self._nodes.get(name, "")
-
     def _begin(self, shard: Shard) -> None:
         """Create the shard's actor, or find a running one."""
         plan = shard.plan

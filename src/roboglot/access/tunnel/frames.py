@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import struct
 from enum import IntEnum
 from typing import NamedTuple
@@ -43,13 +42,3 @@ class BadFrame(ValueError):
 def encode(kind: FrameKind, stream: int = 0, payload: bytes = b"") -> bytes:
     """Return the frame's bytes; the payload has at most FRAME_MAX - 1."""
     return HEAD.pack(kind, stream, len(payload)) + payload
-
-
-async def read_frame(reader: asyncio.StreamReader) -> TunnelFrame:
-    """Return the next frame. Raises BadFrame, IncompleteReadError, OSError."""
-    number, stream, size = HEAD.unpack(await reader.readexactly(HEAD.size))
-    try:
-        kind = FrameKind(number)
-    except ValueError:
-        raise BadFrame(f"there is no frame of kind {number}") from None
-    return TunnelFrame(kind, stream, await reader.readexactly(size))

@@ -64,7 +64,6 @@ OWN: dict[tuple[str, str], Limit] = {
 }
 WALK = Limit(WALK_DURATION.minimum, WALK_DURATION.maximum)  # all other durations belong to walks
 
-_EYES = tuple(name for name in ENUMS["LedConstraint"] if "mini" in name and "effect" in name)
 CHOICES: dict[str, tuple[str, tuple[str, ...]]] = {
     "target": ("LedConstraint", tuple(LED_TARGETS)),
     "gesture_type": ("GestureType", tuple(name for name in ENUMS["GestureType"] if name != "no_gesture")),
