@@ -23,10 +23,22 @@ from roboglot.programs.engine.events import (
     Finished,
     Output,
 )
+from roboglot.programs.engine.processor_group import ProcessorGroup
 from roboglot.programs.worker import zygote
 from tests.programs.playing import PRELUDE, children_of, open_descriptors, play, process_state, until
 
 BUSY = "print('ready')\nwhile True: pass"
+
+
+@pytest.mark.parametrize(("after", "gives_way"), [(0.0, True), (1e6, False)])
+async def test_zygote_gives_way_after_a_moment(monkeypatch: pytest.MonkeyPatch, after: float, gives_way: bool) -> None:
+    """The first program begins at the server's own weight."""
+    stepped: list[int] = []
+    monkeypatch.setattr(ProcessorGroup, "step_aside", lambda _, pid: stepped.append(pid))
+    monkeypatch.setattr(engine_module, "STEPS_BACK_AFTER", after)
+    async with Engine() as engine:
+        await play(engine, "print(1)")
+        assert bool(stepped) is gives_way
 
 
 def test_modules_of_the_zygote_stay_compiled() -> None:

@@ -66,7 +66,8 @@ ANSWER_MAX = 60.0
 ENDS_MAX = 5.0
 """Longest wait for killed programs before the zygote is ended, in the machine's seconds."""
 STEPS_BACK_AFTER = 0.5
-"""Delay before a program moves to the control group, which is slow in the kernel; in the machine's seconds."""
+"""Delay before a program moves to the control group, which is slow in the kernel, and before the zygote's session gets
+less of the processors, so that the first program begins soon; in the machine's seconds."""
 
 _CHECK_MEMORY, _CHECK_CPU = 256 * 1024 * 1024, 10
 _EMPTY = Prelude()
@@ -259,7 +260,7 @@ class Engine:
                 self.layers = await launcher.open()
                 self._launcher = launcher
                 self.layers = [*self.layers, *await self._open_group()]
-                self._group.step_aside(launcher.pid)
+                asyncio.get_running_loop().call_later(STEPS_BACK_AFTER, self._step_aside, launcher)
                 self._memory.empty = usage_of(launcher.pid).memory
                 if FILTER not in self.layers:
                     log.warning(
@@ -319,6 +320,11 @@ class Engine:
         if not done:
             raise EngineSilent(f"the program engine did not answer for {ANSWER_MAX:g} s")
         return task.result()
+
+    def _step_aside(self, launcher: Launcher) -> None:
+        """Have the zygote's session yield to others, if it is still there."""
+        if self._launcher is launcher:
+            self._group.step_aside(launcher.pid)
 
     def _step_back(self, worker: Worker) -> None:
         """Move a program that is still running to the control group."""
