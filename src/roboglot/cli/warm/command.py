@@ -16,10 +16,6 @@ import sys
 
 from roboglot.cli.warm import installation
 
-TYPE_CHECKING = False  # not from ``typing``: nothing large is loaded before the parent is asked
-if TYPE_CHECKING:
-    from types import FrameType
-
 COMMAND, CODE = "command", "code"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2)
 LIMITS = (resource.RLIMIT_NOFILE, resource.RLIMIT_CPU, resource.RLIMIT_AS, resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)
@@ -138,11 +134,11 @@ def surroundings() -> dict[str, object]:
 def _stand_for_it(parent: socket.socket, mask: set[int | signal.Signals]) -> int:
     """Pass signals on, those of ``mask`` excepted, until the command has ended; return its status."""
 
-    def pass_on(number: int, _: FrameType | None) -> None:
+    def pass_on(number: int, _: object) -> None:
         with contextlib.suppress(OSError):
             parent.send(bytes([number]))
 
-    def pause(_: int, frame: FrameType | None) -> None:
+    def pause(_: int, frame: object) -> None:
         pass_on(signal.SIGSTOP, frame)
         os.kill(os.getpid(), signal.SIGSTOP)
         pass_on(signal.SIGCONT, frame)

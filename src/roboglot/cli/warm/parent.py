@@ -13,6 +13,7 @@ import ctypes
 import fcntl
 import importlib
 import os
+import resource
 import select
 import signal
 import socket
@@ -34,7 +35,7 @@ SLOW_MAX = 2.0  # s for a caller to say what it wants
 LAST_SECONDS = 3.0  # s between SIGTERM and SIGKILL for a command that has lost its caller
 CALLERS_MAX = 64
 COMMANDS = ("program", "test", "lesson")
-MODULES = ("encodings.utf_8_sig", "typer._click.decorators", "typer.main", "typer.rich_utils")  # loaded late by these
+MODULES = ("encodings.utf_8_sig", "typer._click.decorators", "typer.main", "typer.rich_utils")
 PACKAGES = ("clients", "recording")  # beside those of all robots; not the test kit, whose modules pytest rewrites
 PR_SET_NAME = 15
 PEER = struct.Struct("3i")  # pid, uid, gid
@@ -149,7 +150,7 @@ class WarmParent:
     def _fork(self, wanted: Wanted, descriptors: list[int], caller: socket.socket) -> int:
         pid = fork()
         if pid == 0:
-            caller.send(b"+")  # before the command does anything: else, if we are killed now, its caller does it again
+            caller.send(b"+")  # first: if we are killed now, its caller must not begin anew
             ctypes.CDLL(None).prctl(PR_SET_NAME, b"roboglot", 0, 0, 0)
             os.setpgid(0, 0)  # in our session, so that the commands of one caller share its part of the processors
             become(wanted, descriptors, _run_code if wanted["kind"] == CODE else _run_command)
@@ -201,7 +202,7 @@ class WarmParent:
 
 
 def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], None]) -> NoReturn:
-    """Become the command, in the fork: with all that its caller would have given it; ``run`` does what it does."""
+    """Become the command, in the fork, with all that its caller would have given it; ``run`` runs it."""
     try:
         _take(descriptors, wanted["descriptors"])
         for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}:
@@ -210,7 +211,8 @@ def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], No
         if signal.SIGINT not in wanted["ignored"]:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         for kind, soft, hard in wanted["limits"]:
-            _limit(kind, soft, hard)
+            with contextlib.suppress(OSError, ValueError):  # a limit that we have lower ourselves
+                resource.setrlimit(kind, (soft, hard))
         os.sched_setaffinity(0, wanted["processors"])
         os.umask(wanted["umask"])
         os.chdir(wanted["folder"])
@@ -249,13 +251,6 @@ def _signal(pid: int, number: int) -> None:
             os.kill(pid, number)
 
 
-def _limit(kind: int, soft: int, hard: int) -> None:
-    import resource
-
-    with contextlib.suppress(OSError, ValueError):  # a limit that we have lower ourselves
-        resource.setrlimit(kind, (soft, hard))
-
-
 def _run_command(words: list[str]) -> None:
     sys.argv = [f"{installation.PACKAGE}/__main__.py", *words]
     run_command()
@@ -267,8 +262,7 @@ def _run_code(words: list[str]) -> None:
     sys.argv, sys.path[0] = ["-c", *arguments], ""
     package = sys.modules["roboglot"]  # a plugin of pytest's, which would warn that it is too late to rewrite it
     package.__doc__ = f"{package.__doc__} PYTEST_DONT_REWRITE"
-    module = types.ModuleType("__main__")
-    sys.modules["__main__"] = module
+    sys.modules["__main__"] = module = types.ModuleType("__main__")
     exec(compile(code, "<string>", "exec"), module.__dict__)
 
 

@@ -66,8 +66,8 @@ ANSWER_MAX = 60.0
 ENDS_MAX = 5.0
 """Longest wait for killed programs before the zygote is ended, in the machine's seconds."""
 STEPS_BACK_AFTER = 0.5
-"""Delay before a program moves to the control group, which is slow in the kernel, and before the zygote's session gets
-less of the processors, so that the first program begins soon; in the machine's seconds."""
+"""Delay before a program moves to the control group, which is slow in the kernel, and before the zygote's session
+yields, so that the first program begins soon; in the machine's seconds."""
 
 _CHECK_MEMORY, _CHECK_CPU = 256 * 1024 * 1024, 10
 _EMPTY = Prelude()
@@ -322,7 +322,7 @@ class Engine:
         return task.result()
 
     def _step_aside(self, launcher: Launcher) -> None:
-        """Have the zygote's session yield to others, if it is still there."""
+        """Let the zygote's session yield."""
         if self._launcher is launcher:
             self._group.step_aside(launcher.pid)
 
