@@ -87,7 +87,7 @@ class LeanCache(FunctionCache):
 
 
 def _rebuild_env(module: str, constants: list[object], name: str) -> environment.Environment:
-    """Return a function's environment without importing its module (``arrayobj``: 6 MB) for object mode."""
+    """Return a function's environment without importing its module (``arrayobj``: 6 MB)."""
     found = environment.lookup_environment(name)
     if found is None:
         found = environment.Environment(vars(sys.modules[module]) if module in sys.modules else {"__name__": module})
