@@ -28,6 +28,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
+from roboglot.transport import listening
 from tests.access.matrix import ADDRESS
 
 HERE = free_addresses(1)
@@ -337,3 +338,26 @@ async def test_a_connector_that_is_stopped_ends_its_handshake(tmp_path: Path) ->
         with contextlib.suppress(ConnectionError):
             await asyncio.wait_for(reader.read(), 5.0)
         writers[0].close()
+
+
+async def test_no_datagram_comes_before_the_welcome(
+    gateway: tuple[Runtime, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Robots announce themselves all the time, also while the gateway still opens ports for a tunnel."""
+    runtime, token = gateway
+    assert runtime._gateway is not None
+    tap, listen, opened = runtime.fleet.robots["a"].tap, listening.listen, list[int]()
+
+    async def while_announced(factory: Any, address: str, port: int) -> asyncio.Server:
+        tap.push("robomaster", "255.255.255.255:40926", "> robot ip", b"robot ip 127.0.0.1")
+        opened.append(port)
+        return await listen(factory, address, port)
+
+    monkeypatch.setattr("roboglot.access.tunnel.gateway.listen", while_announced)
+    context = ssl.create_default_context()
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port, ssl=context)
+    writer.write(encode(FrameKind.HELLO, 0, json.dumps({"robot": "a", "token": token}).encode()))
+    assert await next_kind(reader) is FrameKind.WELCOME
+    assert opened
+    writer.close()

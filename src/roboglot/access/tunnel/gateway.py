@@ -338,8 +338,8 @@ async def _listening(tunnel: Tunnel, robot: Robot, ports: Ports, own: str) -> As
             tunnel.send_datagram(port, exchange.payload)
 
     async with contextlib.AsyncExitStack() as stack:
-        stack.callback(robot.tap.listen(take))
         for port in ports.callbacks:
             server = await listen(tunnel.accept(port), own, port)
             stack.callback(server.close)
+        stack.callback(robot.tap.listen(take))  # last: nothing precedes the welcome
         yield
