@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import socket
 
-from roboglot.transport.listening import SILENT_PROBES, listen
+import pytest
+
+from roboglot.transport.listening import SILENT_PROBES, end_vanished, listen
 
 
 async def test_silent_client_of_any_port_is_probed() -> None:
@@ -27,3 +29,12 @@ async def test_silent_client_of_any_port_is_probed() -> None:
         writer.close()
         (await accepted).close()  # type: ignore[attr-defined] # a base transport has it
         server.close()
+
+
+def test_ports_open_where_the_kernel_lacks_these_options(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``roboglot connect`` runs on people's own machines: macOS and Windows have no TCP_USER_TIMEOUT."""
+    monkeypatch.setattr("sys.platform", "darwin")
+    for option in ("TCP_KEEPIDLE", "TCP_USER_TIMEOUT"):
+        monkeypatch.delattr(socket, option)
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        end_vanished(listening)

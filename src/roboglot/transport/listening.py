@@ -6,6 +6,7 @@ import asyncio
 import errno
 import os
 import socket
+import sys
 from collections.abc import Callable
 
 SILENT_PROBES = (20, 5, 4)  # s of silence before a probe, s between probes, lost probes that end the connection
@@ -32,8 +33,10 @@ async def listen(
 def end_vanished(listening: socket.socket) -> None:
     """Have the kernel end connections to a port whose clients vanished, with or without data for them.
 
-    Accepted connections inherit this, and may change it.
+    Accepted connections inherit this, and may change it. Other systems than Linux lack these options.
     """
+    if sys.platform != "linux":
+        return
     idle, interval, lost = SILENT_PROBES
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, idle)

@@ -341,5 +341,5 @@ async def _listening(tunnel: Tunnel, robot: Robot, ports: Ports, own: str) -> As
         for port in ports.callbacks:
             server = await listen(tunnel.accept(port), own, port)
             stack.callback(server.close)
-        stack.callback(robot.tap.listen(take))  # last: nothing precedes the welcome
+        stack.callback(robot.tap.listen(take))  # last, so that nothing precedes the welcome
         yield
