@@ -13,6 +13,7 @@ const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "../..");
 const TARGET = join(root, "src/roboglot/console/web/studio/vendor");
 const CONSOLE = join(root, "src/roboglot/console/web/vendor"); // its other files are as npm has them; its sums are kept by hand
+const APACHE_NOTICE = "Licensed under the Apache License, Version 2.0: ../../vendor/Apache-2.0.txt\n";
 const AXE = join(root, "tests/browser/vendor");
 const MEDIA = ["delete-icon.svg", "dropdown-arrow.svg", "foldout-icon.svg",
   "handclosed.cur", "handdelete.cur", "handopen.cur", "resize-handle.svg", "sprites.svg", "1x1.gif", "quote0.png", "quote1.png", "pilcrow.png"];
@@ -48,6 +49,7 @@ async function packed(folder, name, code) {
 
 async function licences(packages) {
   const texts = new Map();
+  const apache = await readFile(join(CONSOLE, "Apache-2.0.txt"), "utf-8"); // shipped once
   for (const name of packages) {
     const folder = join(here, "node_modules", name);
     const { version } = JSON.parse(await readFile(join(folder, "package.json"), "utf-8"));
@@ -56,7 +58,7 @@ async function licences(packages) {
     const text = await readFile(join(folder, file), "utf-8"); // many packages have the same
     texts.set(text, [...(texts.get(text) ?? []), `${name} ${version}`]);
   }
-  const sections = [...texts].map(([text, names]) => `${names.join("\n")}\n\n${text}`);
+  const sections = [...texts].map(([text, names]) => `${names.join("\n")}\n\n${text === apache ? APACHE_NOTICE : text}`);
   return Buffer.from(sections.join("\n\n----------------------------------------\n\n"));
 }
 

@@ -59,6 +59,14 @@ def test_vendored_files_are_as_published(folder: Path) -> None:
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest, name
 
 
+@pytest.mark.parametrize("notice", ["vendor/htm.LICENSE", "studio/vendor/blockly.LICENSE"])
+def test_notices_lead_to_the_licence(notice: str) -> None:
+    named = (FOLDER / notice).read_text().split()[-1]
+    text = (FOLDER / notice).parent.joinpath(named).read_text()
+    assert "Apache License" in text
+    assert "END OF TERMS AND CONDITIONS" in text
+
+
 def test_pages_load_nothing_from_elsewhere() -> None:
     for path in OWN:
         text = path.read_text("utf-8").replace("http://www.w3.org/2000/svg", "")
