@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import errno
 import os
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.testing.campaign.report import interval, report
-from roboglot.testing.campaign.table import OtherCampaign, Row, Table
+from roboglot.testing.campaign.table import OtherCampaign, Row, Table, write_parquet
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, trials_of
 from roboglot.testing.scenarios.files import find
 from tests.programs.playing import children_of
@@ -202,3 +205,47 @@ def test_the_report_groups_reasons_that_differ_in_numbers(tmp_path: Path) -> Non
     page = report([*failed, Row("a.yaml", "a", 9, Outcome.PASSED, "", 2.0, 1, "f")], tmp_path, 4)
     assert "3 x failed: then 1: moved 0.0 m (seeds 0, 1, 2)" in page
     assert f"roboglot test {tmp_path / 'a.yaml'} --seed 0" in page
+
+
+def test_reported_command_is_quoted_for_a_shell(tmp_path: Path) -> None:
+    page = report([Row("a b.yaml", "a", 0, Outcome.FAILED, "moved", 1.0, 1, "f")], tmp_path, 1)
+    assert f"roboglot test '{tmp_path / 'a b.yaml'}' --seed 0" in page
+
+
+ENDED = Row("a.yaml", "a", 1, Outcome.PASSED, "", 1.5, 1, "f")
+
+
+@pytest.mark.parametrize("ended", [[], [ENDED], [ENDED, ENDED._replace(outcome=Outcome.FAILED, why="moved")]])
+def test_parquet_has_the_same_types_for_any_rows(tmp_path: Path, ended: list[Row]) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="the package pyarrow is not installed")
+    path = tmp_path / "table.parquet"
+    assert write_parquet(ended, path)
+    found = parquet.read_table(path)
+    text = "string"
+    assert [str(kind) for kind in found.schema.types] == [text, text, "int64", text, text, "double", "int64", text]
+    assert found.to_pylist() == [{**row._asdict(), "why": row.why or None} for row in ended]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def write_half(_table: object, path: Path) -> None:
+    path.write_text("PAR1")
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_failed_writing_keeps_the_earlier_parquet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pyarrow, parquet = MagicMock(__spec__=ModuleSpec("pyarrow", None)), MagicMock(write_table=write_half)
+    monkeypatch.setitem(sys.modules, "pyarrow", pyarrow)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", parquet)
+    path = tmp_path / "table.parquet"
+    path.write_text("whole")
+    with pytest.raises(OSError, match="No space"):
+        write_parquet([ENDED], path)
+    assert path.read_text() == "whole"
+
+
+def test_without_pyarrow_no_outdated_parquet_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.testing.campaign.table.find_spec", lambda _: None)
+    path = tmp_path / "table.parquet"
+    path.write_text("of an earlier run")
+    assert not write_parquet([ENDED], path)
+    assert not path.exists()

@@ -118,12 +118,13 @@ def _play(left: list[Trial], table: Table, player: Player) -> bool:
 def _write(table: Table, folder: Path, trials: Sequence[Trial]) -> bool:
     """Write the report on ``trials`` and, if pyarrow is installed, the table for data tools; return if all passed."""
     from roboglot.testing.campaign.report import report
-    from roboglot.testing.campaign.table import write_parquet
+    from roboglot.testing.campaign.table import replacing, write_parquet
 
     wanted = {(trial.scenario, trial.seed) for trial in trials}  # the table may hold further ones
     rows = [row for row in table.rows if (row.scenario, row.seed) in wanted]
     page = table.path.with_name("report.md")
-    page.write_text(report(rows, folder, len(trials)), encoding="utf-8")
+    with replacing(page) as fresh:
+        fresh.write_text(report(rows, folder, len(trials)), encoding="utf-8")
     written = [str(table.path), str(page)]
     if write_parquet(table.rows, parquet := table.path.with_suffix(".parquet")):
         written.append(str(parquet))

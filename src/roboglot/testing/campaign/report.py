@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 import statistics
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
@@ -58,7 +59,7 @@ def _reasons(scenario: Path, failed: Sequence[Row]) -> Iterator[str]:
         own = sorted(kinds[kind], key=lambda row: row.seed)
         seeds = ", ".join(str(row.seed) for row in own[:SEEDS_MAX]) + (" …" if len(own) > SEEDS_MAX else "")
         yield f"- {len(own)} x {own[0].outcome}: {_plain(own[0].why) or 'no reason'} (seeds {seeds}):"
-        yield f"  `roboglot test {scenario} --seed {own[0].seed}`"
+        yield f"  `roboglot test {shlex.quote(str(scenario))} --seed {own[0].seed}`"
 
 
 def _plain(text: str) -> str:

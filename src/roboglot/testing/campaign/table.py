@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import fcntl
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, get_type_hints
 
 from roboglot.testing.campaign.trials import FINAL, Outcome, Result, Trial
-
-HEAD = ("scenario", "name", "seed", "outcome", "why", "seconds", "attempts", "fingerprint")
 
 
 class OtherCampaign(ValueError):
@@ -32,6 +31,9 @@ class Row(NamedTuple):
     seconds: float
     attempts: int
     fingerprint: str
+
+
+HEAD = Row._fields
 
 
 class Table:
@@ -97,13 +99,11 @@ class Table:
 
     def _leave_the_last(self) -> None:
         """Replace the file by one without superseded rows of trials that were played again."""
-        fresh = self.path.with_name(f"{self.path.name}.new")
-        with fresh.open("wb") as file:
+        with replacing(self.path) as fresh, fresh.open("wb") as file:
             for values in (HEAD, *self._found.values()):
                 file.write(_line(values))
             file.flush()
             os.fsync(file.fileno())
-        fresh.replace(self.path)
 
     def _write(self, values: Sequence[object]) -> None:
         self._file.write(_line(values))
@@ -137,11 +137,23 @@ def _row(line: Sequence[str]) -> Row:
     return Row(scenario, name, int(seed), Outcome(outcome), why, float(seconds), int(attempts), fingerprint)
 
 
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a place beside ``path`` for a file that replaces it once it is whole."""
+    fresh = path.with_name(f"{path.name}.new")
+    yield fresh
+    fresh.replace(path)
+
+
 def write_parquet(rows: Sequence[Row], path: Path) -> bool:
-    """Write the table for data tools; False where pyarrow is not installed."""
+    """Write the table for data tools, null for no reason; False where pyarrow is not installed."""
     if find_spec("pyarrow") is None:
+        path.unlink(missing_ok=True)  # of an earlier run
         return False
     pyarrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
-    plain = [row._replace(outcome=str(row.outcome)) for row in rows]
-    parquet.write_table(pyarrow.table({name: [getattr(row, name) for row in plain] for name in HEAD}), path)
+    types = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64()}
+    schema = pyarrow.schema([(name, types[kind]) for name, kind in get_type_hints(Row).items()])
+    plain = [{**row._asdict(), "outcome": str(row.outcome), "why": row.why or None} for row in rows]
+    with replacing(path) as fresh:
+        parquet.write_table(pyarrow.Table.from_pylist(plain, schema), fresh)
     return True
