@@ -62,3 +62,34 @@ async def test_commands_reach_the_worlds_of_a_fleet(tmp_path: Path) -> None:
     finally:
         for server in servers:
             await server.close()
+
+
+async def test_every_world_that_refuses_is_named(tmp_path: Path) -> None:
+    """A refusing world, or one that is gone, hides neither another's refusal nor its robots."""
+    servers: list[LocalServer] = []
+    for world, error in {"w1": "robot a1: no link", "w2": "", "w3": "robot a3: no link", "w4": ""}.items():
+
+        async def answer(line: bytes, robot: str = f"a{world[1:]}", error: str = error) -> bytes:
+            verb = msgspec.json.decode(line, type=lease_desk.Request).do
+            controls = [lease_desk.Control(robot, "", "", 0.0, "", "", "")]
+            return msgspec.json.encode(lease_desk.Answer(controls, "" if verb == "look" else error))
+
+        (tmp_path / "shards" / world / "data").mkdir(parents=True)
+        servers.append(LocalServer(tmp_path / "shards" / world / "data" / lease_desk.NAME, "lease", answer))
+        await servers[-1].open()
+    gone = tmp_path / "shards/w4/data" / lease_desk.NAME
+    await servers.pop().close()
+    gone.touch()  # as a killed world leaves it
+    try:
+        with pytest.raises(SystemExit) as ended:
+            await asyncio.to_thread(wish, "stop", lease_desk.Request("stop", all=True), tmp_path)
+        assert str(ended.value).splitlines() == [
+            "roboglot stop: robot a1: no link",
+            "roboglot stop: robot a3: no link",
+            f"roboglot stop: no `roboglot up` answers in {gone.parent}",
+        ]
+        stopped = await asyncio.to_thread(wish, "stop", lease_desk.Request("stop", "a2"), tmp_path)
+        assert [control.robot for control in stopped.robots] == ["a2"]
+    finally:
+        for server in servers:
+            await server.close()

@@ -225,21 +225,22 @@ async def test_all_stop_and_all_are_taken_and_released(desk: Path, world: World,
     assert not any(row["taken_by"] for row in freed["robots"])
 
 
-@pytest.mark.world("empty", robots=("a", "b", "c"))
-async def test_one_that_refuses_holds_up_no_other(
+@pytest.mark.world("empty", robots=("a", "b", "c", "d"))
+async def test_refusing_robots_are_named_and_delay_no_other(
     desk: Path, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def refuse(reason: str) -> None:
         raise Refused("its link is gone")
 
-    monkeypatch.setattr(world.robot("a").actions, "cancel", refuse)
+    for name in ("a", "d"):
+        monkeypatch.setattr(world.robot(name).actions, "cancel", refuse)
     for name in ("b", "c"):
         world.robot(name)[Driving].drive(Twist(0.3, 0.0, 0.0), source="test")
     await forward(seconds=1.0)
     stopping = asyncio.create_task(say(desk, b'{"do": "stop", "all": true}\n'))
     while not stopping.done():
         await forward(seconds=0.1)
-    assert (await stopping)["error"] == "robot a: its link is gone"
+    assert (await stopping)["error"] == "robot a: its link is gone; robot d: its link is gone"
     assert max(abs(world.robot(name)[Base].velocity.x) for name in ("b", "c")) < 0.02
 
 

@@ -83,9 +83,8 @@ class LeaseDesk:
         if request.all:
             wishes = (self.do(request, robot) for robot in self._robots.values())
             ends = await asyncio.gather(*wishes, return_exceptions=True)  # a refusal does not delay the others
-            for name, end in zip(self._robots, ends, strict=True):
-                if isinstance(end, BaseException):
-                    raise LookupError(f"robot {name}: {end}") from end
+            if refused := [f"robot {name}: {end}" for name, end in zip(self._robots, ends, strict=True) if end]:
+                raise LookupError("; ".join(refused))
             return
         robot = self._robots.get(request.robot)
         if robot is None:

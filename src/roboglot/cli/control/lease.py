@@ -62,17 +62,29 @@ def wish(command: str, request: Request, data: Path | None) -> Answer:
     if not worlds or (folder / NAME).exists():
         return running.request(command, folder / NAME, request, Answer, PATIENCE)
     if request.robot:
-        homes = {
-            name: world
-            for world in worlds
-            for name in _names(running.request(command, world, Request(), Answer, PATIENCE))
-        }
+        answers, refused = _together(command, worlds, Request())
+        homes = {name: world for world, answer in answers.items() for name in _names(answer)}
         if request.robot not in homes:
-            sys.exit(f"roboglot {command}: there is no robot {request.robot!r}; there are {', '.join(homes)}")
+            refused.append(f"roboglot {command}: there is no robot {request.robot!r}; there are {', '.join(homes)}")
+            sys.exit("\n".join(refused))
         worlds = [homes[request.robot]]
+    answers, refused = _together(command, worlds, request)
+    if refused:
+        sys.exit("\n".join(refused))
+    return Answer([control for answer in answers.values() for control in answer.robots])
+
+
+def _together(command: str, worlds: list[Path], request: Request) -> tuple[dict[Path, Answer], list[str]]:
+    """Return the answers of the worlds, and the sentences of those that refuse or do not answer."""
+    answers, refused = dict[Path, Answer](), list[str]()
     with ThreadPoolExecutor(len(worlds)) as together:
-        asked = [together.submit(running.request, command, w, request, Answer, PATIENCE) for w in worlds]
-        return Answer([control for each in asked for control in each.result().robots])
+        asked = {w: together.submit(running.request, command, w, request, Answer, PATIENCE) for w in worlds}
+    for world, end in asked.items():
+        try:
+            answers[world] = end.result()
+        except SystemExit as sentence:
+            refused.append(str(sentence.code))
+    return answers, refused
 
 
 def _names(answer: Answer) -> list[str]:
