@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -23,6 +24,7 @@ from roboglot.access.secrets import password_fits
 from roboglot.access.store import AccessStore, Grant, open_store
 from roboglot.access.trail import FILE, BrokenChain, Entry, open_trail
 from roboglot.config import AccessConfig
+from roboglot.model.admission import Proof, ProofKind, Unknown
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.lease import Lease
 from roboglot.operations import Right
@@ -188,15 +190,16 @@ def test_a_change_is_found_at_the_next_look(data: Path, monkeypatch: pytest.Monk
     looks: list[float] = []
     found_at: list[int] = []
 
-    class Ended:
-        def wait(self, period: float) -> bool:
-            looks.append(period)
+    class Wanted(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            looks.append(timeout or 0.0)
             if len(looks) == 3:
                 other.add_machine("cell", [Grant("a", DRIVE)])
-            return bool(found_at) or len(looks) > 20
-
-        def is_set(self) -> bool:
             return False
+
+    class Ended(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            return bool(found_at) or len(looks) > 20 or timeout is None
 
     class Loop:
         def call_soon_threadsafe(self, reload: Callable[[], None]) -> None:
@@ -204,6 +207,7 @@ def test_a_change_is_found_at_the_next_look(data: Path, monkeypatch: pytest.Monk
             reload()
 
     monkeypatch.setattr(guard, "_ended", Ended())
+    monkeypatch.setattr(guard, "_wanted", Wanted())
     loop: Any = Loop()
     guard._follow(loop)
     assert found_at == [3]
@@ -211,6 +215,25 @@ def test_a_change_is_found_at_the_next_look(data: Path, monkeypatch: pytest.Monk
     guard._ended = threading.Event()
     guard.close()
     other.close()
+
+
+async def test_token_made_just_now_is_valid_at_once(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("LOOK_PERIOD", "LOOK_MAX"):
+        monkeypatch.setattr(f"roboglot.access.guard.{name}", 1000.0)
+    guard, other = Guard(data, AccessConfig(on=True), {}), open_store(data)
+    guard.start()
+    try:
+        token = other.add_machine("cell", [Grant("a", DRIVE)])
+        bearer = Proof(ProofKind.HTTP, f"Bearer {token}")
+        assert await guard.admit("10.0.0.7:1", bearer) == "cell"
+        other.add_person("eve", "correct horse", [])
+        basic = Proof(ProofKind.HTTP, f"Basic {b64encode(b'eve:correct horse').decode()}")
+        assert await guard.admit("10.0.0.7:1", basic) == "eve"
+        with pytest.raises(Unknown):
+            await guard.admit("10.0.0.7:1", Proof(ProofKind.HTTP, f"Bearer {token}x"))
+    finally:
+        guard.close()
+        other.close()
 
 
 async def test_what_changed_and_what_was_refused_is_kept(runtime: Runtime, store: AccessStore, data: Path) -> None:

@@ -39,6 +39,8 @@ log = logging.getLogger(__name__)
 seldom = Seldom(log)
 
 LOOK_PERIOD = 0.25  # s between two checks of the list and of expiry times
+LOOK_PAUSE = 0.02  # s at least, even when unknown clients come
+LOOK_MAX = 1.0  # s that an unknown client waits for a check
 HANDSHAKES = 20  # TLS handshakes per second from one address; bursts of twice as many
 HANDSHAKES_TOGETHER = 200  # per second from all addresses
 ALLOWED_MAX = 4096  # cached pairs of identity and operation
@@ -88,7 +90,8 @@ class Guard:
         self.bytes = Limiter(config.bytes, config.bytes * BURST_SECONDS, time.monotonic)
         self._handshakes = Limiter(HANDSHAKES, 2 * HANDSHAKES, time.monotonic)
         self._handshakes_together = Limiter(HANDSHAKES_TOGETHER, HANDSHAKES_TOGETHER, time.monotonic)
-        self._ended = threading.Event()
+        self._ended, self._wanted = threading.Event(), threading.Event()
+        self._looks = list[asyncio.Future[None]]()  # clients that wait for the list
         self._thread: threading.Thread | None = None
         self._next_end = self._book.next_end(now())
         self._admissions = [RobotAdmission(self, name, robot) for name, robot in robots.items()]
@@ -106,6 +109,7 @@ class Guard:
     def close(self) -> None:
         """Stop following the list, and write the rest of the audit."""
         self._ended.set()
+        self._wanted.set()
         if self._thread is not None:
             self._thread.join(2.0)
         self.audit.close()
@@ -147,7 +151,22 @@ class Guard:
         """See ``Admission.admit``."""
         if (who := self.known(address, proof)) is not None:
             return who
-        return await self._proofs.find(proof, host_of(address))
+        before = self._list.version
+        try:
+            return await self._proofs.find(proof, host_of(address))
+        except Unknown:
+            if proof is NO_PROOF or not await self._is_newer(before):
+                raise
+        return self.known(address, proof) or await self._proofs.find(proof, host_of(address))
+
+    async def _is_newer(self, version: int) -> bool:
+        """Read the list at once; return whether it has changed since ``version``."""
+        if self._thread is not None:
+            look = asyncio.get_running_loop().create_future()
+            self._looks.append(look)
+            self._wanted.set()
+            await asyncio.wait([look], timeout=LOOK_MAX)
+        return self._list.version > version
 
     async def invite(self, name: str, grant: Grant) -> Proof:
         """See ``Admission.invite``."""
@@ -168,19 +187,22 @@ class Guard:
     def _follow(self, loop: asyncio.AbstractEventLoop) -> None:
         """Follow the list in a thread, so that neither robots nor lockstep wait for its database."""
         seen = self._list.version
-        while not self._ended.wait(LOOK_PERIOD):
+        while not self._ended.wait(LOOK_PAUSE):
+            self._wanted.wait(LOOK_PERIOD)
+            self._wanted.clear()
+            looks, self._looks = self._looks, []
             if self.now() >= self._next_end:
                 self._next_end = float("inf")  # until recomputed
                 loop.call_soon_threadsafe(lambda: self._adopt_safely(self._list))
             try:
-                if self._store.version == seen:
-                    continue
-                newer = self._store.snapshot()
+                if self._store.version != seen:
+                    newer = self._store.snapshot()
+                    seen = newer.version
+                    loop.call_soon_threadsafe(partial(self._adopt_safely, newer))
             except DatabaseError as error:
                 seldom.warning("list", "cannot read the list of identities, the last one stays: %s", error)
-                continue
-            seen = newer.version
-            loop.call_soon_threadsafe(partial(self._adopt_safely, newer))
+            for look in looks:
+                loop.call_soon_threadsafe(look.cancel)
 
     def _adopt_safely(self, newer: Snapshot) -> None:
         if self._ended.is_set():
