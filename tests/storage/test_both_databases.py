@@ -23,6 +23,7 @@ from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.programs.errors import StoreError
 from roboglot.programs.stores import JournalEntry, LogEntry, StoredProgram
 from roboglot.runtime import Runtime
+from roboglot.storage import postgresql
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.apps import StoredApps
 from roboglot.storage.files import StoredFiles
@@ -194,6 +195,29 @@ async def test_a_full_disk_is_only_read(database: Transactions) -> None:
 def test_an_error_of_the_server_is_one_line() -> None:
     error = psycopg.OperationalError("connection failed: Connection refused\n\tIs the server running?")
     assert in_one_line(error) == "connection failed: Connection refused Is the server running?"
+
+
+@needs_postgresql
+async def test_clients_see_no_host_of_the_database(
+    server: PostgreSQLServer, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(postgresql.seldom, "_said", {})
+    server.empty()
+    database = open_database(tmp_path / "unused", server.url, ["a"])
+    settings = StoredSettings(database, "a")
+    server.stop()
+    try:
+        with pytest.raises(DatabaseError) as failed:
+            await settings.put("x", 1)
+    finally:
+        server.start()
+    host = server.url.partition("host=")[2].partition("&")[0]
+    assert str(failed.value) == "the database cannot be reached"
+    assert host in caplog.text
+    with pytest.raises(DatabaseError) as failed:
+        await database.run(lambda connection: connection.execute("SELECT secret FROM password"))
+    assert str(failed.value) == "the database failed"
+    database.close()
 
 
 @needs_postgresql

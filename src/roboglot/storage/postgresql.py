@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import copy
 import functools
+import logging
 import re
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -21,8 +22,10 @@ import psycopg
 
 from roboglot.model.components.system.disk import Disk
 from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, Rows
+from roboglot.transport.seldom import Seldom
 
 T = TypeVar("T")
+seldom = Seldom(logging.getLogger(__name__))
 
 CONNECTIONS_MAX = 4
 CONNECT_MAX, STATEMENT_MAX, IDLE_MAX = 5, 10, 10  # s for connecting, for a statement, for an idle transaction
@@ -56,11 +59,11 @@ class PostgreSQL:
         )
         self._readers = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database reader")
         try:
-            self._threads.submit(self._transact, _is_there if only_read else _migrate).result()
+            self._threads.submit(self._committed, _is_there if only_read else _migrate, read_only=only_read).result()
         except BaseException as error:
             self.close()
-            if isinstance(error, DatabaseError):
-                raise OSError(str(error)) from None
+            if isinstance(error, psycopg.Error | DatabaseError):
+                raise OSError(in_one_line(error)) from None
             raise
 
     def on(self, disk: Disk) -> PostgreSQL:
@@ -98,13 +101,13 @@ class PostgreSQL:
         except psycopg.errors.ReadOnlySqlTransaction as error:
             if full:
                 raise DiskFull("the disk is full") from None
-            raise DatabaseError(in_one_line(error)) from error
+            raise _failed(error) from error
         except psycopg.IntegrityError as error:
-            raise AlreadyThere(in_one_line(error)) from error
+            raise AlreadyThere("the database has such a row") from error
         except psycopg.errors.DiskFull as error:
             raise DiskFull("the database's disk is full") from error
         except psycopg.Error as error:
-            raise DatabaseError(in_one_line(error)) from error
+            raise _failed(error) from error
 
     def _committed(self, work: Callable[[Connection], T], *, read_only: bool) -> T:
         connection = self._begin(b"BEGIN READ ONLY" if read_only or self._only_read else b"BEGIN")
@@ -225,9 +228,16 @@ def _restored(row: Sequence[object]) -> tuple[object, ...]:
     )
 
 
-def in_one_line(error: psycopg.Error) -> str:
-    """Return libpq's text without line breaks: it stands in log lines and doors' answers."""
+def in_one_line(error: Exception) -> str:
+    """Return libpq's text without line breaks, for the log: it names hosts and people."""
     return " ".join(str(error).split())
+
+
+def _failed(error: psycopg.Error) -> DatabaseError:
+    """Log the error; return one that clients may see."""
+    seldom.warning("database", "the database failed: %s", in_one_line(error))
+    away = isinstance(error, psycopg.OperationalError)
+    return DatabaseError("the database cannot be reached" if away else "the database failed")
 
 
 def _is_there(connection: Connection) -> None:
