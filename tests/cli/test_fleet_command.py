@@ -62,6 +62,13 @@ def test_unreadable_template_is_named(content: bytes | None, reason: str, tmp_pa
     assert "Errno" not in str(refused.value)
 
 
+def test_fleet_has_a_world(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        fleet.app(["up", "--worlds", "0", "--data", str(tmp_path)])
+    assert ended.value.code == 2
+    assert "0 is not in the range x>=1" in " ".join(capsys.readouterr().err.split())
+
+
 def test_folder_lies_in_the_data_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROBOGLOT_DATA", str(tmp_path))
     assert fleet._folder(None) == tmp_path / "fleet"

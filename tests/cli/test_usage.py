@@ -2,13 +2,14 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
 from rich.text import Text
 from typer.main import get_command
 
-from roboglot.cli import COMMANDS, loaded
+from roboglot.cli import COMMANDS, loaded, screen
 
 
 def ended(*arguments: str, reader: str = "cat") -> "subprocess.CompletedProcess[str]":
@@ -36,3 +37,20 @@ def test_help_shows_words_in_square_brackets(name: str) -> None:
     commands = command.commands.values() if isinstance(command, click.Group) else [command]
     texts = [text for each in commands for part in (each, *each.params) if (text := getattr(part, "help", None))]
     assert [Text.from_markup(text).plain for text in texts] == [text.replace("\\[", "[") for text in texts]
+
+
+@pytest.mark.parametrize(("inside", "shown"), [(True, ".venv/bin/roboglot"), (False, "{}/.venv/bin/roboglot")])
+def test_lines_to_copy_name_a_program(
+    inside: bool, shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / ".venv" / "bin" / "roboglot"
+    program.parent.mkdir(parents=True)
+    program.touch(0o755)
+    monkeypatch.setattr(sys, "executable", str(program.with_name("python")))
+    monkeypatch.setenv("PATH", "/usr/bin")
+    (tmp_path / "home").mkdir()
+    monkeypatch.chdir(tmp_path if inside else tmp_path / "home")
+    assert screen.as_typed("roboglot scan 10.0.0.1") == f"{shown.format(tmp_path)} scan 10.0.0.1"
+    assert screen.as_typed("curl http://a") == "curl http://a"
+    monkeypatch.setenv("PATH", str(program.parent))
+    assert screen.as_typed("roboglot scan") == "roboglot scan"

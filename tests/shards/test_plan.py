@@ -29,6 +29,13 @@ def test_names_and_addresses_are_each_robots_own(worlds: int, each: int) -> None
     assert len({shard.settings["data"] for shard in plan.shards}) == worlds
 
 
+def test_shards_are_found_by_their_robots() -> None:
+    plan = plan_fleet(2, 2, {}, Path("/nowhere"))
+    assert plan.find("w2") is plan.find("b2") is plan.shard("w2")
+    with pytest.raises(LookupError, match=r"no robot 'c1'; there are w1, w2$"):
+        plan.find("c1")
+
+
 @pytest.mark.parametrize(
     ("worlds", "each", "template", "first", "reason"),
     [

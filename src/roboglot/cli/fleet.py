@@ -47,10 +47,10 @@ class NoWorld(ValueError):
 
 @app.command()
 def up(
-    worlds: Annotated[int, typer.Option(show_default=False, help="Number of worlds; needed at the first start.")] = 0,
+    worlds: Annotated[int | None, typer.Option(min=1, help="Number of worlds; needed at the first start.")] = None,
     robots_each: Annotated[
-        int, typer.Option(show_default=False, help="Robots in each world, without a template; by default one.")
-    ] = 0,
+        int | None, typer.Option(min=1, help="Robots in each world, without a template; by default one.")
+    ] = None,
     template: Annotated[Path | None, typer.Option(help="Configuration of every world, as for `roboglot up`.")] = None,
     first_address: Annotated[
         str, typer.Option(help="Address of the first robot (127.10.0.1); the others follow it.")
@@ -218,10 +218,7 @@ def logs(
         plan = load(folder)
         if plan is None:
             raise LookupError(f"there is no fleet in {folder}")
-        names = {s.name: s.name for s in plan.shards} | {r: s.name for s in plan.shards for r in s.robots}
-        if shard not in names:
-            raise LookupError(f"there is no shard and no robot {shard!r}")
-        with (folder / "shards" / names[shard] / LOG_FILE).open(encoding="utf-8", errors="replace") as file:
+        with (folder / "shards" / plan.find(shard).name / LOG_FILE).open(encoding="utf-8", errors="replace") as file:
             print(visible("".join(deque(file, lines))), end="")
     except (LookupError, ValueError, OSError) as error:
         sys.exit(f"roboglot fleet: {error.args[0] if isinstance(error, LookupError) else error}")
@@ -234,8 +231,8 @@ def _folder(data: Path | None) -> Path:
 class _Asked(NamedTuple):
     """Options of a plan; without options: the stored plan."""
 
-    worlds: int
-    robots_each: int
+    worlds: int | None
+    robots_each: int | None
     template: Path | None
     first: str
 
@@ -256,7 +253,7 @@ def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     except ValueError as error:  # bad TOML, or not UTF-8
         raise ValueError(f"{asked.template}: {error}") from None
     first = asked.first or FIRST_ADDRESS
-    plan = plan_fleet(asked.worlds, asked.robots_each, template, folder, first=first)
+    plan = plan_fleet(asked.worlds, asked.robots_each or 0, template, folder, first=first)
     if kept is None:
         return plan
     if kept.request != plan.request:

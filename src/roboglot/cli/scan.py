@@ -53,7 +53,10 @@ def command(
     if not found:
         print("no robot answered")
         raise typer.Exit(1)
-    print(f"\nconnect with, for example:  roboglot up --robot {shlex.quote(f'b={found[0].url}')}")
+    from roboglot.cli.screen import as_typed
+
+    line = as_typed(f"roboglot up --robot {shlex.quote(f'b={found[0].url}')}")
+    print(f"\nconnect with, for example:  {line}")
 
 
 def expand(texts: Iterable[str]) -> Iterable[str]:

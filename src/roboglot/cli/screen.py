@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
+import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import typer
 
@@ -44,7 +47,7 @@ def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: 
         for endpoint in endpoints[robot.name]:
             _print(f"  {typer.style(f'{endpoint.label:22}', fg='cyan')} {endpoint.address}")
             if endpoint.try_line:
-                _print(f"    {_dim(endpoint.try_line)}")
+                _print(f"    {_dim(as_typed(endpoint.try_line))}")
     if page:
         _print(f"\n{_bold('console')}  {page}  {_dim('see and drive every robot in a browser')}")
     if config.access.on and config.access.gateway:
@@ -55,6 +58,15 @@ def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: 
         shown = fingerprint(config.data / FOLDER / "tls" / SERVER_CERT)
         _print(f"\n{_bold('gateway')}  {config.access.gateway}  {_dim(f'for `roboglot connect`; SHA-256 {shown}')}")
     _print("")
+
+
+def as_typed(line: str) -> str:
+    """Return a command line with the path of this program where the shell does not find it by its name."""
+    program, space, arguments = line.partition(" ")
+    path = Path(sys.executable).with_name(program)
+    if program != "roboglot" or shutil.which(program) or not path.exists():
+        return line
+    return f"{os.path.relpath(path) if path.is_relative_to(Path.cwd()) else path}{space}{arguments}"
 
 
 def _bold(text: str) -> str:

@@ -88,7 +88,7 @@ class Opening:
         head, end, rest = bytes(self._head).partition(HEAD_END)
         if not end and len(self._head) <= OPENING_MAX:
             return
-        self._protocol = protocol = ServerProtocol(max_size=MESSAGE_MAX, logger=log.getChild("library"))
+        self._protocol = protocol = ServerProtocol(max_size=MESSAGE_MAX)
         if not end:
             self._refuse(protocol, HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, "the request is too long")
             return
@@ -160,11 +160,13 @@ class Opening:
             return
         protocol.send_response(protocol.accept(request))
         self._writer.flush(protocol)
+        log.info("%s: %s connected", self._entrance.door, who or self._host)
         self._opened(Opened(channel, protocol, who, self._early))
 
     def _refuse(
         self, protocol: ServerProtocol, status: HTTPStatus, reason: str, headers: Mapping[str, str] | None = None
     ) -> None:
+        log.info("%s: refused %s: %s", self._entrance.door, self._host, reason)
         response = protocol.reject(status, f"{reason}\n")
         response.headers.update(headers or {})
         protocol.send_response(response)

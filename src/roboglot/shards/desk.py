@@ -57,13 +57,7 @@ class FleetDesk:
                 await asyncio.gather(*map(act, shards))
 
     def _shard(self, name: str) -> Shard:
-        shards = self._supervisor.shards
-        if name in shards:
-            return shards[name]
-        try:
-            return shards[self._supervisor.plan.home_of(name).name]
-        except LookupError:
-            raise LookupError(f"there is no shard and no robot {name!r}") from None
+        return self._supervisor.shards[self._supervisor.plan.find(name).name]
 
 
 def _row(shard: Shard) -> Row:

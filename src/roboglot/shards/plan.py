@@ -52,7 +52,18 @@ class FleetPlan(msgspec.Struct):
         for shard in self.shards:
             if shard.name == name:
                 return shard
-        raise LookupError(f"there is no shard {name!r}; there are {', '.join(s.name for s in self.shards)}")
+        raise LookupError(f"there is no shard {name!r}; there are {self._names}")
+
+    def find(self, name: str) -> ShardPlan:
+        """Return the shard of this name, or of the robot of this name. Raises LookupError."""
+        for shard in self.shards:
+            if name == shard.name or name in shard.robots:
+                return shard
+        raise LookupError(f"there is no shard and no robot {name!r}; there are {self._names}")
+
+    @property
+    def _names(self) -> str:
+        return ", ".join(shard.name for shard in self.shards)
 
 
 def plan_fleet(
