@@ -161,6 +161,14 @@ class Implementation(Protocol):
         """Return the keys of partial rows, with what they cannot do yet."""
 
 
+class Chapters(Implementation, Protocol):
+    """Handlers of a door: its module ``table``, once the chapters that fill it are imported."""
+
+    @property
+    def TABLE(self) -> OperationTable[str] | OperationTable[int]:  # noqa: N802 - a module's constant
+        """Operations that clients may ask for."""
+
+
 @dataclass(frozen=True, slots=True)
 class Contract:
     """Rows of the protocol, their implementation, and further paragraphs for the coverage page."""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboglot.operations import OperationTable
 from roboglot.protocols.cyberdog.config import CyberDogConfig
-from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
+from roboglot.protocols.door import Chapters, Contract, Door, DoorType, Option, PortKind, PortSetting, Site
 from roboglot.wire.contracts import contract
 
 
@@ -16,16 +15,10 @@ def _open(config: CyberDogConfig, site: Site) -> Door:
     return CyberDogDoor(site.robot, site.address, config, site.data, frames=site.frames)
 
 
-def _implementation() -> Implementation:
+def _chapters() -> Chapters:
     from roboglot.protocols.cyberdog import server, table  # noqa: F401 - the server's chapters fill the table
 
     return table
-
-
-def _table() -> OperationTable[int]:
-    from roboglot.protocols.cyberdog import server, table  # noqa: F401
-
-    return table.TABLE
 
 
 def _notes() -> Sequence[str]:
@@ -44,8 +37,8 @@ DOOR = DoorType(
     name="cyberdog",
     title="CyberDog 2 gRPC",
     config=CyberDogConfig,
-    contracts=(Contract("cyberdog", lambda: contract("cyberdog"), _implementation, _notes),),
-    table=_table,
+    contracts=(Contract("cyberdog", lambda: contract("cyberdog"), _chapters, _notes),),
+    table=lambda: _chapters().TABLE,
     ports=(PortSetting("CyberDog", "port"), PortSetting("CyberDog app", "app_port", PortKind.APP)),
     open=_open,
     asks="a certificate of the data folder",

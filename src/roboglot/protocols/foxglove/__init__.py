@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-from roboglot.operations import OperationTable
-from roboglot.protocols.door import ClosedDoor, Contract, Door, DoorType, Implementation, PortSetting, Site
+from roboglot.protocols.door import (
+    Chapters,
+    ClosedDoor,
+    Contract,
+    Door,
+    DoorType,
+    Implementation,
+    PortSetting,
+    Site,
+)
 from roboglot.protocols.foxglove.config import FoxgloveConfig
 from roboglot.wire.contracts import contract
 
@@ -16,7 +24,7 @@ def _open(config: FoxgloveConfig, site: Site) -> Door:
     return FoxgloveDoor(site.robot, site.address, config, site.tls)
 
 
-def _implementation() -> Implementation:
+def _chapters() -> Chapters:
     from roboglot.protocols.foxglove import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table
@@ -28,21 +36,15 @@ def _messages() -> Implementation:
     return Messages()
 
 
-def _table() -> OperationTable[str]:
-    from roboglot.protocols.foxglove import dispatch, table  # noqa: F401 - the chapters fill the table
-
-    return table.TABLE
-
-
 DOOR = DoorType(
     name="foxglove",
     title="Foxglove",
     config=FoxgloveConfig,
     contracts=(
-        Contract("foxglove", lambda: contract("foxglove"), _implementation),
+        Contract("foxglove", lambda: contract("foxglove"), _chapters),
         Contract("foxglove_messages", lambda: contract("foxglove_messages"), _messages),
     ),
-    table=_table,
+    table=lambda: _chapters().TABLE,
     ports=(PortSetting("Foxglove", "port"),),
     open=_open,
 )

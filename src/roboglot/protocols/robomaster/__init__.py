@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.operations import OperationTable
-from roboglot.protocols.door import Contract, Door, DoorType, Implementation, Option, PortKind, PortSetting, Site
+from roboglot.protocols.door import Chapters, Contract, Door, DoorType, Option, PortKind, PortSetting, Site
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.wire.contracts import contract
 
@@ -16,24 +15,18 @@ def _open(config: RoboMasterConfig, site: Site) -> Door:
     return RoboMasterDoor(site.robot, site.address, config)
 
 
-def _implementation() -> Implementation:
-    from roboglot.protocols.robomaster import dispatch, table  # noqa: F401 - dispatch's chapters fill the table
+def _chapters() -> Chapters:
+    from roboglot.protocols.robomaster import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table
-
-
-def _table() -> OperationTable[str]:
-    from roboglot.protocols.robomaster import dispatch, table  # noqa: F401 - dispatch's chapters fill the table
-
-    return table.TABLE
 
 
 DOOR = DoorType(
     name="robomaster",
     title="RoboMaster text",
     config=RoboMasterConfig,
-    contracts=(Contract("robomaster", lambda: contract("robomaster"), _implementation),),
-    table=_table,
+    contracts=(Contract("robomaster", lambda: contract("robomaster"), _chapters),),
+    table=lambda: _chapters().TABLE,
     ports=(
         PortSetting("RoboMaster control", "control_port"),
         PortSetting("RoboMaster video", "video_port"),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from roboglot.operations import OperationTable
 from roboglot.protocols.door import (
+    Chapters,
     ClosedDoor,
     Contract,
     Door,
@@ -26,7 +26,7 @@ def _open(config: Ros2Config, site: Site) -> Door:
     return Ros2Door(site.robot, site.address, config)
 
 
-def _implementation() -> Implementation:
+def _chapters() -> Chapters:
     from roboglot.protocols.ros2 import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table
@@ -38,21 +38,15 @@ def _messages() -> Implementation:
     return Messages()
 
 
-def _table() -> OperationTable[str]:
-    from roboglot.protocols.ros2 import dispatch, table  # noqa: F401 - the chapters fill the table
-
-    return table.TABLE
-
-
 DOOR = DoorType(
     name="ros2",
     title="ROS 2",
     config=Ros2Config,
     contracts=(
-        Contract("ros2", lambda: contract("ros2"), _implementation),
+        Contract("ros2", lambda: contract("ros2"), _chapters),
         Contract("ros2_messages", lambda: contract("ros2_messages"), _messages),
     ),
-    table=_table,
+    table=lambda: _chapters().TABLE,
     ports=(PortSetting("ROS 2 over Zenoh", "port", PortKind.ROUTER),),
     open=_open,
     options=(Option("--ros2", "enabled", "Publish the robots' topics for ROS 2 with rmw_zenoh.", True),),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.operations import OperationTable
-from roboglot.protocols.door import Contract, Door, DoorType, Implementation, PortSetting, Site
+from roboglot.protocols.door import Chapters, Contract, Door, DoorType, PortSetting, Site
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.wire.contracts import contract
 
@@ -14,24 +13,18 @@ def _open(config: SlamwareConfig, site: Site) -> Door:
     return SlamwareDoor(site.robot, site.address, config, site.tls)
 
 
-def _implementation() -> Implementation:
+def _chapters() -> Chapters:
     from roboglot.protocols.slamware import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table
-
-
-def _table() -> OperationTable[str]:
-    from roboglot.protocols.slamware import dispatch, table  # noqa: F401 - the chapters fill the table
-
-    return table.TABLE
 
 
 DOOR = DoorType(
     name="slamware",
     title="Slamware REST",
     config=SlamwareConfig,
-    contracts=(Contract("slamware", lambda: contract("slamware"), _implementation),),
-    table=_table,
+    contracts=(Contract("slamware", lambda: contract("slamware"), _chapters),),
+    table=lambda: _chapters().TABLE,
     ports=(PortSetting("Slamware", "port"),),
     open=_open,
 )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from roboglot.operations import OperationTable
 from roboglot.protocols.door import (
+    Chapters,
     ClosedDoor,
     Contract,
     Door,
@@ -26,9 +26,8 @@ def _open(config: Vda5050Config, site: Site) -> Door:
     return Vda5050Door(site.robot, config)
 
 
-def _implementation() -> Implementation:
-    _table()
-    from roboglot.protocols.vda5050 import table
+def _chapters() -> Chapters:
+    from roboglot.protocols.vda5050 import dispatch, table  # noqa: F401 - the chapters fill the table
 
     return table
 
@@ -39,21 +38,15 @@ def _messages() -> Implementation:
     return Messages()
 
 
-def _table() -> OperationTable[str]:
-    from roboglot.protocols.vda5050 import dispatch, table  # noqa: F401 - the former fills the latter
-
-    return table.TABLE
-
-
 DOOR = DoorType(
     name="vda5050",
     title="VDA 5050",
     config=Vda5050Config,
     contracts=(
-        Contract("vda5050", lambda: contract("vda5050"), _implementation),
+        Contract("vda5050", lambda: contract("vda5050"), _chapters),
         Contract("vda5050_messages", lambda: contract("vda5050_messages"), _messages),
     ),
-    table=_table,
+    table=lambda: _chapters().TABLE,
     ports=(PortSetting("VDA 5050 broker", "port", PortKind.BROKER),),
     open=_open,
     options=(
