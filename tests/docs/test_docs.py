@@ -69,6 +69,11 @@ def test_paths_exist(page: Path) -> None:
             assert any((home / path).exists() for home in (*HOMES, page.parent)), path
 
 
+def test_every_extra_is_listed() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(re.findall(r"^\| `(\w+)` \|", (ROOT / "docs/install.md").read_text(), re.MULTILINE)) == set(extras)
+
+
 @every_page
 def test_python_is_python(page: Path) -> None:
     for code in blocks(page, "python"):
@@ -85,6 +90,7 @@ def test_toml_is_toml(page: Path) -> None:
 def test_commands_run_in_the_clone(page: Path) -> None:
     for code in blocks(page, "sh", "bash", "console", ""):
         assert not BARE.search(code), BARE.search(code)
+    assert "pip install '.[" not in page.read_text(), "it would cut the command off from the clone: install -e"
     for script in re.findall(r"(?:^|[\s`])((?:\.venv/bin/python )?(?:scripts|examples)/[\w./-]+)", page.read_text()):
         assert (ROOT / script.removeprefix(".venv/bin/python ")).exists(), script
 
