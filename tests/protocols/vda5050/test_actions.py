@@ -6,10 +6,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.errors import NotFound
 from roboglot.model.tap import Direction
+from roboglot.protocols.vda5050.chapters.sensing import REPORTS, REPORTS_MAX
 from tests.protocols.held import held
 from tests.protocols.vda5050.conftest import ADDRESS, Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
@@ -124,6 +128,23 @@ async def test_a_log_report_is_kept_as_a_file(yard: Opened) -> None:
     await one.until(lambda: states(one).get("log", ("", ""))[0] == "FINISHED")
     text = (await one.robot[FileStore].read(states(one)["log"][1])).decode()
     assert "it stood still" in text.splitlines()[0]
+
+
+async def test_log_report_is_kept_though_another_removed_old_ones(
+    yard: Opened, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = await yard()
+    store = one.robot[FileStore]
+    for number in range(REPORTS_MAX):
+        await store.write(f"{REPORTS}{number}.txt", b"")
+
+    async def removed_already(name: str) -> None:
+        raise NotFound(f"no file {name!r}")
+
+    monkeypatch.setattr(type(store), "remove", lambda _, name: removed_already(name))
+    one.control.send("instantActions", instant(action("logReport", "l", reason="why")))
+    await one.until(lambda: states(one).get("l", ("",))[0] in ("FINISHED", "FAILED"))
+    assert states(one)["l"][0] == "FINISHED"
 
 
 async def test_hibernation_is_silent_until_it_ends(yard: Opened) -> None:

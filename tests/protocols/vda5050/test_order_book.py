@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 
 from roboglot.protocols.vda5050.errors import Rejected
-from roboglot.protocols.vda5050.order_book import ActionStatus, OrderBook
-from roboglot.wire.vda5050.orders import Malformed, OrderMessage, read
+from roboglot.protocols.vda5050.order_book import ACTIONS_KEPT_MAX, ActionStatus, OrderBook
+from roboglot.wire.vda5050.orders import ACTIONS_MAX, NODES_MAX, Action, Malformed, OrderMessage, read
 from roboglot.wire.vda5050.versions import V2, V3, ErrorKind
 from tests.protocols.vda5050.orders import action, encoded, order, valid_orders
 
@@ -88,6 +89,55 @@ def test_the_horizon_takes_its_actions_along() -> None:
     take(book, made)
     take(book, order("one", [(0, 0), (0, 2)], update=1))
     assert book.actions == {}
+
+
+def test_updates_without_end_are_refused_at_the_limit() -> None:
+    book, count = OrderBook(), NODES_MAX // 2
+    take(book, order("one", [(x, 0) for x in range(count)]))
+    take(book, order("one", [(count - 1 + x, 0) for x in range(count)], update=1, first=count - 1))
+    assert len(book.nodes) == 2 * count - 1
+    more = order("one", [(2 * count - 2 + x, 0) for x in range(3)], update=2, first=2 * count - 2)
+    assert refusal(book, more) is ErrorKind.NOT_A_CONTINUATION
+    finished(book)
+    assert take(book, more)
+
+
+def test_states_of_ended_actions_are_dropped_when_many() -> None:
+    book = OrderBook()
+    take(book, order("one", [(0, 0)]))
+    for number in range(ACTIONS_KEPT_MAX // ACTIONS_MAX + 2):
+        made = order("one", [(number, 0), (number + 1, 0)], update=number + 1, first=number)
+        made["nodes"][1]["actions"] = [action("waitForTrigger", f"{number} {index}") for index in range(ACTIONS_MAX)]
+        take(book, made)
+        for state in book.actions.values():
+            state.status = ActionStatus.FINISHED
+    assert len(book.actions) == ACTIONS_KEPT_MAX
+    assert f"{number} 0" in book.actions
+
+
+def test_many_actions_are_compared_once_each() -> None:
+    compared = 0
+
+    class Id(str):
+        __hash__ = str.__hash__
+
+        def __eq__(self, other: object) -> bool:
+            nonlocal compared
+            compared += 1
+            return str.__eq__(self, other)
+
+    def made(update: int) -> OrderMessage:
+        message = parsed(order("one", [(x, 0) for x in range(20)], update=update, released=1))
+        known = message.nodes[-1]
+        own = [Action("waitForTrigger", Id(f"{update} {number}")) for number in range(1000)]
+        nodes = (*message.nodes[:-1], structs.replace(known, actions=tuple(own)))
+        return structs.replace(message, nodes=nodes)
+
+    book = OrderBook()
+    for update in range(3):
+        assert book.take(made(update), lambda _: True)
+    assert len(book.actions) == 1000
+    assert compared < 10_000
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from roboglot.operations import Operation
 from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.maps import Maps
-from roboglot.protocols.vda5050.order_book import ACTIONS_KEPT_MAX, ActionState, ActionStatus, OrderBook
+from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, OrderBook, forget_oldest
 from roboglot.protocols.vda5050.order_check import check_order
 from roboglot.protocols.vda5050.performing import Performer
 from roboglot.protocols.vda5050.route import Route
@@ -115,7 +115,7 @@ class Context:
                 log.info("robot %s hibernates: refused %s", self.robot.id, action.action_type)
                 continue
             state = self.instant[action.action_id] = ActionState(action)
-            _forget_oldest(self.instant)
+            forget_oldest(self.instant)
             self.run_beside(self._do_instantly(state))
 
     def run_beside(self, work: Awaitable[None]) -> asyncio.Future[None]:
@@ -226,8 +226,3 @@ class Context:
 def _point(node: Node) -> Point:
     assert node.node_position is not None
     return Point(node.node_position.x, node.node_position.y)
-
-
-def _forget_oldest(states: dict[str, ActionState]) -> None:
-    for key in [key for key, state in states.items() if state.status.ended][: max(0, len(states) - ACTIONS_KEPT_MAX)]:
-        del states[key]

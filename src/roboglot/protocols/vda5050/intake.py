@@ -1,4 +1,8 @@
-"""Messages of fleet control that wait for their turn. While many wait, the broker keeps the others."""
+"""Messages of fleet control that wait for their turn. While many wait, the broker keeps the others.
+
+Of a longer message than is read, only the beginning is kept. Bytes that are no MQTT end the connection: paho would take
+them up again at every look, and aiomqtt would leave the socket open.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +13,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, cast
 
+from roboglot.wire.vda5050.orders import MESSAGE_MAX
+
 if TYPE_CHECKING:
     import aiomqtt
 
+PACKET_MAX = MESSAGE_MAX + 65540  # bytes: a message too long by one, behind the longest topic
+PIECE_MAX = 65536  # bytes that are read at once
 WAITING_MAX = 32  # messages; beyond this, no more are read until half are answered
 STOPS = frozenset({"cancelOrder", "startPause"})
 
@@ -19,11 +27,26 @@ STOPS = frozenset({"cancelOrder", "startPause"})
 class Paho(Protocol):
     """Client below aiomqtt's, as far as it is used."""
 
+    _in_packet: dict[str, object]
+    _in_messages: dict[int, object]
+    _sock_recv: Callable[[int], bytes]
+
     def socket(self) -> socket.socket | None:
         """Return the socket of the connection."""
 
     def loop_read(self) -> object:
         """Read a message."""
+
+    def _sock_close(self) -> None:
+        """Close the connection."""
+
+
+class _Beginning(bytearray):
+    """The packet that is read, without what goes beyond PACKET_MAX."""
+
+    def __iadd__(self, more: bytes) -> _Beginning:  # type: ignore[misc, override]
+        self.extend(more[: max(0, PACKET_MAX - len(self))])
+        return self
 
 
 class Intake(asyncio.Queue["aiomqtt.Message"]):
@@ -43,8 +66,19 @@ class Intake(asyncio.Queue["aiomqtt.Message"]):
         """Return the queue of a client that has connected; it calls ``look`` with every message from now on."""
         parts = vars(client)
         intake = cast(Intake, parts["_queue"])
-        intake._paho, intake._look = cast(Paho, parts["_client"]), look
+        intake._paho = paho = cast(Paho, parts["_client"])
+        intake._look = look
         intake._disconnected = cast("asyncio.Future[None]", parts["_disconnected"])
+        receive = paho._sock_recv
+
+        def receive_piece(size: int) -> bytes:
+            if size > PACKET_MAX and not isinstance(paho._in_packet["packet"], _Beginning):
+                paho._in_packet["packet"] = _Beginning()
+            return receive(min(size, PIECE_MAX))
+
+        paho._sock_recv = receive_piece
+        if (open := paho.socket()) is not None:
+            asyncio.get_running_loop().add_reader(open.fileno(), intake._read)
         return intake
 
     def _put(self, item: aiomqtt.Message) -> None:
@@ -72,17 +106,20 @@ class Intake(asyncio.Queue["aiomqtt.Message"]):
             self._read()  # TLS may have more in a buffer of its own
 
     def _read(self) -> None:
-        """Read as aiomqtt does."""
+        """Read in place of aiomqtt."""
         assert self._paho is not None
         try:
             while self._paused < 0:
                 self._paho.loop_read()
+                if self._paho._in_messages:
+                    raise ValueError("the broker sends messages with a QoS that was not asked for")
                 pending = getattr(self._paho.socket(), "pending", None)
                 if pending is None or not pending():
                     break
         except Exception as error:  # noqa: BLE001 - it is raised where messages are awaited
             if not self._disconnected.done():
                 self._disconnected.set_exception(error)
+            self._paho._sock_close()
 
 
 def stops(message: aiomqtt.Message) -> bool:

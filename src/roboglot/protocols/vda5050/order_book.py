@@ -11,7 +11,7 @@ from enum import StrEnum
 
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.values import dataclass
-from roboglot.wire.vda5050.orders import Action, Edge, Node, OrderMessage, OrderPart
+from roboglot.wire.vda5050.orders import NODES_MAX, Action, Edge, Node, OrderMessage, OrderPart
 from roboglot.wire.vda5050.versions import ErrorKind
 
 ACTIONS_KEPT_MAX = 1000  # action states; the oldest finished ones are dropped first
@@ -41,6 +41,12 @@ class ActionState:
     action: Action
     status: ActionStatus = ActionStatus.WAITING
     result: str = ""
+
+
+def forget_oldest(states: dict[str, ActionState]) -> None:
+    """Drop the oldest actions that have ended, beyond ACTIONS_KEPT_MAX of all."""
+    for key in [key for key, state in states.items() if state.status.ended][: max(0, len(states) - ACTIONS_KEPT_MAX)]:
+        del states[key]
 
 
 @dataclass(slots=True)
@@ -115,8 +121,10 @@ class OrderBook:
             raise Rejected(
                 ErrorKind.NOT_A_CONTINUATION, f"the update must begin with {where}", {**known, "nodeId": first.node_id}
             )
+        if sum(node.released for node in self.nodes) + len(order.nodes) - 1 > NODES_MAX:
+            raise Rejected(ErrorKind.NOT_A_CONTINUATION, f"an order has at most {NODES_MAX} nodes left", known)
         new = {action.action_id for part in order.parts if part is not first for action in part.actions}
-        if reused := sorted(new & {key for key, state in self.actions.items() if self._released(state.action)}):
+        if reused := sorted(new & (self.actions.keys() - self._horizon())):
             raise Rejected(
                 ErrorKind.NOT_A_CONTINUATION, "an actionId was used before", {**known, "actionId": reused[0]}
             )
@@ -128,22 +136,20 @@ class OrderBook:
         for part in parts:
             for action in part.actions:
                 self.actions[action.action_id] = ActionState(action)
+        forget_oldest(self.actions)
         released = [node for node in order.nodes if node.released]
         self.decision = released[-1]
 
     def _drop_horizon(self) -> None:
-        parts: tuple[OrderPart, ...] = (*self.nodes, *self.edges)
-        for part in parts:
-            for action in () if part.released else part.actions:
-                self.actions.pop(action.action_id, None)
+        for key in self._horizon():
+            self.actions.pop(key, None)
         self.nodes = [node for node in self.nodes if node.released]
         self.edges = [edge for edge in self.edges if edge.released]
 
-    def _released(self, action: Action) -> bool:
-        """Return True if an action is no longer part of the horizon."""
+    def _horizon(self) -> set[str]:
+        """Return the ids of the actions that are not released."""
         parts: tuple[OrderPart, ...] = (*self.nodes, *self.edges)
-        horizon = [part for part in parts if not part.released]
-        return not any(action.action_id == other.action_id for part in horizon for other in part.actions)
+        return {action.action_id for part in parts if not part.released for action in part.actions}
 
     def pass_node(self, node: Node) -> None:
         """Note that the robot is at ``node`` and has passed all nodes before it."""

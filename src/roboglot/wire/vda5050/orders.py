@@ -162,7 +162,7 @@ M = TypeVar("M", OrderMessage, InstantActions)
 def read(data: bytes, kind: type[M]) -> M:
     """Return the message. Raises Malformed."""
     if len(data) > MESSAGE_MAX:
-        raise Malformed(f"the message has {len(data)} bytes, at most {MESSAGE_MAX} are read")
+        raise Malformed(f"the message has more than {MESSAGE_MAX} bytes")
     try:
         message = msgspec.json.decode(data, type=kind)
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:

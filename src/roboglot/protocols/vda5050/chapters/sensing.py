@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Any
@@ -98,5 +99,6 @@ async def report_log(context: Context, *, reason: Text) -> str:
     await robot[FileStore].write(name, "\n".join(lines).encode())
     kept = sorted(known for known in await robot[FileStore].names() if known.startswith(REPORTS))
     for old in kept[:-REPORTS_MAX]:
-        await robot[FileStore].remove(old)
+        with suppress(NotFound):  # another report removes them, too
+            await robot[FileStore].remove(old)
     return name
