@@ -66,5 +66,32 @@ def test_a_field_around_the_value_leads_the_path() -> None:
     assert misfit(raised.value, field="corners", kinds=PYTHON).endswith("not None")
 
 
+class Tower(msgspec.Struct):
+    height: int = 1
+
+    def __post_init__(self) -> None:
+        if self.height < 1:
+            raise ValueError("tower.height must be at least 1")
+
+
+class Town(msgspec.Struct):
+    tower: Tower | None = None
+    church: Tower | None = None
+
+
+@pytest.mark.parametrize(
+    ("kind", "sent", "words"),
+    [
+        (Tower, {"height": 0}, "tower.height must be at least 1"),
+        (Town, {"tower": {"height": 0}}, "tower.height must be at least 1"),
+        (Town, {"church": {"height": 0}}, "church: tower.height must be at least 1"),
+    ],
+)
+def test_sentence_that_names_its_field_has_no_prefix(kind: type, sent: object, words: str) -> None:
+    with pytest.raises(msgspec.ValidationError) as raised:
+        msgspec.convert(sent, kind)
+    assert misfit(raised.value) == words
+
+
 def test_any_other_error_keeps_its_words() -> None:
     assert misfit(ValueError("no JSON")) == "no JSON"

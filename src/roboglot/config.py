@@ -307,7 +307,7 @@ def _section(name: str, kind: type, values: object, origin: str) -> object:
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
-        raise ValueError(f"{origin}: [{name}] {misfit(error)}") from None
+        raise ValueError(f"{origin}: {misfit(error, field=name)}") from None
 
 
 def zone_of(name: str) -> tzinfo:
@@ -391,7 +391,7 @@ def _refuse_unknown(
         if key not in fields:
             if not prefix and key in {field.name for field in dataclasses.fields(RobotConfig)}:
                 raise ValueError(f"{key} is a setting of one robot: it stands below [[robots]]")
-            raise ValueError(f"{prefix}{key} is not a setting; there are {', '.join(fields)}")
+            raise ValueError(f"{prefix + key} is not a setting; there are {', '.join(fields)}")
         nested = fields[key]
         if isinstance(value, dict) and isinstance(nested, type) and dataclasses.is_dataclass(nested):
             _refuse_unknown(value, nested, f"{prefix}{key}.")

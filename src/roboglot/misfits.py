@@ -59,7 +59,7 @@ def misfit(error: Exception, whole: str = "the value", *, field: str = "", kinds
             if values == [kinds["int"], kinds["float"]]:
                 values[1] = "a fraction"
             return form.format(*values, place=place)
-    return f"{place}: {message}"
+    return message if message.removeprefix("[").startswith(path) else f"{place}: {message}"  # it may name the field
 
 
 def _in_words(value: str, kinds: Mapping[str, str]) -> str:

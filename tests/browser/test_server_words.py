@@ -8,6 +8,7 @@ import re
 import pytest
 
 from roboglot.console.assets import FOLDER
+from roboglot.shards.shard import settings_of
 from tests.browser.served import OpenConsole, until
 from tests.browser.test_studio import FOREVER, Open, loaded, studio
 
@@ -26,6 +27,35 @@ def filled(text: str, marks: list[str]) -> str:
     """The sentence with these in its gaps."""
     left = iter(marks)
     return re.sub(r"\{\d?\}", lambda gap: marks[int(gap[0][1:-1])] if gap[0] != "{}" else next(left), text)
+
+
+def refused(settings: dict[str, object]) -> str:
+    with pytest.raises(ValueError, match=" ") as error:
+        settings_of(settings)
+    return str(error.value)
+
+
+async def test_reasons_of_worlds_down_are_chinese(open_console: OpenConsole) -> None:
+    page = await open_console(language="zh")
+    await page.evaluate(LEARNT)
+    wrong: list[dict[str, object]] = [
+        {"foxglove": {"dead_man": 0}},
+        {"foxglove": {"dead_man": "x"}},
+        {"access": {"tls": {"certificate": "x"}}},
+        {"console": {"otlp": "x"}},
+        {"robots": [{"bodyy": 1}]},
+        {"robots": []},
+        {"cyberdog": {"app": "x"}},
+    ]
+    assert await page.evaluate(TRANSLATED, [refused(settings) for settings in wrong]) == [
+        "配置：foxglove.dead_man 是 0.05 到 60 秒",
+        "配置：foxglove.dead_man 应当是数字，不能是文字",
+        "配置：[access.tls] 要么同时给出 certificate 和 key，要么都不给",
+        "配置：console.otlp 是收集器的 http:// 或 https:// 地址，不能是 'x'",
+        "配置：robots.bodyy 不是设置；有 name, body, address, start, priority, serial",
+        "机器人有 1 到 100 个，不能是 0",
+        "配置：cyberdog.app 是 HOST:PORT，不能是 'x'",
+    ]
 
 
 async def test_every_sentence_is_shown_in_chinese(open_console: OpenConsole) -> None:

@@ -9,16 +9,19 @@ from functools import cache
 from pathlib import Path
 
 import roboglot
+from roboglot.protocols import sections
 from tests.statements import parsed, statements
 
 ROOT = Path(roboglot.__file__).parent
+CONFIGS = tuple(f"protocols/{name}/config.py" for name in sections())
 PLACES = (
-    "access/", "autonomy/", "conditions.py", "console/", "drivers/", "media/", "model/", "operations.py", "programs/",
-    "protocols/visual/", "recording/", "rehearsal.py", "shards/", "simulation/", "storage/", "transport/",
-    "wire/visual/",
+    "access/", "autonomy/", "conditions.py", "config.py", "console/", "drivers/", "media/", "model/", "operations.py",
+    "programs/", "protocols/visual/", "recording/", "rehearsal.py", "runtime.py", "shards/", "simulation/", "storage/",
+    "transport/", "wire/visual/", *CONFIGS,
 )  # fmt: skip
 KINDS = {"RobotError", "ProgramError", "BadParameters", "BadCondition", "Problem"}
-OUTSIDE = ("console/", "model/", "rehearsal.py", "simulation/")  # pages show their ValueError and RuntimeError, too
+# Pages show their ValueError and RuntimeError, too.
+OUTSIDE = ("config.py", "console/", "model/", "rehearsal.py", "runtime.py", "simulation/", *CONFIGS)
 NAMED = {"why", "reason", "words", "wrong"}  # variables and arguments that hold such a sentence
 LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1}  # position of the argument, where not the first
 HOLE = "{}"

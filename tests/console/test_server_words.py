@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.config import REMEDY
 from roboglot.console.assets import FOLDER
 from roboglot.misfits import FORMS, KINDS, PYTHON
 from roboglot.simulation.world.placing import EDGE, GAP, IN_THE_WAY, ROBOT
@@ -22,6 +23,8 @@ WORDS = {
     "a key of {}",
     "the body",
     "the value",
+    "configuration: {}",
+    REMEDY,
     EDGE,
     GAP,
     ROBOT,

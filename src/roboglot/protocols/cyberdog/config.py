@@ -27,4 +27,4 @@ class CyberDogConfig:
 
     def __post_init__(self) -> None:
         if self.app and not re.fullmatch(r".+:\d{1,5}", self.app):
-            raise ValueError(f"the app is HOST:PORT, not {self.app!r}")
+            raise ValueError(f"cyberdog.app is HOST:PORT, not {self.app!r}")
