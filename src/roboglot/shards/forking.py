@@ -41,7 +41,7 @@ class Nursery(NamedTuple):
 
 
 def launch() -> Nursery:
-    """Start a nursery, which loads while the caller goes on. Raises OSError."""
+    """Start a nursery; it loads in the background. Raises OSError."""
     ours, theirs = pair()
     with theirs:
         process = subprocess.Popen(
@@ -55,7 +55,7 @@ def launch() -> Nursery:
 
 @contextlib.contextmanager
 def launched(*, wanted: bool) -> Iterator[Nursery | None]:
-    """Start a nursery, if wanted; at the end it has ended, used or not. Raises OSError."""
+    """Start a nursery if ``wanted``; it ends with the context, used or not. Raises OSError."""
     nursery = launch() if wanted else None
     try:
         yield nursery
@@ -67,7 +67,7 @@ def launched(*, wanted: bool) -> Iterator[Nursery | None]:
 class Forks:
     """The nursery of a supervisor. ``born`` and ``dead`` are called with a shard's number and its pid or status.
 
-    ``nursery``: one that loads already, instead of the first.
+    ``nursery``: one that is loading already, to use first.
     """
 
     def __init__(

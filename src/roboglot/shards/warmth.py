@@ -120,7 +120,7 @@ def fork() -> int:
 
 
 def end_with(parent: int) -> None:
-    """Be killed when the process that started this one ends, however it does."""
+    """Have the kernel kill this process when its parent ends, for any reason."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:  # it died before that was set
         os._exit(EXIT_BROKEN)

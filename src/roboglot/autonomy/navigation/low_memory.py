@@ -17,7 +17,7 @@ from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.depth import remember_low, seen_since
 from roboglot.model.geometry import Pose
 
-KEPT = 60.0  # s after which a sighting counts no more for anyone
+KEPT = 60.0  # s after which a sighting is forgotten
 SPARE = 0.1  # s: cells round their time
 EXPLAINED = 0.1  # m around an echo within which depth adds nothing
 
@@ -71,7 +71,7 @@ class LowMemory:
         return self._sightings.of(grid)
 
     def around(self, grid: EvidenceGrid, pose: Pose, reach: float, since: float) -> Points:
-        """Return the middles (map, m; n, 2) of cells within ``reach`` m with an obstacle seen ``since`` then (s).
+        """Return the middles (map, m; n, 2) of cells within ``reach`` m with an obstacle seen ``since`` (s) or later.
 
         Obstacles beside the robot need this memory, as most of these sensors have a small view.
         """

@@ -13,7 +13,7 @@ from roboglot.kernels.obstacles import remember
 from roboglot.model.geometry import Pose
 
 OBSTACLE_RANGE = 5.0  # m within which obstacles are remembered
-NOTED_MAX = 4000  # cells in the list; when there are more, all of the map's count
+NOTED_MAX = 4000  # cells in the list; with more, the whole map is searched
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -21,7 +21,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 class Cells(Generic[Scalar]):
     """A number for each cell of a map, 0 at first; grows with the map, and begins anew with another one.
 
-    Pages of memory with zeros only are never written, so that the system need not provide them.
+    Pages that hold only zeros are never written, so the system need not provide them.
     """
 
     def __init__(self, kind: type[Scalar]) -> None:
@@ -44,9 +44,9 @@ class Cells(Generic[Scalar]):
 
 
 class Sightings:
-    """Times (s) of the last sighting in a map's cells, 0: never, with a list of the others while they are few.
+    """Times (s) of the last sighting in a map's cells (0: never), with a list of the cells that are not 0.
 
-    ``noted``: (row, column) of the first ``count`` of them; a negative count: they are too many.
+    ``noted``: (row, column) of the first ``count`` such cells; a negative count: too many for the list.
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class Sightings:
         self.noted, self.count = np.empty((NOTED_MAX, 2), np.int32), 0
 
     def of(self, grid: EvidenceGrid) -> NDArray[np.float32]:
-        """Return the times, which may be written to; what becomes more than 0 must be noted."""
+        """Return the times, which may be written to; cells that become more than 0 must be noted."""
         seen = self._seen.of(grid)
         if seen is not self._listed:
             cells = np.argwhere(seen)

@@ -77,7 +77,7 @@ class SimulatedRobot:
         self._context.run(self.senses.run_at, stamp)
 
     def together(self, name: str) -> tuple[object, Sense] | None:
-        """Return its part of this name with its sensing, for one function of all robots; None: it has none."""
+        """Return the part of this name with its sensing, to be sensed for all robots at once; None: there is none."""
         return self._together.get(name)
 
     def control_together(self, name: str) -> tuple[object, Control] | None:
@@ -85,7 +85,7 @@ class SimulatedRobot:
         return self._control_together.get(name)
 
     def ahead(self, name: str) -> object | None:
-        """Return its part of this name, if the kind is computed in advance."""
+        """Return the part of this name, if it is computed ahead for all robots."""
         return self._ahead.get(name)
 
     def displaced(self) -> None:

@@ -39,7 +39,7 @@ Motion = tuple[float, float, float, float]
 
 
 class HullState:
-    """Numbers of a hull, which a kernel may update: the properties read them anew each time."""
+    """Numbers of a hull. Kernels may update them, so the properties read them each time."""
 
     def __init__(self, seat: Seat) -> None:
         self.seat = seat

@@ -73,7 +73,7 @@ class Agenda:
 class Rounds:
     """Control and sensing of the robots. ``tick``: s.
 
-    ``controls`` and ``senses``: what is done together for all, in every tick; that of ``senses`` by the one who calls.
+    ``controls`` and ``senses``: what is done for all robots together, in every tick; the caller does ``senses``.
     """
 
     def __init__(self, rows: Rows, tick: float) -> None:
@@ -82,7 +82,7 @@ class Rounds:
         self.controls: list[SharedControl] = []
         self.senses: list[SharedSense] = []
         self._ahead: list[Callable[[int], None]] = []
-        self.gathered = 0  # how often these were made anew
+        self.gathered = 0  # number of times that these were made
         self._ticks = 0
         self._controlled = self._sensed = Agenda((), (), 0)
 
@@ -105,7 +105,7 @@ class Rounds:
         return True
 
     def free(self, most: int) -> int:
-        """Return how many ticks, at least 1 and at most so many, can pass before a robot has something due.
+        """Return how many ticks, 1 to ``most``, can pass before a robot has something due.
 
         That is, control after the first of them, or sensing before the last.
         """
@@ -116,7 +116,7 @@ class Rounds:
         return most
 
     def skip(self, ticks: int) -> None:
-        """Note that so many ticks have passed; the last one is to be sensed yet."""
+        """Note that so many ticks have passed; sensing of the last one is still to come."""
         if not ticks:
             return
         self._ticks += ticks

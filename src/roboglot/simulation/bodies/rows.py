@@ -1,6 +1,6 @@
-"""Numbers of all robots of a world in tables, a row each, so that one kernel computes a tick of all of them.
+"""Tables of numbers with a row for each robot of a world, so that one kernel computes a tick of all robots.
 
-A part keeps there what it computes together with its like (``Part.together``), and reads and writes its own row.
+A part that is computed for all robots together (``Part.together``) keeps its state there, in its own row.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Leg:
 
 
 class Rows:
-    """Tables for ``robots`` robots. ``kernels``: None until they are loaded; ``others``: room for their answer."""
+    """Tables for ``robots`` robots. ``kernels``: None until loaded; ``others``: buffer for rows that they leave."""
 
     def __init__(self, robots: int) -> None:
         self._robots = robots
@@ -68,22 +68,22 @@ class Rows:
         )
 
     def table(self, name: str, width: int) -> FloatArray:
-        """Return the table of this name, made with zeros at first; ``width``: numbers in a row."""
+        """Return the table of this name, at first full of zeros; ``width``: numbers in a row."""
         if name not in self._tables:
             self._tables[name] = np.zeros((self._robots, width))
         return self._tables[name]
 
     def control(self, alone: Mapping[int, Control], kernel: Callable[[Kernels, float], int], leg: Leg) -> SharedControl:
-        """Return what controls with ``kernel`` and those of ``alone``, as ``sense`` does for sensing."""
+        """Return control by ``kernel``, and by ``alone`` for rows that it leaves; see ``sense``."""
         return SharedControl(self, alone, kernel, leg)
 
     def sense(
         self, alone: Mapping[int, Sense], kernel: Callable[[Kernels, float, float], int], leg: Leg | None = None
     ) -> SharedSense:
-        """Return what senses with one call of ``kernel``, and with those of ``alone`` that it leaves.
+        """Return sensing by one call of ``kernel``, and by ``alone`` (by row) for rows that it leaves.
 
-        Without kernels with all of them. The keys of ``alone`` are rows; the kernel's answer is how many it has left.
-        ``leg``: its part in the kernel that does all in one (``kernels/ticks.py``).
+        While there are no kernels, ``alone`` does all rows. The kernel returns the number of rows that it has left.
+        ``leg``: the same stage in the kernel of whole ticks (``kernels/ticks.py``).
         """
         return SharedSense(self, alone, kernel, leg)
 
@@ -96,7 +96,7 @@ class Seat:
     index: int
 
     def row(self, name: str, width: int) -> memoryview[float]:
-        """Return its row of a table, with zeros; a number of it is read and written quicker than in an array."""
+        """Return the robot's row of a table, set to zeros; single numbers are quicker to access than in an array."""
         self.rows.table(name, width)[self.index] = 0.0
         row: memoryview[float] = memoryview(self.rows.table(name, width)[self.index]).cast("B").cast("d")
         return row
@@ -141,7 +141,7 @@ class SharedSense:
             self.end(count, stamp, seconds)
 
     def end(self, count: int, stamp: float, seconds: float) -> None:
-        """Sense with the ``count`` that the kernel has left."""
+        """Sense for the ``count`` rows that the kernel has left."""
         for index in self.rows.others[:count].tolist():
-            if index in self.alone:  # else it joined in this tick, and begins with the next
+            if index in self.alone:  # one that joined in this tick begins with the next
                 self.alone[index](stamp, seconds)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 LOWEST = AWAY[2] / 2  # m below which movable bodies are away
-MARGIN = 0.012  # m around each robot: more than contacts extend beyond the shapes and what speed gains in a tick
+MARGIN = 0.012  # m around each robot: covers contacts beyond the shapes, and what speed gains in a tick
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,15 +88,15 @@ class Gliding:
         return self._kernels is not None
 
     def clear(self, seconds: float, *, known: bool) -> bool:
-        """Return whether no robot can touch anything in a step of ``seconds``, and none has to be watched.
+        """Return whether no robot can touch anything in a step of ``seconds``, and none needs a closer look.
 
-        ``known``: contacts were searched since something was moved at once; they need not be for robots at rest.
+        ``known``: contacts were searched since something last jumped; robots at rest need no new search.
         """
         known = known and self.parted
         return self._kernels is not None and self._kernels.clear(*self._near, seconds, known)
 
     def step(self, steps: int) -> bool:
-        """Move robots that are clear on by so many steps of the physics; return False if this takes MuJoCo."""
+        """Advance robots that are clear by so many steps of the physics; return False if only MuJoCo can."""
         return self._kernels is not None and self.free and self._kernels.glide(*self._motion, steps)
 
     @property

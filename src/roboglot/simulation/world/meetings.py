@@ -83,11 +83,11 @@ class Meetings:
 
     @property
     def known(self) -> bool:
-        """True if nothing but people was moved at once since the last ``note``."""
+        """True if nothing but people has jumped since the last ``note``."""
         return self._changes() == self._revision and not any(hull.disturbed for hull in self._hulls)
 
     def note(self) -> None:
-        """Note that contacts were searched for, or found impossible, with all where it is now."""
+        """Note that contacts were searched for, or found impossible, with everything at its present place."""
         self._revision = self._changes()
         for hull in self._hulls:
             hull.disturbed = False

@@ -138,13 +138,13 @@ class Physics:
         return self._gliding is not None and self._gliding.loaded
 
     def course(self) -> Course | None:
-        """Return what a kernel needs to move all for several ticks; None: the next one takes MuJoCo, or no kernels."""
+        """Return what a kernel needs to do several ticks; None: the next one needs MuJoCo, or there are no kernels."""
         if self._gliding is None or not self.glides or self._touched:
             return None
         return Course(self._gliding, self._sleep, self._meetings.known)
 
     def moved(self, *, awake: bool, known: bool) -> None:
-        """Note that a kernel moved all, or (not ``awake``) found that nothing moves; ``known``: as of the course."""
+        """Note that a kernel moved everything, or (not ``awake``) nothing moves; ``known``: as in the course."""
         self.rays.outdate()
         self._meetings.switch(off=True)
         if not known:
@@ -153,7 +153,7 @@ class Physics:
             self._sleep.wake()
 
     def end(self, stage: int, count: int, seconds: float) -> None:
-        """Do the rest of a tick's physics after the kernel has stopped at a stage, with a ``count``, of its."""
+        """Do the rest of a tick's physics after the kernel has stopped at ``stage`` and returned ``count``."""
         if stage in (NEAR, STUCK):
             self._meetings.switch(off=stage == STUCK)
             self._plod(seconds)
@@ -188,7 +188,7 @@ class Physics:
         self._look(count)
 
     def _look(self, count: int) -> None:
-        """Read the rest: of the ``count`` hulls that the kernel has left, -1: of all, and what touches them."""
+        """Read the ``count`` hulls that the kernel has left (-1: all of them), and what touches them."""
         hulls, standing = self._all_hulls, self._feet
         if self._touched or self._data.nefc:  # others cannot touch anything
             standing -= sum(len(hull.wheels) for hull in hulls if hull.support.sprung)
@@ -319,7 +319,7 @@ class Physics:
 
 
 class Course(NamedTuple):
-    """Objects whose arrays a kernel moves on. ``known``: nothing but people was moved at once since the last step."""
+    """Objects whose arrays a kernel moves on. ``known``: nothing but people has jumped since the last step."""
 
     gliding: Gliding
     sleep: Sleep

@@ -1,6 +1,6 @@
 """Ticks of a world between the control of its robots and their own sensing: wheels, people, physics, shared senses.
 
-Several at once by one kernel (``kernels/ticks.py``), which stops where something needs more than it.
+One kernel does several of them at once (``kernels/ticks.py``), and stops where something is beyond it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ LEGS = [GIMBALS, TOUCHED, MEASURED, WATCHED, RECKONED]  # stages of parts, as th
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """Ticks that have begun, the stage at which the last one has stopped, and a number with it; DONE: it is over."""
+    """Number of ticks begun; the stage at which the last one stopped (DONE: it is over), and that stage's number."""
 
     ticks: int
     stage: int
@@ -51,7 +51,7 @@ class Ticking:
     def __init__(self, physics: Physics, crowd: Crowd, rounds: Rounds, seconds: float) -> None:
         self._physics, self._crowd, self._rounds, self._seconds = physics, crowd, rounds, seconds
         self._run: Callable[..., int] | None = None
-        self._gathered = 0  # of the rounds, to which these belong
+        self._gathered = 0  # count of the rounds from which these are
         self._arrays: tuple[object, ...] = ()
         self._settings: tuple[float, ...] = ()
         self._refresh: list[Callable[[], None]] = []
@@ -70,9 +70,9 @@ class Ticking:
         return self._run is not None and self._physics.glides
 
     def run(self, ticks: int, number: int, origin: float, *, followed: bool) -> Left:
-        """Begin up to so many ticks after tick ``number``, 0: one without the kernel. The last one waits for ``end``.
+        """Begin up to ``ticks`` ticks after tick ``number`` (0: one, without the kernel); ``end`` finishes the last.
 
-        ``followed``: the first one's shared control has run; ``origin``: stamp of tick 0, s.
+        ``followed``: shared control of the first one has run; ``origin``: stamp of tick 0, s.
         """
         if not ticks:
             return Left(1, DRIVE, 0)

@@ -43,7 +43,7 @@ class Truth:
         return places.free(pose, hull.floor, hull.body.hull.radius) and not self.in_the_way(name, pose, hull.floor)
 
     def in_the_way(self, name: str, pose: Pose, floor: int) -> str:
-        """Return what a robot would be inside of there: a name, or IN_THE_WAY; empty: nothing. Raises NotFound."""
+        """Return what a robot there would overlap: a name, or one of IN_THE_WAY; empty: nothing. Raises NotFound."""
         hull = self._population.hull(name)
         wanted = _solid(hull, pose)
         for key, other in self._population.hulls.items():

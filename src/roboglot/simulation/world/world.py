@@ -275,7 +275,7 @@ class World:
         self._arm()
 
     def _tick(self) -> Iterator[None]:
-        """Do a tick, and those after it until a robot has something due, as far as nothing else happens meanwhile."""
+        """Do a tick, and those after it until a robot has something due or anything else happens."""
         self._ticks += 1
         robots = tuple(self._population.simulated.values())  # steps lie apart: one may join meanwhile
         beads, rounds, ticking = self._environment.beads, self._rounds, self._ticking
