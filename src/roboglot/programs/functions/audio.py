@@ -25,31 +25,31 @@ PIECES: Mapping[int, Callable[[], Sound]] = {6000: cache(romp), 6001: cache(even
 
 @ABILITIES.on("cyberdog.audio.play", needs=(Speaker,))
 async def play(session: Session, message: str, volume: int = UNCHANGED) -> Record:
-    """Say ``message`` once what is being said is over; returns when it has been said."""
+    """Say ``message`` after the present speech; returns at its end."""
     return await _played(session, message, volume)
 
 
 @ABILITIES.on("cyberdog.audio.offline_play", needs=(Speaker,))
 async def offline_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
-    """Play a bark (4000, 4001) or music (6000, 6001) once what is being played is over; returns at its end."""
+    """Play a bark (4000, 4001) or music (6000, 6001) after the present sound; returns at its end."""
     return await _played(session, audio_id, volume)
 
 
 @ABILITIES.on("cyberdog.audio.instantly_play", needs=(Speaker,))
 async def instantly_play(session: Session, message: str, volume: int = UNCHANGED) -> Record:
-    """Say ``message`` at once, whatever is being said; returns at once. It ends with the program."""
+    """Say ``message`` now, in place of anything being said; returns at once. Speech ends with the program."""
     return _started(session, message, volume)
 
 
 @ABILITIES.on("cyberdog.audio.offline_instantly_play", needs=(Speaker,))
 async def offline_instantly_play(session: Session, audio_id: int = 4000, volume: int = UNCHANGED) -> Record:
-    """Play a bark (4000, 4001) or music (6000, 6001) in place of what is played, at once; ends with the task."""
+    """Play a bark (4000, 4001) or music (6000, 6001) now, in place of any other; ends with the task."""
     return _started(session, audio_id, volume)
 
 
 @ABILITIES.on("cyberdog.audio.get_volume", needs=(Speaker,))
 async def get_volume(session: Session) -> Record:
-    """The volume now."""
+    """Return the current volume."""
     percent = round(session.robot[Speaker].volume * 100)
     fields = {"state": state(), "response": Record("AudioGetVolumeSeviceResponseBody", {"volume": percent})}
     return Record("AudioGetVolumeSeviceResponse", fields)
@@ -57,7 +57,7 @@ async def get_volume(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.audio.set_volume", needs=(Speaker,))
 async def set_volume(session: Session, volume: int = UNCHANGED) -> Record:
-    """Set the volume of everything that is said from now on."""
+    """Set the volume of all speech from now on."""
     outcome = state()
     try:
         turn_to(session.robot[Speaker], volume)

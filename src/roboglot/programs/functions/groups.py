@@ -82,7 +82,7 @@ for _group in GROUPS:
 
 @ABILITIES.on("cyberdog.state")
 async def read_state(session: Session) -> Record:
-    """The first of the groups' states that is not success, or success (attribute; 4.4.01).
+    """First state of a group that is not success, or success (attribute; 4.4.01).
 
     What the robot is not made of does not count.
     """
@@ -104,5 +104,5 @@ async def set_log(session: Session, log: bool = False) -> Record:
 
 @ABILITIES.on("cyberdog.shutdown")
 async def shutdown(_session: Session) -> None:
-    """Leave: what the program started is called off, and the program ends here (4.4.01)."""
+    """End the program here, and cancel what it started (4.4.01)."""
     raise TaskEnded

@@ -98,14 +98,14 @@ async def play(session: Session, target: int, effect: int) -> Record:
 
 @ABILITIES.on("cyberdog.led.play_rgb", needs=(Light,))
 async def play_rgb(session: Session, target: int, effect: int, r: int, g: int, b: int) -> Record:
-    """Show an effect in a colour of one's own (0 to 255 each) until the next request, or until the program ends."""
+    """Show an effect in any colour (0 to 255 each) until the next request, or until the program ends."""
     look = (EYES if ZONES.get(target) == "eyes" else LINE).get(effect)
     return _show(session, target, look, Colour(r, g, b))
 
 
 @ABILITIES.on("cyberdog.led.freed", needs=(Light,))
 async def freed(session: Session, target: int) -> Record:
-    """Give the light back: it shows again what it did before the program took it."""
+    """Release the light: it shows again what it did before the program took it."""
     if target not in ZONES:
         return _answer(TARGET_ERROR, "no such light")
     try:

@@ -12,26 +12,26 @@ BLOCK_ID_MAX = 256  # characters; the vendor's editor uses 20
 
 @ABILITIES.on("cyberdog.task.start")
 async def start(_session: Session) -> Record:
-    """Mark the task as running; a program that can call this runs already, and run x start stays run."""
+    """Mark the task as running. A program that can call this is running, so the call changes nothing."""
     return state()
 
 
 @ABILITIES.on("cyberdog.task.stop")
 async def stop(_session: Session) -> Record:
-    """End the task here: the last block ends, nothing after this call runs."""
+    """End the task here, with its last block; nothing after this call runs."""
     raise TaskEnded
 
 
 @ABILITIES.on("cyberdog.task.block")
 async def block(session: Session, id: str = "") -> Record:
-    """The block before ends, this one begins; front ends see both."""
+    """Begin a block; the one before ends, and front ends show both."""
     session.host.begin_block(_usable(id))
     return state()
 
 
 @ABILITIES.on("cyberdog.task.breakpoint_block")
 async def breakpoint_block(session: Session, id: str = "") -> Record:
-    """A block before whose first statement the task is suspended until a user recovers it."""
+    """Begin a block, and suspend the task before its first statement until a user recovers it."""
     session.host.begin_block(_usable(id))
     await session.host.breakpoint()
     return state()
@@ -39,7 +39,7 @@ async def breakpoint_block(session: Session, id: str = "") -> Record:
 
 @ABILITIES.on("cyberdog.task.recover")
 async def recover(_session: Session) -> Record:
-    """Go on after a breakpoint; a program that can call this is not held by one, and run x recover stays run."""
+    """Continue after a breakpoint. A program that can call this is running, so the call changes nothing."""
     return state()
 
 

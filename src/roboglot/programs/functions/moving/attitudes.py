@@ -29,7 +29,7 @@ async def absolute_attitude(
     yaw: float = 0.0,
     duration: float = 0.0,
 ) -> Record:
-    """Hold the body at this height and attitude within ``duration`` s; 0: as fast as it may."""
+    """Move the body to this height and attitude within ``duration`` s (0: as fast as possible), and hold it."""
     wrong = outside(centroid_z=centroid_z, roll=roll, pitch=pitch, yaw=yaw, duration=duration)
     body = BodyPose(centroid_z, _attitude(roll, pitch, yaw))
     return await result(session, ABSOLUTE_FORCE, _hold(session, body, duration), wrong)
@@ -53,7 +53,7 @@ async def relatively_force_control_attitude(
     yaw: float = 0.0,
     duration: float = 1.0,
 ) -> Record:
-    """Move the body by so much from how it is held, within ``duration`` s."""
+    """Move the body by these amounts from its present pose, within ``duration`` s."""
     wrong = _outside(centroid_x, centroid_y, centroid_z, roll, pitch, yaw, duration)
     body = BodyPose(centroid_z, _attitude(roll, pitch, yaw), Point(centroid_x, centroid_y))
     return await result(session, RELATIVE_FORCE, _hold(session, body, duration, relative=True), wrong)
@@ -73,7 +73,7 @@ async def relatively_position_control_attitude(
     fulcrum_z: float = 0.0,
     duration: float = 1.0,
 ) -> Record:
-    """Move the body by so much, turning it about the fulcrum (m from its middle), within ``duration`` s."""
+    """Move the body by these amounts, turned about the fulcrum (m from its middle), within ``duration`` s."""
     wrong = _outside(centroid_x, centroid_y, centroid_z, roll, pitch, yaw, duration)
     wrong = wrong or outside(fulcrum_x=fulcrum_x, fulcrum_y=fulcrum_y, fulcrum_z=fulcrum_z)
     attitude = _attitude(roll, pitch, yaw)

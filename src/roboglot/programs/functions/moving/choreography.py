@@ -42,9 +42,9 @@ class Choreography:
 
 @ABILITIES.on("choreographer.moonwalk")
 async def moonwalk(session: Session, x_velocity: float, y_velocity: float, stride: float, number: int) -> None:
-    """Prepare sliding that way (m/s) with steps of ``stride`` m, ``number`` times four steps of a diagonal pair.
+    """Prepare sliding at this velocity (m/s): ``number`` times four steps of a diagonal pair, ``stride`` m each.
 
-    How fast the feet step follows from both: a foot goes a stride in the time of two steps.
+    The step rate follows from both: a foot moves one stride in the time of two steps.
     """
     twist = Twist(_cut(x_velocity, -0.08, 0.08), _cut(y_velocity, -0.05, 0.05))
     length = _cut(stride, 0.001, 0.065)
@@ -63,7 +63,7 @@ async def moonwalk(session: Session, x_velocity: float, y_velocity: float, strid
 
 @ABILITIES.on("choreographer.push_up")
 async def push_up(session: Session, frequency: int, number: int) -> None:
-    """Prepare ``number`` push-ups, ``frequency`` of them in a minute."""
+    """Prepare ``number`` push-ups, ``frequency`` a minute."""
     half = 30.0 / _cut(frequency, 10, 60)
     once = [Step(half, body=BodyPose(-DEPTH)), Step(half, body=BodyPose(0.0))]
     prepared = session.part(Choreography)
@@ -72,7 +72,7 @@ async def push_up(session: Session, frequency: int, number: int) -> None:
 
 @ABILITIES.on("dancer.dance", needs=(Legs,))
 async def dance(session: Session) -> None:
-    """Do what the choreographer prepared last, to its end; raises RobotError if the robot cannot."""
+    """Perform what the choreographer prepared last, to its end; raises RobotError if the robot cannot."""
     prepared = session.part(Choreography)
     if not prepared.steps:
         raise InvalidGoal("the choreographer has prepared nothing")

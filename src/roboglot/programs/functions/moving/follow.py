@@ -103,7 +103,7 @@ async def add_personnel(session: Session, preset_name: str = "") -> Record:
 
 @ABILITIES.on("cyberdog.follow.delete_personnel")
 async def delete_personnel(session: Session, preset_name: str = "") -> Record:
-    """Revert it; following ends."""
+    """Remove a person who was added, and stop following them."""
     following = session.part(FollowedMember)
     if preset_name not in following.people:
         return state(StateCode.FAIL, f"{preset_name!r} was not added")
@@ -115,12 +115,12 @@ async def delete_personnel(session: Session, preset_name: str = "") -> Record:
 
 @ABILITIES.on("cyberdog.follow.follow_personnel", needs=(Following, Vision))
 async def follow_personnel(session: Session, preset_name: str = "", intimacy: float = 0.0) -> Record:
-    """Walk after a person who was added, ``intimacy`` m behind (0.5 to 5; 0: 1 m), while the program goes on.
+    """Follow a person who was added, ``intimacy`` m behind (0.5 to 5; 0: 1 m), while the program continues.
 
-    Goes around what stands between, or where they went; what the program itself drives meanwhile comes first.
+    Walks around obstacles, or along the person's way; the program's own motions take precedence.
 
-    Lasts until it is cancelled, another client moves the robot, the person was out of sight for 30 s, or the program
-    ends; ``cyberdog.follow.state`` says why.
+    Ends when it is cancelled, another client moves the robot, the person is out of sight for 30 s, or the program ends;
+    ``cyberdog.follow.state`` has the reason.
     """
     following = session.part(FollowedMember)
     distance = intimacy or DISTANCE_DEFAULT
@@ -137,7 +137,7 @@ async def follow_personnel(session: Session, preset_name: str = "", intimacy: fl
 
 @ABILITIES.on("cyberdog.follow.cancel_follow")
 async def cancel_follow(session: Session, preset_name: str = "") -> Record:
-    """Stop following this person, or with no name anybody."""
+    """Stop following this person; without a name, anyone."""
     following = session.part(FollowedMember)
     if not following.name or preset_name not in ("", following.name):
         return state(StateCode.FAIL, f"the robot does not follow {preset_name or 'a person'}")

@@ -20,7 +20,7 @@ EMERGENCY_STOP, GET_DOWN, STAND = 0, 101, 111
 
 @ABILITIES.on("cyberdog.motion.params")
 async def params(_session: Session) -> Record:
-    """The limits of table 4.1 as MotionParams (attribute)."""
+    """Limits of table 4.1 as MotionParams (attribute)."""
     return Record(
         "MotionParams",
         {
@@ -40,7 +40,7 @@ async def params(_session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.motion.emergency_stop")
 async def emergency_stop(session: Session) -> Record:
-    """Stop at once and go limp; only standing up leads out. A robot without legs brakes."""
+    """Stop at once and go limp; only standing up ends that. A robot without legs brakes."""
 
     async def do() -> None:
         if Legs in session.robot:

@@ -47,7 +47,7 @@ class NavigationMode:
 
 @ABILITIES.on("cyberdog.navigation.get_preset", needs=(MapLibrary,))
 async def get_preset(session: Session) -> Record:
-    """The points on the map saved last."""
+    """Return the points of the map saved last."""
     try:
         stored = await _newest(session.robot)
     except RobotError as error:
@@ -76,7 +76,7 @@ async def turn_on_navigation(
     interact: bool = False,
     volume: int = 50,
 ) -> Record:
-    """Use the map saved last, of the ``outdoor`` ones or the others, and find out where in it the robot is.
+    """Use the map saved last, ``outdoor`` or indoor, and find the robot's pose in it.
 
     With ``assisted_relocation`` a person has 60 s to take a robot that cannot find itself elsewhere; ``interact``: it
     asks for that, and says how it went.
@@ -87,14 +87,14 @@ async def turn_on_navigation(
 
 @ABILITIES.on("cyberdog.navigation.turn_off_navigation")
 async def turn_off_navigation(session: Session) -> Record:
-    """Call off every drive to a place, and use navigation no more."""
+    """Cancel all drives to places, and switch navigation off."""
     session.part(NavigationMode).map = None
     return await _outcome(_cancel(session.robot))
 
 
 @ABILITIES.on("cyberdog.navigation.cancel_navigation")
 async def cancel_navigation(session: Session) -> Record:
-    """Call off every drive to a place; returns when the robot stands."""
+    """Cancel all drives to places; returns when the robot stands."""
     return await _outcome(_cancel(session.robot))
 
 
@@ -119,7 +119,7 @@ async def to_preset(
 
 @ABILITIES.on("cyberdog.navigation.navigation_to_preset", needs=(Localization, MapLibrary, Navigation))
 async def navigation_to_preset(session: Session, preset_name: str = "") -> Record:
-    """Go to a point of the map that navigation is on with."""
+    """Go to a point of the map with which navigation was switched on."""
 
     async def do() -> None:
         stored = await session.robot[MapLibrary].get(_map_in_use(session))
@@ -138,7 +138,7 @@ async def navigation_to_coordinates(
     pitch: float = 0.0,
     yaw: float = 0.0,
 ) -> Record:
-    """Go to a point of the map and look where ``yaw`` says; navigation must be on. z, roll and pitch: the floor's."""
+    """Go to a pose on the map; navigation must be on. z, roll and pitch are ignored."""
 
     async def do() -> None:
         _map_in_use(session)

@@ -100,7 +100,7 @@ for _motion in RESULT_MOTIONS:
 
 @ABILITIES.on("cyberdog.motion.walk_the_dog", needs=(Legs,))
 async def walk_the_dog(session: Session, front_leg_lift: float = 0.03, back_leg_lift: float = 0.03) -> Record:
-    """Get up if need be, then go where a person pulls, feet lifted so high (m).
+    """Stand up if necessary, then go where a person pulls, with this lift of the feet (m).
 
     Returns at once; lasts until the robot gets another motion, or the program ends.
     """

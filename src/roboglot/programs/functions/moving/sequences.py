@@ -46,7 +46,7 @@ FEET = {
 
 @ABILITIES.on("cyberdog.motion.run_sequence", needs=(Legs,))
 async def run_sequence(session: Session, sequence: object) -> Record:
-    """Step as the gait list says and go as the pace list says, then stand straight; a pace's duration is in ms.
+    """Step by the gait list and move by the pace list, then stand straight; a pace's duration is in ms.
 
     The gaits, in units of 30 ms, begin again as long as there are paces; without any it trots. Feet on the floor stay
     where they are, and hold the body back when a leg is stretched to its end. A foot's x and y are m beside its place

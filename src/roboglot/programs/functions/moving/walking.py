@@ -111,7 +111,7 @@ def _declare_jump(name: str, motion: int, gait: Gait) -> None:
         distance: float = 0.0,
         duration: float = 1.0,
     ) -> Record:
-        """Walk jumping (m/s; z in degrees/s, left positive) for ``distance`` m, else for ``duration`` s."""
+        """Walk in jumps (m/s; z in degrees/s, left positive) for ``distance`` m, else for ``duration`` s."""
         wrong = outside(
             x_jump_velocity=x_jump_velocity,
             y_jump_velocity=y_jump_velocity,

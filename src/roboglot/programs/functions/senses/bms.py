@@ -22,7 +22,7 @@ IN_USE, CHARGING, CHARGED, LOCKED = range(4)
 
 @ABILITIES.on("cyberdog.bms.data", needs=(Battery,))
 async def data(session: Session) -> Record:
-    """The battery now, as BmsStatus (attribute); current is negative while discharging."""
+    """State of the battery as BmsStatus (attribute); the current is negative while discharging."""
     robot = session.robot
     require_heard(robot)
     battery = robot[Battery].state
@@ -52,7 +52,7 @@ async def data(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.bms.get_data", needs=(Battery,))
 async def get_data(session: Session, timeout: int = 5) -> Record:  # noqa: ARG001 - the vendor has it
-    """The newest BmsStatus; the battery always has one, so nothing is waited for."""
+    """Return the newest BmsStatus, without waiting: the battery always has one."""
     return await data(session)
 
 

@@ -17,7 +17,7 @@ TOUCHES = {TouchKind.SINGLE: 1, TouchKind.DOUBLE: 2, TouchKind.LONG: 3}
 
 @ABILITIES.on("cyberdog.touch.data", needs=(Touch,))
 async def touch(session: Session) -> Record:
-    """The last touch as TouchStatus (attribute): 1 once, 2 twice, 3 long, 0 never yet."""
+    """Last touch as TouchStatus (attribute): 1 once, 2 twice, 3 long, 0 none yet."""
     last = session.robot[Touch].last
     if last is None:
         return Record("TouchStatus")
@@ -27,7 +27,7 @@ async def touch(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.touch.get_data", needs=(Touch,))
 async def next_touch(session: Session, timeout: int = 5) -> Record:
-    """The next touch, or the last one after ``timeout`` seconds."""
+    """Return the next touch, or the last one after ``timeout`` seconds."""
     pad = session.robot[Touch]
     await newer(session, lambda: pad.last[0] if pad.last else -math.inf, timeout)
     return await touch(session)
@@ -35,7 +35,7 @@ async def next_touch(session: Session, timeout: int = 5) -> Record:
 
 @ABILITIES.on("cyberdog.network.data", needs=(Network,))
 async def network(session: Session) -> Record:
-    """The Wi-Fi card as ConnectorStatus (attribute); strength 0 to 100: full at -50 dBm, nothing at -100.
+    """State of the Wi-Fi card as ConnectorStatus (attribute); strength from 0 (-100 dBm) to 100 (-50 dBm).
 
     The robot's address and that of the network's access point are IPv4, "" without; ``code`` stays 0.
     """

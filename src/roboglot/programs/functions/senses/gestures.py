@@ -76,13 +76,13 @@ async def turn_on_recognition(session: Session, duration: int = 60) -> Record:
 
 @ABILITIES.on("cyberdog.gesture.turn_off_recognition")
 async def turn_off_recognition(session: Session) -> Record:
-    """Stop looking."""
+    """Switch recognition off."""
     return _switched(lambda: session.part(GestureWatch).close())
 
 
 @ABILITIES.on("cyberdog.gesture.recognized", needs=(Vision,))
 async def recognized(session: Session, duration: int = 60, sensitivity: int = 1) -> Record:
-    """Look for gestures for ``duration`` s and wait for any; one of the last ``sensitivity`` s counts, too."""
+    """Look for gestures for ``duration`` s and wait for one; those of the last ``sensitivity`` s count, too."""
     try:
         session.part(GestureWatch).open(_seconds("duration", duration))
     except RobotError as error:
@@ -92,13 +92,13 @@ async def recognized(session: Session, duration: int = 60, sensitivity: int = 1)
 
 @ABILITIES.on("cyberdog.gesture.recognized_any_gesture", needs=(Vision,))
 async def recognized_any_gesture(session: Session, timeout: int = 60, sensitivity: int = 1) -> Record:
-    """Wait for any gesture (30 to 300 s) once recognition is on; none in time is all False, and no failure."""
+    """Wait for any gesture (30 to 300 s) while recognition is on; without one in time, all are False: no failure."""
     return await _wait(session, timeout, sensitivity)
 
 
 @ABILITIES.on("cyberdog.gesture.recognized_designated_gesture", needs=(Vision,))
 async def recognized_designated_gesture(session: Session, timeout: int = 60, gesture_type: int = 0) -> Record:
-    """Wait for one gesture (1 to 300 s) once recognition is on; none in time is all False, and no failure."""
+    """Wait for one gesture (1 to 300 s) while recognition is on; without it in time, all are False: no failure."""
     if not 1 <= gesture_type <= len(GESTURES):
         return _gestures(state(StateCode.FAIL, f"gesture_type = {gesture_type} is no gesture"), set())
     return await _wait(session, timeout, 1, GESTURES[gesture_type - 1], least=1)

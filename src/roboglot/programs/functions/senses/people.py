@@ -99,7 +99,7 @@ async def voiceprint_recognized(
 
 @ABILITIES.on("cyberdog.train.get_training_words_set")
 async def get_training_words_set(session: Session) -> Record:
-    """The words that the robot listens for: the three that it knows by itself, and what people taught it."""
+    """Return the words that the robot listens for: three built-in ones, and those it was taught."""
     words = {word.trigger: _word(word) for word in known_words(session.robot)}
     response = Record("TrainingSet", {"training_set": list(words.values())})
     fields = {"state": state(), "response": response, "dictionary": words}
@@ -108,7 +108,7 @@ async def get_training_words_set(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.train.training_words_recognized", needs=(Hearing,))
 async def training_words_recognized(session: Session, timeout: int = 5) -> Record:
-    """Wait until one of them is said (5 to 300 s); none in time is an empty one, and no failure."""
+    """Wait until one of these words is said (5 to 300 s); without one in time, it is empty: no failure."""
     outcome, word = state(), Record("MsgTrainingWords")
     try:
         left, since, ear = usable(timeout), session.robot.clock.time(), session.part(Ear)

@@ -1,4 +1,4 @@
-"""cyberdog.tof, cyberdog.ultrasonic and cyberdog.gps: distances, and the place on earth (4.4.11 to 4.4.15)."""
+"""cyberdog.tof, cyberdog.ultrasonic and cyberdog.gps: distances, and the position on earth (4.4.11 to 4.4.15)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WEEK = 604_800  # s
 
 @ABILITIES.on("cyberdog.tof.data", needs=(TimeOfFlight,))
 async def tof(session: Session) -> Record:
-    """TofPayload now (attribute): 64 distances a sensor in m, row by row from the top; nearer than it sees is 0."""
+    """Current TofPayload (attribute): 64 distances per sensor, m, row by row from the top; 0: too near to measure."""
     head = {f"{side}_head": _single(session, f"head {side}") for side in ("left", "right")}
     rear = {f"{side}_rear": _single(session, f"rear {side}") for side in ("left", "right")}
     return Record("TofPayload", {"head": Record("HeadTofPayload", head), "rear": Record("RearTofPayload", rear)})
@@ -32,7 +32,7 @@ async def tof(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.tof.get_data", needs=(TimeOfFlight,))
 async def next_tof(session: Session, timeout: int = 5) -> Record:
-    """The next TofPayload, or the last known one after ``timeout`` seconds."""
+    """Return the next TofPayload, or the last known one after ``timeout`` seconds."""
     part = session.robot[TimeOfFlight]
     if part.names:
         await newer(session, lambda: part.reading(part.names[0]).stamp, timeout)
@@ -75,7 +75,7 @@ class RangesOn:
 
 @ABILITIES.on("cyberdog.ultrasonic.data", needs=(RangeSensors,))
 async def ultrasonic(session: Session) -> Record:
-    """Range now (attribute): m, inf where nothing came back; the defaults before the first measurement."""
+    """Current Range (attribute), m; inf without an echo; the defaults before the first measurement."""
     reading = session.part(RangesOn).reading()
     if reading is None:
         return Record("Range")
@@ -94,7 +94,7 @@ async def ultrasonic(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.ultrasonic.get_data", needs=(RangeSensors,))
 async def next_ultrasonic(session: Session, timeout: int = 5) -> Record:
-    """The next Range, or the last known one after ``timeout`` seconds."""
+    """Return the next Range, or the last known one after ``timeout`` seconds."""
     ranges = session.part(RangesOn)
 
     def stamp() -> float:
@@ -107,7 +107,7 @@ async def next_ultrasonic(session: Session, timeout: int = 5) -> Record:
 
 @ABILITIES.on("cyberdog.gps.data", needs=(Gps,))
 async def gps(session: Session) -> Record:
-    """GpsPayload now (attribute): degrees; without a fix (fix_type 0) those of the last one, or 0."""
+    """Current GpsPayload (attribute), degrees; without a fix (fix_type 0), those of the last fix, or 0."""
     reading = session.robot[Gps].reading
     at = epoch(session, reading.stamp)
     return Record(
@@ -126,7 +126,7 @@ async def gps(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.gps.get_data", needs=(Gps,))
 async def next_gps(session: Session, timeout: int = 5) -> Record:
-    """The next GpsPayload, or the last known one after ``timeout`` seconds."""
+    """Return the next GpsPayload, or the last known one after ``timeout`` seconds."""
     part = session.robot[Gps]
     await newer(session, lambda: part.reading.stamp, timeout)
     return await gps(session)

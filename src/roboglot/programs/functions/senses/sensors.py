@@ -59,7 +59,7 @@ async def imu(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.lidar.data", needs=(Lidar,))
 async def lidar(session: Session) -> Record:
-    """LaserScan (attribute): m, rad counter-clockwise from straight ahead; inf where nothing came back.
+    """LaserScan (attribute): m, rad counter-clockwise from straight ahead; inf without an echo.
 
     Before the first turn all fields have their defaults and ``cyberdog.lidar.state`` says no_data_update.
     """
@@ -86,7 +86,7 @@ async def lidar(session: Session) -> Record:
 
 @ABILITIES.on("cyberdog.odometer.get_data", needs=(Odometry,))
 async def next_odometry(session: Session, timeout: int = 5) -> Record:
-    """The next Odometry, or the last known one after ``timeout`` seconds."""
+    """Return the next Odometry, or the last known one after ``timeout`` seconds."""
     part = session.robot[Odometry]
     await newer(session, lambda: part.reading.stamp, timeout)
     return await odometer(session)
@@ -94,7 +94,7 @@ async def next_odometry(session: Session, timeout: int = 5) -> Record:
 
 @ABILITIES.on("cyberdog.imu.get_data", needs=(Imu,))
 async def next_imu(session: Session, timeout: int = 5) -> Record:
-    """The next Imu, or the last known one after ``timeout`` seconds."""
+    """Return the next Imu, or the last known one after ``timeout`` seconds."""
     part = session.robot[Imu]
     await newer(session, lambda: part.reading.stamp, timeout)
     return await imu(session)
@@ -102,7 +102,7 @@ async def next_imu(session: Session, timeout: int = 5) -> Record:
 
 @ABILITIES.on("cyberdog.lidar.get_data", needs=(Lidar,))
 async def next_scan(session: Session, timeout: int = 5) -> Record:
-    """The next LaserScan, or the last known one after ``timeout`` seconds."""
+    """Return the next LaserScan, or the last known one after ``timeout`` seconds."""
     part = session.robot[Lidar]
     await newer(session, lambda: part.scan.stamp if part.scan else -math.inf, timeout)
     return await lidar(session)

@@ -141,7 +141,7 @@ async def sports_recognition(
     instantly: bool = True,
     volume: int = 50,
 ) -> Record:
-    """Count until there are enough or the time is up; ``interact``: say the counts, ``instantly``: not one by one."""
+    """Count up to ``counts`` or until the time is up; ``interact``: say the counts; ``instantly``: not one by one."""
     watch = session.part(ExerciseWatch)
     try:
         usable_volume(volume)

@@ -38,7 +38,7 @@ class SerialLine(asyncio.Transport):
         asyncio.get_running_loop().add_reader(self._master, self._read)
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
-        """Lost when there is no reader and the line is full, as on a wire."""
+        """Write; bytes are lost if nothing reads and the line is full, as on a wire."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 
@@ -47,7 +47,7 @@ class SerialLine(asyncio.Transport):
         asyncio.get_running_loop().remove_reader(self._master)
 
     def resume_reading(self) -> None:
-        """Go on."""
+        """Read again."""
         if not self._closing:
             asyncio.get_running_loop().add_reader(self._master, self._read)
 
@@ -55,11 +55,11 @@ class SerialLine(asyncio.Transport):
         return self._closing
 
     def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:  # noqa: ARG002
-        """The terminal's own buffer is all there is; it is far smaller than OUTPUT_MAX."""
+        """Do nothing: the only buffer is the terminal's, far smaller than OUTPUT_MAX."""
         assert high is None or high <= OUTPUT_MAX
 
     def abort(self) -> None:
-        """End of the line: its link goes away."""
+        """Close the line and remove its link."""
         if self._closing:
             return
         self._closing = True

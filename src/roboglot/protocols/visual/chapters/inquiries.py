@@ -43,7 +43,7 @@ async def inquire(context: Context) -> None:
 
 
 async def _items(robot: Robot, request: Request) -> list[Item]:
-    """Each kind of thing by id, ascending; raises RobotError."""
+    """Return the entries of the requested kind, by id, ascending. Raises RobotError."""
     match request.kind, request.mode:
         case FrameSubject.SLAM, "map":
             return _sorted(await _maps(robot[MapLibrary]))
@@ -58,7 +58,10 @@ async def _items(robot: Robot, request: Request) -> list[Item]:
 
 
 def _people(members: Members, kind: str) -> list[Item]:
-    """``kind`` is personnel (all members), face or voiceprint (members with one). Never 2: entering is not observed."""
+    """Return people; ``kind``: personnel (all members), face or voiceprint (members with one).
+
+    A style or condition of 2 (being enrolled) never occurs: enrolment is not observed.
+    """
     people = [
         {
             "id": str(member.id),
@@ -99,7 +102,7 @@ async def _maps(library: MapLibrary) -> list[Item]:
 
 
 async def _presets(library: MapLibrary) -> list[Item]:
-    """The labels on the map saved last: the robot moves in that one unless another is loaded."""
+    """Return the labels of the map saved last, which the robot uses unless another one is loaded."""
     names = await library.names()
     if not names:
         return []

@@ -12,7 +12,7 @@ from roboglot.protocols.visual.vocabulary import item, program
 
 @TABLE.on("module save", right=Right.PROGRAM)
 async def save(context: Context) -> None:
-    """Keep a module. Raises ProgramError for what concerns the frame as a whole, as all of these do."""
+    """Save a module. Raises ProgramError for a refusal of the whole frame, as do all handlers here."""
     await context.library.save(program(context.request))
     await context.answers.accept()
 

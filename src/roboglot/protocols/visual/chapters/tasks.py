@@ -13,21 +13,21 @@ from roboglot.protocols.visual.vocabulary import item, program
 
 @TABLE.on("task save", right=Right.PROGRAM)
 async def save(context: Context) -> None:
-    """Keep a task. Raises ProgramError for what concerns the frame as a whole, as all of these do."""
+    """Save a task. Raises ProgramError for a refusal of the whole frame, as do all handlers here."""
     await context.service.save(program(context.request))
     await context.answers.accept()
 
 
 @TABLE.on("task debug", right=Right.PROGRAM)
 async def debug(context: Context) -> None:
-    """Run a task that is not kept."""
+    """Run a task without saving it."""
     await context.service.debug(program(context.request))
     await context.answers.accept()
 
 
 @TABLE.on("task run", right=Right.PROGRAM)
 async def run(context: Context) -> None:
-    """Run a kept task, now or when its condition says; the first target counts, as in save."""
+    """Run a saved task, now or when its condition is due; only the first target counts, as in ``save``."""
     request = context.request
     await context.service.run(request.targets[0], request.mode, request.condition)
     await context.answers.accept()
@@ -41,7 +41,7 @@ async def inquire(context: Context) -> None:
 
 @TABLE.on("task suspend", "task recover", "task shutdown", right=Right.PROGRAM)
 async def control(context: Context) -> None:
-    """Two feedbacks: the first for the request, the second (from the service) when each task has really obeyed."""
+    """Send two feedbacks: one for the request and, by the service, one when each task has done it."""
     service, answers = context.service, context.answers
     operation = TaskOperation(context.request.operate)
     legal = []

@@ -50,7 +50,7 @@ def get_home_pose(context: Context) -> Pose3D:
 
 @TABLE.on(f"PUT {API}/homepose", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def set_home_pose(context: Context, body: Pose3D) -> bool:
-    """The dock is there: the robot's pose when docked. Moves the dock that it goes home to."""
+    """Set the place of the home dock, by the robot's pose when docked."""
     robot = context.robot
     before = home_dock(robot)
     if before is None:
@@ -63,13 +63,13 @@ async def set_home_pose(context: Context, body: Pose3D) -> bool:
 
 @TABLE.on(f"GET {API}/homedocks", right=Right.SEE, needs=(Docking, MapAnnotations, Settings))
 def get_home_docks(context: Context) -> list[PoseEntry]:
-    """The docks on the map."""
+    """Return the docks on the map."""
     return [entry_of(dock) for dock in known_docks(context.robot)]
 
 
 @TABLE.on(f"PUT {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
 async def set_home_docks(context: Context, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=1000)]) -> bool:
-    """These, and no others; each needs a name."""
+    """Replace all docks; each needs a name."""
     docks = {entry.id: _entered(context.robot, entry) for entry in body}
     await change_docks(context.robot, lambda _: tuple(docks.values()))
     return True
@@ -77,7 +77,7 @@ async def set_home_docks(context: Context, body: Annotated[list[PoseEntry], msgs
 
 @TABLE.on(f"POST {API}/homedocks", right=Right.EDIT, needs=(Docking, Localization, MapAnnotations, Settings))
 async def add_home_dock(context: Context, body: PoseEntry) -> bool:
-    """Add one with a name, or replace the one with its id."""
+    """Add a dock with a name, or replace the one with its id."""
     dock = _entered(context.robot, body)
     await change_docks(context.robot, lambda docks: (*(d for d in docks if d.id != dock.id), dock))
     return True
@@ -85,7 +85,7 @@ async def add_home_dock(context: Context, body: PoseEntry) -> bool:
 
 @TABLE.on(f"DELETE {API}/homedocks", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def clear_home_docks(context: Context) -> PoseEntry | None:
-    """Remove all; answers the one that was home, as the manual has a dock here, or null."""
+    """Remove all docks; return the home dock, as the manual has it, or null."""
     home = home_dock(context.robot)
     await change_docks(context.robot, lambda _: ())
     return entry_of(home) if home else None
@@ -110,7 +110,7 @@ def _one(docks: Docks, id: str) -> PointOfInterest:
 
 @TABLE.on(f"PUT {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def edit_home_dock(context: Context, dock_id: Identifier, body: PoseChange) -> bool:
-    """Change pose, metadata or both; 404 if there is none."""
+    """Change a dock's pose, metadata or both; 404 if there is none."""
 
     def edit(docks: Docks) -> Docks:
         old = _one(docks, dock_id)
@@ -124,7 +124,7 @@ async def edit_home_dock(context: Context, dock_id: Identifier, body: PoseChange
 
 @TABLE.on(f"DELETE {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def erase_home_dock(context: Context, dock_id: Identifier) -> bool:
-    """Remove one, or 404."""
+    """Remove a dock; 404 if there is none."""
 
     def edit(docks: Docks) -> Docks:
         gone = _one(docks, dock_id)

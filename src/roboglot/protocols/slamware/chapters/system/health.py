@@ -95,7 +95,7 @@ def _stopped(robot: Robot) -> bool:
 def clear_robot_health(context: Context, error_code: int) -> None:
     """Dismiss a fault, which returns while its cause persists; 400 for an unknown code.
 
-    The flags go on saying how the robot is.
+    The flags still show the robot's state.
     """
     health = context.robot[Health]
     if error_code not in {record.error_code for record in _records(context.robot)}:
