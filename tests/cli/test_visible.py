@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+from xml.etree import ElementTree
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.hosting.visible import VisibleFormatter, visible
+from roboglot.hosting.visible import VisibleFormatter, visible, xml_text
 
 
 def test_controls_are_written_out_and_words_stay() -> None:
@@ -23,3 +24,14 @@ def test_nothing_that_drives_a_terminal_is_left(text: str) -> None:
 def test_log_lines_are_visible_too() -> None:
     record = logging.LogRecord("x", logging.INFO, "", 0, "%s said: %s", ("a", "\x1b]0;mine\x07"), None)
     assert VisibleFormatter("%(message)s").format(record) == "a said: \\x1b]0;mine\\x07"
+
+
+@given(st.text())
+def test_any_text_fits_into_xml(text: str) -> None:
+    element = ElementTree.Element("case", name=xml_text(text))
+    read = ElementTree.fromstring(ElementTree.tostring(element, "utf-8"))
+    assert read.get("name") is not None
+
+
+def test_xml_keeps_words_and_pictures() -> None:
+    assert xml_text("狗 🐕\tA\x00\ufffe\ud800") == "狗 🐕\tA\ufffd\ufffd\ufffd"

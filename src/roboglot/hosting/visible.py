@@ -1,8 +1,9 @@
-"""Foreign text for a terminal, with characters that move the cursor, colour or reorder text as escapes."""
+"""Foreign text for a terminal, with characters that move the cursor, colour or reorder text as escapes; and for XML."""
 
 from __future__ import annotations
 
 import logging
+import re
 
 _KEPT = "\t\n"
 _REORDERING = (0x061C, 0x200E, 0x200F, 0x2028, 0x2029, *range(0x202A, 0x202F), *range(0x2066, 0x206A))
@@ -12,11 +13,17 @@ _WRITTEN_OUT = {
     for code in (*_CONTROLS, *_REORDERING)
     if chr(code) not in _KEPT
 }
+_NOT_XML = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # characters that XML 1.0 lacks
 
 
 def visible(text: str) -> str:
     """Return ``text`` with control characters and direction marks as escapes; line ends and tabs stay."""
     return text.translate(_WRITTEN_OUT).encode("utf-8", "replace").decode()
+
+
+def xml_text(text: str) -> str:
+    """Return ``text`` with characters that XML cannot hold replaced."""
+    return _NOT_XML.sub("\ufffd", text)
 
 
 class VisibleFormatter(logging.Formatter):

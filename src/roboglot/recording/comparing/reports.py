@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 from xml.etree import ElementTree
 
+from roboglot.hosting.visible import xml_text
 from roboglot.recording.comparing.comparison import Comparison, Row
 
 STYLE = (
@@ -54,11 +55,11 @@ def junit(comparison: Comparison) -> bytes:
         failed = sum(row.agreed < row.checks for row in rows)
         suite = ElementTree.SubElement(suites, "testsuite", name=door, tests=str(len(rows)), failures=str(failed))
         for row in rows:
-            case = ElementTree.SubElement(suite, "testcase", classname=door, name=_clean(row.operation) or "(none)")
+            case = ElementTree.SubElement(suite, "testcase", classname=door, name=xml_text(row.operation) or "(none)")
             if row.agreed < row.checks:
                 text = "\n".join(f"{d.what}: {d.one} | {d.other}" for d in row.differences)
                 why = f"{row.checks - row.agreed} of {row.checks} do not agree"
-                ElementTree.SubElement(case, "failure", message=why).text = _clean(text)
+                ElementTree.SubElement(case, "failure", message=why).text = xml_text(text)
     return bytes(ElementTree.tostring(suites, encoding="utf-8", xml_declaration=True))
 
 
@@ -74,8 +75,3 @@ def _html_row(row: Row) -> str:
     bad = " class=bad" if row.differences else ""
     share = percent(_share(row))
     return f"<tr{bad}><td>{escape(row.operation)}<td>{row.ones}<td>{row.others}<td>{share}<td>{wrong}</tr>"
-
-
-def _clean(text: str) -> str:
-    """Remove characters that XML cannot hold."""
-    return "".join(c for c in text if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
+from roboglot.hosting.visible import xml_text
 from roboglot.testing.artifacts import folder_of, save
 from roboglot.testing.scenarios.checks import Checker
 from roboglot.testing.scenarios.files import Found
@@ -73,22 +74,16 @@ def junit(outcomes: Sequence[Outcome]) -> bytes:
         time=f"{sum(o.seconds for o in outcomes):.3f}",
     )
     for outcome in outcomes:
-        names = {"classname": str(outcome.found.path), "name": outcome.found.scenario.name}
+        names = {"classname": xml_text(str(outcome.found.path)), "name": xml_text(outcome.found.scenario.name)}
         case = ElementTree.SubElement(suite, "testcase", names, time=f"{outcome.seconds:.3f}")
         if outcome.failures:
             kind = "error" if outcome.broken else "failure"
-            ElementTree.SubElement(case, kind, message=_clean(outcome.failures[0])).text = _clean(
-                "\n".join(outcome.failures)
-            )
+            failure = ElementTree.SubElement(case, kind, message=xml_text(outcome.failures[0]))
+            failure.text = xml_text("\n".join(outcome.failures))
         if outcome.left:
             lines = "\n".join(f"[[ATTACHMENT|{path}]]" for path in outcome.left)
-            ElementTree.SubElement(case, "system-out").text = lines
+            ElementTree.SubElement(case, "system-out").text = xml_text(lines)
     root = ElementTree.Element("testsuites")
     root.append(suite)
     document: bytes = ElementTree.tostring(root, "utf-8", xml_declaration=True)
     return document
-
-
-def _clean(text: str) -> str:
-    """Replace characters that XML cannot carry."""
-    return "".join(c if c in "\t\n" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF) else "\ufffd" for c in text)
