@@ -26,8 +26,8 @@ ROUNDS_MAX = 200  # of the event loop
 LEAD, LEAD_MAX = 0.03, 0.1  # robot s by which a patient clock may be ahead of the world, at 1 x and at great speeds
 LEAD_REAL = 0.002  # real s that the lead must last: timers are no finer than half of that
 THOUGHT, THOUGHT_MAX = 0.5, 60.0  # robot s that a robot's computation takes at most, real s that time waits for it
-HASTE = 0.25  # share by which a patient clock that stood runs faster than asked
-OWED_MAX = 0.5  # real s that it makes up for
+HASTE = 0.25  # share by which a patient clock runs faster after it stood still
+OWED_MAX = 0.5  # real s that it makes up for at most
 STANDING = 0.002  # real s between two checks of a patient clock that stands still
 LOCKSTEP_EPOCH = 1_767_225_600.0  # 2026-01-01T00:00:00Z: lockstep traces contain no real date
 
@@ -120,14 +120,14 @@ class RealClock(Clock):
 class PatientClock(RealClock):
     """A real clock that waits for the world and for what robots compute: on a slow machine robot time falls behind.
 
-    It leads the world by LEAD to LEAD_MAX, and a computation under way by THOUGHT. For the time that it stood it then
-    runs faster by HASTE; what it stood longer than OWED_MAX is lost, and counted in ``behind``. Before the first call
-    of ``reached`` it does not wait for the world.
+    It may be ahead of the world by LEAD to LEAD_MAX, and of a computation by THOUGHT. After it stood still, it runs
+    faster by HASTE to make up for up to OWED_MAX; any more is lost, and counted in ``behind``. Until the first call of
+    ``reached`` it does not wait for the world.
     """
 
     def __init__(self, speed: float = 1.0) -> None:
-        self._reach = self._limit = math.inf  # robot time that the world allows; at which the clock stands
-        self._thoughts: dict[object, float] = {}  # robot time until which each may take
+        self._reach = self._limit = math.inf  # robot time that the world allows; at which the clock stands still
+        self._thoughts: dict[object, float] = {}  # robot time that each allows
         self._owed = 0.0  # robot s at the anchor
         super().__init__(speed)
 
@@ -136,7 +136,7 @@ class PatientClock(RealClock):
         return now if now < self._limit else self._limit
 
     def _wanted(self, real: float) -> float:
-        """Return robot time, but for what the clock waits for."""
+        """Return robot time as if the clock waited for nothing."""
         (anchor, robot), owed = self._anchor, self._owed
         passed = (real - anchor) * self._speed
         now = robot + passed
@@ -165,7 +165,7 @@ class PatientClock(RealClock):
             self._wait_anew()
 
     def _wait_anew(self) -> None:
-        """Note the time that the clock stood at its limit, and set the next one."""
+        """Note the time that the clock stood still at its limit, and set the next limit."""
         now, (real, robot) = time.monotonic(), self._anchor
         if self._wanted(now) > self._limit:
             owed = min(robot + (now - real) * self._speed + self._owed, self._until) - self._limit

@@ -1,8 +1,8 @@
-"""Longer jobs in slices, between which the event loop serves its sockets. Knows no robot and no clock.
+"""Runs longer jobs in slices, between which the event loop serves its sockets. Knows no robot and no clock.
 
-A request of several steps (over gRPC, seven turns of the loop) would wait for a slice at each of them, if there were
-one in every turn. So after a slice the loop first serves what there is to serve, and the threads that bring a request's
-next step have a moment for that; but jobs that are long behind have a slice in every turn.
+With a slice in every turn of the loop, a request of several steps (seven turns over gRPC) would wait for a slice at
+each of them. So after a slice, sockets are served until nothing has come for a moment, in which threads can bring the
+next step of a request. Jobs that have waited too long get a slice in every turn.
 """
 
 from __future__ import annotations
@@ -13,30 +13,30 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-SLICE = 0.001  # real s of jobs after which the loop sees to its sockets
-SERVING = 0.003  # real s for which sockets may keep waiting jobs from their next slice
-IDLE = 0.0003  # real s without anything to serve after which it begins
-BEHIND_MAX = 0.2  # real s since jobs wait without end, after which sockets keep them no longer
-TURN = 0.00005  # real s of a turn of the loop in which it served something
+SLICE = 0.001  # real s of jobs, after which the loop serves its sockets
+SERVING = 0.003  # real s for which sockets may delay the next slice
+IDLE = 0.0003  # real s without anything to serve, after which the next slice begins
+BEHIND_MAX = 0.2  # real s of waiting jobs, after which sockets delay them no longer
+TURN = 0.00005  # real s; a longer turn of the loop has served something
 
 
 class Slices:
-    """Jobs that wait for their turn. ``speed``: robot s in a real one; for greater ones, sockets keep jobs less."""
+    """Jobs that wait for their turn. ``speed``: robot s per real s; the higher, the less sockets delay jobs."""
 
     def __init__(self) -> None:
         self.speed = 1.0
         self._jobs: deque[Callable[[], None]] = deque()
-        self._turn: asyncio.Handle | None = None  # of the next of them, or of the one under way
+        self._turn: asyncio.Handle | None = None  # of the next slice, or the one under way
         self._ends = self._ended = -math.inf  # real s: of the slice under way, and of the last one
-        self._armed = self._served = self._behind = -math.inf  # real s: when the turn, something else, waiting began
+        self._armed = self._served = self._behind = -math.inf  # real s: begin of the turn, of other work, of waiting
 
     @property
     def over(self) -> bool:
-        """True if the slice under way, or the last one, has taken its time."""
+        """True if the slice under way, or the last one, has used up its time."""
         return time.perf_counter() >= self._ends
 
     def add(self, job: Callable[[], None], *, first: bool) -> None:
-        """Run ``job`` after those that wait, or ``first``."""
+        """Run ``job`` after the waiting ones, or (``first``) before them."""
         if first:
             self._jobs.appendleft(job)
         else:
@@ -50,7 +50,7 @@ class Slices:
         self._turn = asyncio.get_running_loop().call_soon(self._work)
 
     def _work(self) -> None:
-        """Run jobs for one SLICE, unless there was something to serve just now."""
+        """Run jobs for one SLICE, unless sockets have just been served."""
         now = time.perf_counter()
         if now >= self._armed + TURN:
             self._served = now
