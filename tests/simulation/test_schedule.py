@@ -19,7 +19,7 @@ def recorder(calls: Calls, name: str) -> Callable[[int, float], None]:
 
 def run(schedule: Schedule, ticks: range) -> None:
     for tick in ticks:
-        for _, call, seconds in schedule.due(tick):
+        for call, seconds in schedule.due(tick):
             call(tick, seconds)
 
 

@@ -68,13 +68,11 @@ class SimulatedRobot:
 
     def control(self, tick: int) -> None:
         """Run the parts' control that is due, before the physics of a tick."""
-        self.controls.begin(tick - (self.before or 0))
-        self._context.run(self.controls.run)
+        self._context.run(self.controls.run, tick - (self.before or 0))
 
     def sense(self, tick: int, stamp: float) -> None:
         """Run the sensing that is due of the parts that are not sensed together, after the physics of a tick."""
-        self.senses.begin(tick - (self.before or 0))
-        self._context.run(self.senses.run_at, stamp)
+        self._context.run(self.senses.run_at, tick - (self.before or 0), stamp)
 
     def together(self, name: str) -> tuple[object, Sense] | None:
         """Return the part of this name with its sensing, to be sensed for all robots at once; None: there is none."""

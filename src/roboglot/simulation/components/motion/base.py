@@ -30,7 +30,7 @@ class SimulatedBase(Base):
     """
 
     def __init__(self, section: BaseSection, hull: Hull) -> None:
-        self.duty = Duty()  # while speeds change or something limits them
+        self.duty = Duty()  # while the speed is not the commanded one
         self.when_fast: list[Duty] = []  # start when it moves faster than SLOW, or is to
         self.wheels = wheels = Wheels(section, self._rewired)
         self.limits = BaseLimits(
@@ -122,6 +122,12 @@ class SimulatedBase(Base):
     def hindrance(self, command: Twist | WheelSpeeds) -> Blocked | None:
         return self.hindrances.blocks(self._twist_of(command).x)
 
+    def slow_to(self, pace: float) -> None:
+        """Drive no faster than ``pace`` (m/s) from now on; inf: as commanded."""
+        self.hindrances.pace = pace
+        if self._twist.speed > pace:
+            self.duty.begin()
+
     def steer(self, rate: float | None) -> None:
         """Turn at ``rate`` (rad/s) instead of the commanded rate from now on; None: as commanded."""
         self._steered = rate
@@ -168,8 +174,7 @@ class SimulatedBase(Base):
             self._twist = Twist(self._twist.x * share, self._twist.y * share, self._twist.yaw)
             self._speeds = self.wheels.speeds_of(self._twist)
         self._turn_wheels(self._twist)
-        limited = self.hindrances.bars or pace < math.inf or self.wheels.dead or self._steered is not None
-        if self._twist is self._target and not limited:
+        if self._twist is self._target:
             self.duty.end()
 
     def _turn_wheels(self, twist: Twist) -> None:

@@ -16,11 +16,12 @@ class Hindrances:
     """``bars``: by holder, whether driving ahead and behind is barred, and the reason.
 
     ``touching``: directions (unit vectors, base_link) in which the hull touches something. ``duty``: the base's.
+    ``pace``: speed that obstacles ahead permit, m/s; inf: any.
     """
 
     def __init__(self, duty: Duty) -> None:
         self._duty = duty
-        self._pace = math.inf
+        self.pace = math.inf
         self.bars: dict[str, tuple[bool, bool, str]] = {}
         self.touching: tuple[tuple[float, float], ...] = ()
 
@@ -31,17 +32,6 @@ class Hindrances:
             self._duty.begin()
         else:
             self.bars.pop(who, None)
-
-    @property
-    def pace(self) -> float:
-        """Speed that obstacles ahead permit, m/s; inf: any."""
-        return self._pace
-
-    @pace.setter
-    def pace(self, speed: float) -> None:
-        self._pace = speed
-        if speed < math.inf:
-            self._duty.begin()
 
     def blocks(self, way: float) -> Blocked | None:
         """Return the error for driving ``way`` m/s forwards; None: it is not barred."""
