@@ -31,6 +31,7 @@ class SimulatedBase(Base):
 
     def __init__(self, section: BaseSection, hull: Hull) -> None:
         self.duty = Duty()  # while the speed is not the commanded one
+        self.when_driven: list[Callable[[], None]] = []  # called when the wheels' speed changes
         self.when_fast: list[Duty] = []  # start when it moves faster than SLOW, or is to
         self.wheels = wheels = Wheels(section, self._rewired)
         self.limits = BaseLimits(
@@ -180,6 +181,8 @@ class SimulatedBase(Base):
     def _turn_wheels(self, twist: Twist) -> None:
         """Command the hull's wheels, of which some may be dead."""
         self._twist = twist
+        for notice in self.when_driven:
+            notice()
         self._hull.drive(self.velocity if self.wheels.dead else twist)
         self._hull.note_wheels(twist, slack=self._free or bool(self.wheels.dead))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from msgspec import Struct
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from roboglot.model.components.motion.emergency_braking import EmergencyBraking
 from roboglot.model.components.sensing.lidar import Lidar
-from roboglot.model.events import EventStream, ObstacleBraked
+from roboglot.model.events import EventStream, ObstacleBraked, ScanTaken
 from roboglot.model.sensing import LaserScan
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
@@ -37,29 +38,36 @@ class SimulatedEmergencyBraking(EmergencyBraking):
         self, section: EmergencyBrakingSection, radius: float, base: SimulatedBase, lidar: Lidar, events: EventStream
     ) -> None:
         self._section, self._radius, self._base, self._lidar, self._events = section, radius, base, lidar, events
-        self.duty, self._braking = Duty(on=section.on), False
+        self.duty, self._enabled, self._braking = Duty(), section.on, False
+        base.when_driven.append(self._wake)
+        events.listen(ScanTaken, self._wake)
         self._seen: LaserScan | None = None
         self._free = (math.inf, math.inf)  # m ahead of the hull and behind it
 
     @property
     def enabled(self) -> bool:
-        return self.duty.on
+        return self._enabled
 
     def enable(self, on: bool) -> None:
-        if on:
-            self.duty.begin()
-        else:
-            self.duty.end()
+        self._enabled = on
+        self._wake()
+        if not on:
             self._hold(0.0, ahead=False, behind=False)
 
     @property
     def braking(self) -> bool:
         return self._braking
 
+    def _wake(self, *_: object) -> None:
+        """Check in this tick: the speed changes, or there is a new scan."""
+        if self._enabled:
+            self.duty.begin()
+
     def sense(self, stamp: float, _seconds: float) -> None:
         """Check the free distances, if driving or braking."""
         speed = self._base.velocity.x
-        if not self.duty.on or (abs(speed) < SLOW and not self._braking):
+        if not self._enabled or (abs(speed) < SLOW and not self._braking):
+            self.duty.end()
             return
         scan = self._lidar.scan
         if scan is not self._seen:
@@ -69,6 +77,8 @@ class SimulatedEmergencyBraking(EmergencyBraking):
         ahead = (speed > SLOW or self._braking) and self._free[0] < reach
         behind = (speed < -SLOW or self._braking) and self._free[1] < reach
         self._hold(stamp, ahead=ahead, behind=behind)
+        if not self._braking:
+            self.duty.end()  # until the speed changes, or the next scan
 
     def _hold(self, stamp: float, *, ahead: bool, behind: bool) -> None:
         left = max(0.0, self._free[0] if ahead else self._free[1])
@@ -81,14 +91,21 @@ class SimulatedEmergencyBraking(EmergencyBraking):
 
 def _free(scan: LaserScan, radius: float) -> tuple[float, float]:
     """Return the distances between hull and nearest hit in its driving strip, ahead and behind, m."""
-    seen: NDArray[np.bool_] = np.isfinite(scan.ranges)
-    ranges, angles = scan.ranges[seen], scan.angles[seen] + scan.mount.yaw
-    x, y = ranges * np.cos(angles) + scan.mount.x, ranges * np.sin(angles) + scan.mount.y
-    strip = np.abs(y) < radius + SIDE
-    rim = np.sqrt(np.maximum(0.0, radius * radius - y[strip] ** 2))
-    along = x[strip]
-    ahead, behind = along[along > 0.0] - rim[along > 0.0], -along[along < 0.0] - rim[along < 0.0]
-    return float(ahead.min(initial=math.inf)), float(behind.min(initial=math.inf))
+    mount, ranges = scan.mount, scan.ranges
+    cosines, sines = _ways(len(ranges), scan.angle_min + mount.yaw, scan.angle_increment)
+    with np.errstate(invalid="ignore"):  # of rays straight ahead that meet nothing
+        y = ranges * sines + mount.y
+    strip = np.flatnonzero(np.abs(y) < radius + SIDE)
+    along, y = ranges[strip] * cosines[strip] + mount.x, y[strip]
+    away = np.abs(along) - np.sqrt(np.maximum(0.0, radius * radius - y * y))
+    return float(away[along > 0.0].min(initial=math.inf)), float(away[along < 0.0].min(initial=math.inf))
+
+
+@lru_cache(maxsize=8)
+def _ways(rays: int, first: float, step: float) -> NDArray[np.float64]:
+    """Return cosines and sines of the rays' directions (2, n)."""
+    angles = first + step * np.arange(rays)
+    return np.stack((np.cos(angles), np.sin(angles)))
 
 
 def _fit(fit: Fitting) -> SimulatedEmergencyBraking:
