@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import math
 import random
 
 import mujoco
@@ -189,3 +190,32 @@ async def test_rising_robot_meets_what_hangs_above(simulate: Simulate, *, compil
     await simulation.clock.advance(5.0)
     assert hull.touches
     assert hull.belly + hull.body.hull.torso_height < 0.32
+
+
+async def test_robot_that_leans_glides(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
+    simulation = simulate("empty", start=Pose(4.0, 5.0))
+    await settled(simulation)
+    base, hull = simulation.robot[Base], simulation.world._physics.hulls["a"]
+    simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(0.6)), (0.2, 0.2, 0.5))
+    base.set_velocity(Twist(0.3))
+    await simulation.clock.advance(3.0)
+    assert hull.touches
+    base.set_velocity(Twist(yaw=1.0))
+    await simulation.clock.advance(0.2)
+    steps = list[int]()
+    step = mujoco.mj_step
+
+    def noting(model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
+        steps.append(nstep)
+        step(model, data, nstep=nstep)
+
+    monkeypatch.setattr(mujoco, "mj_step", noting)
+    (touch, *_), turned = hull.touches, hull.turned
+    await simulation.clock.advance(0.5)
+    assert steps == []
+    (after, *_), turn = hull.touches, hull.turned - turned
+    assert math.atan2(after.y, after.x) == pytest.approx(math.atan2(touch.y, touch.x) - turn, abs=1e-6)
+    base.set_velocity(Twist(-0.3))
+    await simulation.clock.advance(1.0)
+    assert steps
+    assert not hull.touches

@@ -147,6 +147,21 @@ async def test_the_emergency_stop_cancels_and_refuses_until_released(hermes):
     assert [event.engaged for event in heard.drain()] == [True, False, True, False]
 
 
+async def test_emergency_braking_looks_once_a_scan(hermes):
+    sim = hermes(start=Pose(2, 5))
+    duty, begun = sim.robot[EmergencyBraking].duty, []
+    changed = duty.changed
+    duty.changed = lambda on: (begun.append(on), changed(on))
+    sim.robot[Base].set_velocity(Twist(0.3))
+    await sim.clock.advance(1.0)
+    assert sim.robot[Base].velocity == Twist(0.3)
+    assert sum(begun) > 15  # while the speed changed
+    begun.clear()
+    await sim.clock.advance(1.0)
+    assert sum(begun) == 10
+    assert not duty.on
+
+
 async def test_with_the_brake_released_people_can_push_it(hermes):
     sim = hermes()
     stop, hull = sim.robot[EmergencyStop], sim.world._physics.hulls["a"]

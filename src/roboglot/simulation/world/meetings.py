@@ -103,12 +103,12 @@ class Meetings:
             self._model.opt.disableflags = flags | NO_CONTACTS if off else flags & ~NO_CONTACTS
 
     def _as_expected(self, hull: Hull) -> bool:
-        return hull.support.sprung and not (hull.disturbed or (hull.rests and not _rests(hull)))
+        return hull.support.sprung and not (hull.disturbed or (hull.rests and not rests(hull)))
 
     def _is_calm(self) -> bool:
         """Return whether all robots stand on springs without contact forces; note which of them rest."""
         for hull in self._hulls:
-            hull.rests, hull.disturbed = _rests(hull), False
+            hull.rests, hull.disturbed = rests(hull), False
         return not self._data.nefc and all(hull.support.sprung and not hull.touches for hull in self._hulls)
 
     def _there(self) -> tuple[NDArray[np.int64], list[float], list[float]]:
@@ -158,7 +158,7 @@ class Meetings:
         return min(HORIZON, float(times.min()))
 
 
-def _rests(hull: Hull) -> bool:
+def rests(hull: Hull) -> bool:
     """Return whether a robot neither drives nor moves, its torso included."""
     vx, vy, vz, _ = hull.motion
     return not hull.pulls and max(abs(vx), abs(vy), abs(vz)) < STILL

@@ -30,7 +30,7 @@ from roboglot.simulation.people.people import keyed
 from roboglot.simulation.people.person_state import STRIDE_MAX
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.gliding import Gliding
-from roboglot.simulation.world.meetings import Meetings
+from roboglot.simulation.world.meetings import Meetings, rests
 from roboglot.simulation.world.rays import Rays
 from roboglot.simulation.world.scene import TIMESTEP, VISITORS_MAX, build, visitors
 
@@ -84,7 +84,7 @@ class Physics:
         self.rays = Rays(model, self._data)
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
         self.obstacles: dict[int, tuple[int, Solid]] = {}  # by its number: floor and box
-        self._touched: set[Hull] = set()
+        self._touched: dict[Hull, list[tuple[float, float]]] = {}  # where (world, m)
         self._feet = sum(model.geom(geom).name.split(" ")[-1] == "foot" for geom in range(model.ngeom))
         self._feet += sum(len(hull.wheels) for hull in self.hulls.values())
         self._light = {
@@ -107,7 +107,7 @@ class Physics:
 
         ``meanwhile`` is called after every small step with its length (s), for objects too fast for a whole tick.
         """
-        self._meetings.look(seconds, touched=bool(self._touched))
+        self._meetings.look(seconds, touched=self._pressed)
         if meanwhile is None and self._meetings.off:
             if self._sleep.lasts:
                 self.rays.outdate()
@@ -139,9 +139,15 @@ class Physics:
 
     def course(self) -> Course | None:
         """Return what a kernel needs to do several ticks; None: the next one needs MuJoCo, or there are no kernels."""
-        if self._gliding is None or not self.glides or self._touched:
+        if self._gliding is None or not self.glides or self._pressed:
             return None
         return Course(self._gliding, self._sleep, self._meetings.known)
+
+    @property
+    def _pressed(self) -> bool:
+        """True if contacts must be searched for: something presses on a hull, moves at it, or was put there."""
+        leans = not self._data.nefc and all(map(_leans, self._touched))
+        return bool(self._touched) and not (leans and self._meetings.known)
 
     def moved(self, *, awake: bool, known: bool) -> None:
         """Note that a kernel moved everything, or (not ``awake``) nothing moves; ``known``: as in the course."""
@@ -151,6 +157,9 @@ class Physics:
             self._meetings.note()
         if awake:
             self._sleep.wake()
+        for hull, places in self._touched.items():  # it may turn
+            seen = (hull.seen_from(*place) for place in places)
+            hull.touches = [touch._replace(x=x, y=y) for touch, (x, y) in zip(hull.touches, seen, strict=True)]
 
     def end(self, stage: int, count: int, seconds: float) -> None:
         """Do the rest of a tick's physics after the kernel has stopped at ``stage`` and returned ``count``."""
@@ -288,7 +297,7 @@ class Physics:
         before = self._touched
         for hull in before:
             hull.touches = []
-        self._touched = set()
+        self._touched = {}
         data = self._data
         # A caster's contact is frictionless: one constraint. Only a touching hull causes more constraints than contacts
         # (limp legs do, too, at the price of a needless check) or more contacts than feet, and checking is expensive.
@@ -307,7 +316,9 @@ class Physics:
             self._note_touch(a, b, (x, y), distance, before)
             self._note_touch(b, a, (x, y), distance, before)
 
-    def _note_touch(self, mine: int, other: int, at: tuple[float, float], distance: float, before: set[Hull]) -> None:
+    def _note_touch(
+        self, mine: int, other: int, at: tuple[float, float], distance: float, before: Container[Hull]
+    ) -> None:
         touched = self._hull_of.get(mine)
         if touched is None or other in self._docks or (distance > 0.0 and touched not in before):
             return
@@ -315,7 +326,12 @@ class Physics:
             for duty in touched.when_touched:
                 duty.begin()
         touched.touches.append(HullContact(*touched.seen_from(*at), other in self._persons, other in self._light))
-        self._touched.add(touched)
+        self._touched.setdefault(touched, []).append(at)
+
+
+def _leans(hull: Hull) -> bool:
+    """Return whether a touched hull stands, possibly turning, at things that stand as well."""
+    return rests(hull) and not any(touch.person for touch in hull.touches)
 
 
 class Course(NamedTuple):

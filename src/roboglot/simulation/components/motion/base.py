@@ -123,12 +123,6 @@ class SimulatedBase(Base):
     def hindrance(self, command: Twist | WheelSpeeds) -> Blocked | None:
         return self.hindrances.blocks(self._twist_of(command).x)
 
-    def slow_to(self, pace: float) -> None:
-        """Drive no faster than ``pace`` (m/s) from now on; inf: as commanded."""
-        self.hindrances.pace = pace
-        if self._twist.speed > pace:
-            self.duty.begin()
-
     def steer(self, rate: float | None) -> None:
         """Turn at ``rate`` (rad/s) instead of the commanded rate from now on; None: as commanded."""
         self._steered = rate

@@ -33,6 +33,12 @@ class Hindrances:
         else:
             self.bars.pop(who, None)
 
+    def limit(self, pace: float, speed: float) -> None:
+        """Permit this pace (m/s) from now on, to a base that has this speed (m/s)."""
+        self.pace = pace
+        if speed > pace:
+            self._duty.begin()
+
     def blocks(self, way: float) -> Blocked | None:
         """Return the error for driving ``way`` m/s forwards; None: it is not barred."""
         for who, (ahead, behind, reason) in self.bars.items():

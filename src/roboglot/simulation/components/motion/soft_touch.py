@@ -41,16 +41,17 @@ class SoftTouch:
         twist, base = self._base.wanted, self._base
         slow = twist.speed <= (max(SLOW, self._speed) if math.isinf(base.hindrances.pace) else self._speed)
         if slow:
-            base.slow_to(math.inf)
+            base.hindrances.pace = math.inf
             self.duty.end()
             return
         if zone_of(twist.x, twist.y) in self._bumper.masked:
-            base.slow_to(math.inf)
+            base.hindrances.pace = math.inf
             return
         now = max(base.velocity.speed, self._speed)
         reach = (now * now - self._speed**2) / (2.0 * DECELERATION) + now * REACTION + 2.0 * self._hull.body.hull.radius
         free = self._free(twist, reach) - now * REACTION
-        base.slow_to(math.sqrt(self._speed**2 + 2.0 * DECELERATION * max(0.0, free)))
+        pace = math.sqrt(self._speed**2 + 2.0 * DECELERATION * max(0.0, free))
+        base.hindrances.limit(pace, base.velocity.speed)
 
     def _free(self, twist: Twist, reach: float) -> float:
         """Return the distance from the hull to an upright obstacle towards ``twist`` (base_link), m; inf: none near."""
