@@ -90,7 +90,8 @@ def check(code: Code, answer: Mapping[str, Any], words: type[IntEnum] | None = N
         value = answer.get(key)
         if value is None or value is True or (value == 0 and value is not False):
             continue
-        number = int(answer.get("code", value) or 0)
+        said = answer.get("code", value)
+        number = int(said) if isinstance(said, int | float) else 0
         name = str(answer.get("message", "")) or "the robot did not do it"
         if words and number in tuple(words):
             name = words(number).name.lower().replace("_", " ")

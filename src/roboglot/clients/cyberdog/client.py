@@ -39,6 +39,7 @@ from roboglot.clients.cyberdog.values import PUSHED, Value
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
+from roboglot.transport.seldom import Seldom
 from roboglot.wire.cyberdog.channel import APP_PORT, ROBOT_PORT
 from roboglot.wire.cyberdog.chapters.camera import BadSignal, read_signal
 from roboglot.wire.cyberdog.codes import Code
@@ -82,6 +83,7 @@ class CyberDogClient(
         clock: Clock | None = None,
     ) -> None:
         clock = clock or RealClock()
+        self._seldom = Seldom(log)
         Calls.__init__(self, DogLink(host, port, certificates, clock, app_port=app_port, pushed=self._pushed))
         self.signals = _feed()
         self._feeds: dict[int, Feed[Any]] = {int(code): _feed() for code in PUSHED}
@@ -131,7 +133,7 @@ class CyberDogClient(
             else:
                 log.debug("unknown push %d", code)
         except (msgspec.MsgspecError, NotJson, BadSignal) as error:
-            log.warning("cannot read push %d: %s", code, error)
+            self._seldom.warning(str(code), "cannot read push %d: %s", code, error)
 
 
 def _feed() -> Feed[object]:

@@ -10,22 +10,19 @@ import ipaddress
 import re
 from collections.abc import AsyncGenerator, Callable
 from pathlib import Path
+from typing import NoReturn
 
 import grpc
 
-from roboglot.clients.errors import LinkLost, TimedOut
+from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
 from roboglot.model.clock import Clock
 from roboglot.model.tap import LOST, Line
 from roboglot.transport.wakes import prompt_wakes
 from roboglot.values import dataclass
-from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, client_options
+from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, SERVICE, client_options
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
+from roboglot.wire.cyberdog.messages import reading
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
-from roboglot.wire.cyberdog.proto.cyberdog_app_pb2_grpc import (
-    GrpcAppServicer,
-    GrpcAppStub,
-    add_GrpcAppServicer_to_server,
-)
 
 REDIAL_MAX = 2000  # ms between two attempts to connect
 PUSH_MAX = 5_242_880  # bytes per message
@@ -107,7 +104,7 @@ class DogLink:
         self.line: Line | None = None  # records requests, answers and pushes
         self._host, self._port, self._certificates, self._pushed = host, port, certificates, pushed
         self._channel: grpc.aio.Channel | None = None
-        self._stub: GrpcAppStub | None = None
+        self._calls: _Calls | None = None
         self._server: grpc.aio.Server | None = None
         self._stopping: asyncio.Future[object] | None = None
 
@@ -127,14 +124,14 @@ class DogLink:
                 self._channel = grpc.aio.secure_channel(where, credentials, options=options)
             else:
                 self._channel = grpc.aio.insecure_channel(where, options=options)
-        self._stub = GrpcAppStub(self._channel)
+        self._calls = _Calls(self._channel)
         if self.app_port is not None:
             await self._serve(self.app_port, self._channel)
 
     async def _serve(self, port: int, channel: grpc.aio.Channel) -> None:
         limits = [("grpc.so_reuseport", 0), ("grpc.max_receive_message_length", PUSH_MAX)]
         self._server = grpc.aio.server(options=[*limits, ("grpc.http2.min_ping_interval_without_data_ms", 500)])
-        add_GrpcAppServicer_to_server(_App(self), self._server)
+        self._server.add_generic_rpc_handlers((_App(self).handlers,))
         where = f"{'127.0.0.1' if _on_this_machine(self._host) else '0.0.0.0'}:{port}"
         try:
             if self._certificates:
@@ -157,21 +154,23 @@ class DogLink:
         if self._stopping:
             await asyncio.shield(self._stopping)
         if self._channel:
-            self._stub = None
+            self._calls = None
             await self._channel.close()
 
-    def _robot(self) -> GrpcAppStub:
-        if self._stub is None:
+    def _robot(self) -> _Calls:
+        if self._calls is None:
             raise LinkLost("disconnected")
-        return self._stub
+        return self._calls
 
     async def send(self, code: int, text: str) -> AsyncGenerator[tuple[int, str], None]:
-        """Yield the answers to one request as (code, text) until the robot ends it. Raises LinkLost."""
-        call = self._robot().sendMsg(pb.SendRequest(nameCode=code, params=text))
+        """Yield the answers to one request as (code, text) until the robot ends it. Raises LinkLost, BadAnswer."""
+        call = self._robot().send(pb.SendRequest(nameCode=code, params=text))
         line = self.line if self.line is not None and self.line.watched else None
         began = 0.0 if line is None else line.request(str(int(code)), text)
         try:
             async for answer in call:
+                if answer is None:
+                    raise BadAnswer(f"{code}: the robot sent bytes that are no answer")
                 if line is not None:
                     found = IN_BAND.search(answer.data)
                     refusal = f"error_code {found[1]}" if found else ""
@@ -185,12 +184,14 @@ class DogLink:
             call.cancel()
 
     async def fetch(self, code: int, text: str) -> AsyncGenerator[pb.FileChunk, None]:
-        """Yield the chunks of a file. Raises LinkLost."""
-        call = self._robot().getFile(pb.SendRequest(nameCode=code, params=text))
+        """Yield the chunks of a file. Raises LinkLost, BadAnswer."""
+        call = self._robot().fetch(pb.SendRequest(nameCode=code, params=text))
         line = self.line if self.line is not None and self.line.watched else None
         began = 0.0 if line is None else line.request(str(int(code)), text)
         try:
             async for chunk in call:
+                if chunk is None:
+                    raise BadAnswer(f"{code}: the robot sent bytes that are no part of a file")
                 if line is not None:
                     line.reply(str(int(code)), chunk.SerializeToString(), "ok", "", began)
                 yield chunk
@@ -211,13 +212,33 @@ class DogLink:
         return self.heartbeat
 
 
-class _App(GrpcAppServicer):
+class _Calls:
+    """The robot's calls over one channel; bytes that are no answer become None."""
+
+    def __init__(self, channel: grpc.aio.Channel) -> None:
+        written = pb.SendRequest.SerializeToString
+        answer, chunk = reading(pb.RecResponse.FromString), reading(pb.FileChunk.FromString)
+        self.send = channel.unary_stream(f"/{SERVICE}/sendMsg", written, answer)
+        self.fetch = channel.unary_stream(f"/{SERVICE}/getFile", written, chunk)
+
+
+class _App:
     """The service of the app, which the robot calls."""
 
     def __init__(self, link: DogLink) -> None:
         self._link, self._beats = link, Beats()
+        ticks, pushed = reading(pb.Ticks.FromString), reading(pb.SendRequest.FromString)
+        self.handlers = grpc.method_handlers_generic_handler(
+            SERVICE,
+            {
+                "heartbeat": grpc.unary_unary_rpc_method_handler(self._beat, ticks, pb.Result.SerializeToString),
+                "sendMsg": grpc.unary_stream_rpc_method_handler(self._push, pushed, pb.RecResponse.SerializeToString),
+            },
+        )
 
-    async def heartbeat(self, request: pb.Ticks, _context: object) -> pb.Result:
+    async def _beat(self, request: pb.Ticks | None, rpc: grpc.aio.ServicerContext) -> pb.Result:
+        if request is None:
+            await _refuse(rpc)
         self._link.heartbeat = _heartbeat(request, self._link.clock.time())
         if self._link.line is None or not self._link.line.watched:
             self._beats.forget()
@@ -225,13 +246,21 @@ class _App(GrpcAppServicer):
             self._link.line.push(HEARTBEAT, news)
         return pb.Result(result="ok")
 
-    async def sendMsg(  # noqa: N802 - the service's name
-        self, request: pb.SendRequest, _context: grpc.aio.ServicerContext
+    async def _push(
+        self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext
     ) -> AsyncGenerator[pb.RecResponse, None]:
+        if request is None:
+            await _refuse(rpc)
         if self._link.line is not None and self._link.line.watched:
             self._link.line.push(str(int(request.nameCode)), request.params)
         self._link._pushed(request.nameCode, request.params)
         yield pb.RecResponse(nameCode=request.nameCode, data="{}")
+
+
+async def _refuse(rpc: grpc.aio.ServicerContext) -> NoReturn:
+    """End a call of bytes that are no message. Raises what gRPC does."""
+    await rpc.abort(grpc.StatusCode.INTERNAL, "these bytes are no message")
+    raise AssertionError
 
 
 def _lost(error: grpc.aio.AioRpcError) -> LinkLost:

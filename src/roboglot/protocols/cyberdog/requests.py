@@ -1,7 +1,4 @@
-"""Decoding of requests for gRPC. Malformed bytes reach the door too, which answers them in the protocol's form.
-
-gRPC's own answer to them would be the status UNKNOWN with the name of a Python class, and no line in the log.
-"""
+"""Handlers of gRPC's calls. Malformed bytes reach the door too, which answers them in the protocol's form."""
 
 from __future__ import annotations
 
@@ -10,12 +7,11 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
 import grpc
-from google.protobuf.message import DecodeError
 
 from roboglot.transport.last_messages import ending_with_last
+from roboglot.wire.cyberdog.channel import SERVICE
+from roboglot.wire.cyberdog.messages import reading
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
-
-SERVICE = "grpcapi.GrpcApp"
 
 
 class Calls(Protocol):
@@ -35,20 +31,12 @@ def add_calls(
     server: grpc.aio.Server, calls: Calls, holding: Callable[[], AbstractContextManager[None]] = nullcontext
 ) -> None:
     """Have ``server`` serve ``calls``, ``holding`` what is held while a last answer is sent."""
+    read = reading(pb.SendRequest.FromString)
     written, chunk, result = pb.RecResponse.SerializeToString, pb.FileChunk, pb.Result
     answering = ending_with_last(calls.sendMsg, written, holding)
     methods = {
-        "sendMsg": grpc.unary_stream_rpc_method_handler(answering, _read, written),
-        "getFile": grpc.unary_stream_rpc_method_handler(calls.getFile, _read, chunk.SerializeToString),
+        "sendMsg": grpc.unary_stream_rpc_method_handler(answering, read, written),
+        "getFile": grpc.unary_stream_rpc_method_handler(calls.getFile, read, chunk.SerializeToString),
         "heartbeat": grpc.unary_unary_rpc_method_handler(calls.heartbeat, lambda _: None, result.SerializeToString),
     }
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, methods),))
-
-
-def _read(data: bytes) -> pb.SendRequest | None:
-    request = pb.SendRequest()
-    try:
-        request.ParseFromString(data)
-    except DecodeError:
-        return None
-    return request

@@ -1,7 +1,8 @@
-"""Channel options of both ends: ports, names, limits, keepalive."""
+"""Channel options of both ends: the service, ports, names, limits, keepalive."""
 
 from __future__ import annotations
 
+SERVICE = "grpcapi.GrpcApp"
 ROBOT_PORT = 50052
 APP_PORT = 8981
 ROBOT_NAME = "cyberdog2.server"  # the common names in the two certificates

@@ -1,0 +1,100 @@
+"""Robots that send bytes of any kind: each call fails with a ClientError or succeeds, and the log stays short."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import AsyncIterator, Sequence
+
+import grpc
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from roboglot.clients.cyberdog import CyberDogClient
+from roboglot.clients.errors import BadAnswer, ClientError
+from roboglot.wire.cyberdog.channel import SERVICE
+from roboglot.wire.cyberdog.codes import Code
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+
+ADDRESS = "127.0.0.1"
+PATIENCE = 60.0  # real s
+NONSENSE = (b"\xff\xff", b"\x12\x02\xff\xfe")  # no protobuf; a text that is no UTF-8
+
+
+class Robot:
+    """Answers every request with the same bytes."""
+
+    def __init__(self) -> None:
+        self.answers: Sequence[bytes] = ()
+        self._server = grpc.aio.server()
+        calls = {name: grpc.unary_stream_rpc_method_handler(self._answer) for name in ("sendMsg", "getFile")}
+        self._server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, calls),))
+        self.port = self._server.add_insecure_port(f"{ADDRESS}:0")
+
+    async def __aenter__(self) -> Robot:
+        await self._server.start()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._server.stop(None)
+
+    async def _answer(self, _request: bytes, _context: object) -> AsyncIterator[bytes]:
+        for answer in self.answers:
+            yield answer
+
+
+def said(text: str) -> bytes:
+    return pb.RecResponse(nameCode=Code.STATUS, data=text).SerializeToString()
+
+
+async def failures(answers: Sequence[bytes]) -> list[ClientError]:
+    """Return the errors of the calls of a client to a robot with these answers, one after the other."""
+    found = []
+    async with Robot() as robot, CyberDogClient(ADDRESS, None, port=robot.port, app_port=None) as client:
+        for answer in answers:
+            robot.answers = (answer,)
+            try:
+                async with asyncio.timeout(PATIENCE):
+                    await client.do(Code.STATUS)
+            except ClientError as error:
+                found.append(error)
+    return found
+
+
+async def test_bytes_that_are_no_answer_are_bad_ones(caplog: pytest.LogCaptureFixture) -> None:
+    assert [type(error) for error in await failures(NONSENSE)] == [BadAnswer, BadAnswer]
+    async with Robot() as robot, CyberDogClient(ADDRESS, None, port=robot.port, app_port=None) as client:
+        robot.answers = NONSENSE
+        with pytest.raises(BadAnswer):
+            _ = [chunk async for chunk in client.link.fetch(Code.STATUS, "{}")]
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
+
+
+values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=5), inner, max_size=2),
+    max_leaves=4,
+)
+fields = st.dictionaries(st.sampled_from(("success", "result", "code", "message", "error_code")), values)
+
+
+@settings(max_examples=25, deadline=None)
+@example(['{"success":false,"code":"x"}', '{"result":[],"code":{}}', '{"success":false,"code":2.0}'])
+@given(st.lists(fields.map(json.dumps) | st.text(), max_size=8))
+def test_any_text_is_success_or_an_error_of_clients(texts: list[str]) -> None:
+    asyncio.run(failures([said(text) for text in texts]))
+
+
+@pytest.mark.parametrize("sent", NONSENSE)
+async def test_bytes_that_are_no_push_end_their_call(sent: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    async with (
+        CyberDogClient(ADDRESS, None, port=1, app_port=0) as client,
+        grpc.aio.insecure_channel(f"{ADDRESS}:{client.link.app_port}") as channel,
+    ):
+        with pytest.raises(grpc.aio.AioRpcError) as refused:
+            async with asyncio.timeout(PATIENCE):
+                _ = [answer async for answer in channel.unary_stream(f"/{SERVICE}/sendMsg")(sent)]
+        assert refused.value.code() is grpc.StatusCode.INTERNAL
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
