@@ -52,5 +52,6 @@ def test_lines_to_copy_name_a_program(
     monkeypatch.chdir(tmp_path if inside else tmp_path / "home")
     assert screen.as_typed("roboglot scan 10.0.0.1") == f"{shown.format(tmp_path)} scan 10.0.0.1"
     assert screen.as_typed("curl http://a") == "curl http://a"
+    assert screen.as_typed("WHERE='tcp/a' ros2 topic list") == "WHERE='tcp/a' ros2 topic list"
     monkeypatch.setenv("PATH", str(program.parent))
     assert screen.as_typed("roboglot scan") == "roboglot scan"

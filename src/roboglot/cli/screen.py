@@ -63,7 +63,7 @@ def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: 
 def as_typed(line: str) -> str:
     """Return a command line with the path of this program where the shell does not find it by its name."""
     program, space, arguments = line.partition(" ")
-    path = Path(sys.executable).with_name(program)
+    path = Path(sys.executable).with_name("roboglot")
     if program != "roboglot" or shutil.which(program) or not path.exists():
         return line
     return f"{os.path.relpath(path) if path.is_relative_to(Path.cwd()) else path}{space}{arguments}"
