@@ -10,6 +10,7 @@ import gc
 import inspect
 import math
 import os
+import select
 import signal
 import sqlite3
 import sys
@@ -31,7 +32,9 @@ from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.protocols.door import Option
 
+STANDARD_INPUT = 0
 LINE_MAX = 64  # bytes per line of standard input in lockstep
+FILE_MAX = 1 << 20  # bytes of a file in its place
 STEP_MAX = 86_400.0  # s that one line may advance
 
 
@@ -235,7 +238,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
 
 async def _step(clock: LockstepClock) -> None:
     """Advance by the seconds on each line of standard input; answer each with the time reached."""
-    async for line in _lines():
+    async for line in lines_of(STANDARD_INPUT):
         try:
             seconds = float(line)
         except ValueError:
@@ -247,11 +250,15 @@ async def _step(clock: LockstepClock) -> None:
         print(f"time {clock.time():.3f}", flush=True)
 
 
-async def _lines() -> AsyncIterator[str]:
-    """Yield lines of standard input, until it ends."""
+async def lines_of(descriptor: int) -> AsyncIterator[str]:
+    """Yield the lines of a file, a pipe or a terminal, until it ends or is closed."""
     reader = asyncio.StreamReader(limit=LINE_MAX)
-    with contextlib.suppress(PermissionError, OSError):  # standard input may be a file or closed
-        await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(0))
+    with contextlib.suppress(OSError), os.fdopen(descriptor, "rb") as file:
+        if _can_wait(descriptor):
+            await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), file)
+        else:
+            reader.feed_data(file.read(FILE_MAX))
+            reader.feed_eof()
         while True:
             try:
                 line = await reader.readline()
@@ -260,6 +267,16 @@ async def _lines() -> AsyncIterator[str]:
             if not line:
                 return
             yield line.decode("utf-8", "replace").strip()
+
+
+def _can_wait(descriptor: int) -> bool:
+    """Return whether an event loop can wait for data: not of files and of /dev/null. Raises OSError if closed."""
+    with select.epoll() as poll:
+        try:
+            poll.register(descriptor)
+        except PermissionError:
+            return False
+    return True
 
 
 SIGNATURE = _with_door_options()
