@@ -41,7 +41,7 @@ class Side(asyncio.Protocol):
 
 
 def context(folder: Path | None, names: tuple[str, str], purpose: ssl.Purpose) -> ssl.SSLContext | None:
-    """Return a context that shows this certificate and looks at none."""
+    """Return a context that shows this certificate and checks none."""
     if folder is None:
         return None
     made = ssl.create_default_context(purpose)

@@ -20,7 +20,7 @@ AHEAD, CIRCLE = Twist(0.15, 0.0, 0.0), Twist(0.12, 0.0, 1.0)  # leave docks, the
 
 @dataclass
 class Crowd:
-    """Robots without autonomy in the office, after their start; ``scans`` counts those of all."""
+    """Started robots without autonomy in the office; ``scans``: number of scans of all robots."""
 
     clock: LockstepClock
     world: World
@@ -38,7 +38,7 @@ class Crowd:
 
 
 def drive(base: Base, twist: Twist) -> None:
-    """Drive so, or backwards where something is touched ahead: crowds start close to each other."""
+    """Drive with this velocity, or backwards where the hull touches something ahead: crowds start close together."""
     try:
         base.set_velocity(twist)
     except Collided:

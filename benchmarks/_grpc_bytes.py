@@ -1,4 +1,4 @@
-"""Both ends of gRPC over HTTP/2 and TLS, of bytes that are ready, so that a benchmark's clients cost little.
+"""Both ends of gRPC over HTTP/2 and TLS, with prepared bytes, so that a benchmark's clients cost little.
 
 Real frames to and from a real gRPC: but each call has one request, its headers are always the same ones, and answers'
 headers are not read: a call without a message counts as refused. Flow control is opened wide once.

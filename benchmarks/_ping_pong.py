@@ -1,6 +1,6 @@
-"""The floor under a host call: two processes that say as many bytes to each other over the same kind of socket.
+"""The floor under a host call: two processes that exchange as many bytes over the same kind of socket.
 
-One on the running loop, one blocking, as server and worker are; neither looks at what it reads.
+One on the running loop, one blocking, as server and worker are; neither parses what it reads.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Clients in a process of their own: one for each robot, ten requests a second, and what they saw.
+"""Clients in a process of their own: one for each robot, with ten requests a second; and their observations.
 
 REST clients ask for the pose and have their robot turn, text clients turn theirs and take pushes at 10 Hz, gRPC
 clients send frames that let the dog turn, and take its heartbeats. Some text clients film: they take the video's bytes.
@@ -89,7 +89,7 @@ def percentile(values: list[float], share: float) -> float:
 
 @dataclass(slots=True)
 class Burden:
-    """The clients' own process: how late its loop was when nothing but itself held it up (s), and its cores."""
+    """The clients' own process: delays of its loop that it caused itself (s), and its cores."""
 
     late: list[float] = field(default_factory=list)
     cores: float = 0.0
@@ -143,7 +143,7 @@ class Class:
         return self.seen, self.own
 
     async def beats(self, number: int, kind: str, request: Callable[[int], Awaitable[bool]]) -> None:
-        """Send a request at every beat, each client a little later than the one before; only then count."""
+        """Send a request at every beat, each client a little after the one before it; count once all have begun."""
         await self.ready.wait()
         began, seen = self.began + number / len(self.lesson.robots) / RATE, self.seen[kind]
         for beat in range(round(self.lesson.seconds * RATE)):

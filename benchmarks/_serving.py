@@ -16,7 +16,7 @@ QUIET = 4.0  # s without requests
 
 
 def cpu_seconds(pid: int) -> float:
-    """Processor time of a process so far, all its threads that are and were, to the microsecond."""
+    """Processor time of a process so far, with ended threads, to the microsecond."""
     return time.clock_gettime((~pid << 3) | CPU_CLOCK)
 
 

@@ -41,7 +41,7 @@ def place(clock: LockstepClock | RealClock) -> tuple[World, Robot]:
 
 
 async def draw(claims: Claims, folder: Path | None) -> None:
-    """Time single pictures, scene and all, in place: the best of many, because other work only ever adds."""
+    """Time single pictures with their scene: the best of many, as other work can only add time."""
     world, robot = place(LockstepClock())
     camera = robot[Camera]
     await camera.capture()  # loads the kernels

@@ -1,7 +1,7 @@
 """Claims: >= 3000 short sendMsg/s of a core, >= 0.9 of a bare echo; WebRTC >= 25 pictures/s, first in 2 s, <= 0.5 core.
 
 The bare grpc.aio echo is asked in turns with the robot: same messages and TLS, a handler that does nothing.
-The video part needs Chromium and is left out, with a word, where there is none. Processor time, not the clock, counts.
+The video part needs Chromium, and says so where there is none. Processor time, not the clock, counts.
 """
 
 from __future__ import annotations

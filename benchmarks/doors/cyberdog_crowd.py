@@ -192,7 +192,7 @@ def part(
     address: str,
     *arguments: str,
 ) -> None:
-    """One ``roboglot up`` with these arguments, and what is measured of it."""
+    """Measure one ``roboglot up`` with these arguments."""
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "data"
         with served(data, *arguments, address=address) as robot:

@@ -39,7 +39,7 @@ FLOODED_SECONDS = 8.0  # s of each flood, restarted until then: enough requests 
 
 
 def latencies(attack: subprocess.Popen[bytes] | None) -> list[float]:
-    """ms of each request of a friend, until the attack is over (None: for a while)."""
+    """ms of each request of a well-behaved client, until the attack is over (None: for a while)."""
     text = socket.create_connection((ADDRESS, 40923), 20, source_address=(FRIEND, 0))
     text.sendall(b"command;")
     text.recv(64)

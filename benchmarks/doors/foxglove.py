@@ -55,7 +55,7 @@ async def share(seconds: float) -> float:
 
 
 async def main(robots: int, seconds: float) -> None:
-    """Look and look away by turns, so that both see the same machine."""
+    """Measure with and without viewers in turns, so that both see the same machine."""
     claims = Claims()
     with tempfile.TemporaryDirectory() as folder:
         base = load_config(None, {"data": folder, "world": "office"})

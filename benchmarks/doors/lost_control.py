@@ -1,4 +1,4 @@
-"""Claim: an EP that is driven over the driver stands within 0.5 s of any failure of program or network.
+"""Claim: an EP that is driven by the driver stands within 0.5 s of any failure of program or network.
 
 The robot is our text door in a network of its own, behind a router and, for one row, a relay; the program that drives
 it is another process on the far side. It makes itself root of a network namespace of its own (`unshare`). Times are

@@ -70,7 +70,7 @@ async def opened(door: str, address: str, certificates: str) -> Line:
 async def timed(line: Line, door: str) -> float:
     """Milliseconds of one request."""
     operation, payload = REQUESTS[door]
-    if door == "visual":  # every front end gets every answer; only its own count
+    if door == "visual":  # every front end gets all answers, and counts its own
         payload = payload.replace(b'"b"', b'"b%d"' % next(NUMBERS))
     began = time.perf_counter()
     assert await line.ask(operation, payload, [b"{}"])

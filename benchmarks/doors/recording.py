@@ -48,7 +48,7 @@ async def share(seconds: float) -> float:
 
 
 async def cost(robots: int, seconds: float, claims: Claims) -> None:
-    """Processor and bytes: recording is switched on and off by turns, so that both see the same machine."""
+    """Processor time and bytes; recording is switched on and off in turns, so that both see the same machine."""
     with tempfile.TemporaryDirectory() as folder:
         base = load_config(None, {"data": folder, "world": "office"})
         placed = with_addresses(tuple(RobotConfig(f"r{number}", "universal") for number in range(robots)))

@@ -104,7 +104,7 @@ class Page:
         return str((await self.until(lambda message: message["type"] == "grid"))["code"])
 
     async def join(self, code: str, name: str, pages: list[str]) -> None:
-        """Join from the first world's page, and go on to one's own world."""
+        """Join on the first world's page, and continue in the pupil's own world."""
         await self.open(pages[0], "a1")
         while True:
             await self.say(type="class", do="join", code=code, name=name, id=1)

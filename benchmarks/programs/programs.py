@@ -11,7 +11,6 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Awaitable, Callable
 
 import uvloop
 from _claim import Claims
@@ -65,10 +64,6 @@ async def first_output(run: Run) -> None:
                 run.calls.reply(event.id, None)
             case Failed():
                 raise RuntimeError(event.message)
-
-
-async def median_ms(count: int, once: Callable[[], Awaitable[float]]) -> float:
-    return statistics.median([await once() for _ in range(count)]) * 1000
 
 
 async def start_and_kill(engine: Engine, claims: Claims) -> None:

@@ -56,7 +56,7 @@ KINDS = {
 
 
 class Line:
-    """One connection that is asked again and again: how long each answer takes, s."""
+    """Connection with one request after another; records the time of each answer, s."""
 
     def __init__(self, name: str, ask: Callable[[], Awaitable[object]]) -> None:
         self.name = name

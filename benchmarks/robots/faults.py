@@ -91,7 +91,7 @@ time_t time(time_t *there) {
 
 @dataclass(frozen=True)
 class Sight:
-    """Observation of a node's watcher: a robot that let itself be driven ("drove"), or kept a place ("saved")."""
+    """Observation of a node's watcher: a robot obeyed ("drove"), or stored a place ("saved")."""
 
     at: float
     node: str
@@ -261,7 +261,7 @@ class Fleet:
 
 
 def judge(claims: Claims, fleet: Fleet, name: str, began: float, ended: float) -> None:
-    """Say how long each robot could not be driven around a fault, and whether two programs let it be driven."""
+    """Report how long no client could drive each robot around a fault, and whether two programs obeyed."""
     for robot in ROBOTS:
         seen = sorted(
             (sight.at, sight.node)

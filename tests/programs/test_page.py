@@ -53,7 +53,7 @@ def test_place_that_was_known_is_looked_at_again(pair: tuple[Page, mmap.mmap]) -
     ("word", "filling"), [(b"AB" * 4, b"BA" * 4), (b"\1" * 8, b"\1" * 7 + b"\2"), (b"\0" * 7 + b"\1", b"\0" * 8)]
 )
 def test_no_filling_keeps_the_server(pair: tuple[Page, mmap.mmap], word: bytes, filling: bytes) -> None:
-    """Bytes were searched for once, which took half a second here."""
+    """A search by bytes instead of words would take half a second."""
     page, worker = pair
     worker[:WORD] = word
     worker[WORD : WORD * (LINES + 1)] = filling * LINES

@@ -29,9 +29,8 @@ from tests.programs.functions.effects import EFFECTS, Seen
 from tests.programs.staging import Act, Stage
 
 EXAMPLES = examples()
-FIGURE = (
-    2.0  # s that a figure takes here; tests/simulation/bodies/test_performing.py has its real time, up to two minutes
-)
+# s that a figure takes here; tests/simulation/bodies/test_performing.py has its real time, up to two minutes.
+FIGURE = 2.0
 MOTIONS = [f"cyberdog.motion.{name}" for name, _, _ in RESULT_MOTIONS]
 WITH_PEOPLE = [
     name for name in EXAMPLES if name.split(".")[1] in ("follow", "gesture", "personnel", "skeleton", "train")

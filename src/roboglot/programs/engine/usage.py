@@ -20,11 +20,11 @@ class Usage:
     memory: int = 0
 
 
-def usage_of(pid: int, proc: Path = Path("/proc")) -> Usage:
+def usage_of(pid: int) -> Usage:
     """Return the use of one process; zeros if it is gone."""
     with contextlib.suppress(OSError, ValueError, IndexError):
-        _, resident, shared, *_ = (proc / str(pid) / "statm").read_text().split()
-        fields = (proc / str(pid) / "stat").read_text().rpartition(")")[2].split()
+        _, resident, shared, *_ = Path(f"/proc/{pid}/statm").read_text().split()
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         cpu = (int(fields[11]) + int(fields[12])) * _TICK
         return Usage(cpu, max(0, int(resident) - int(shared)) * _PAGE)
     return Usage()

@@ -143,9 +143,9 @@ def _gripping(now: Twist, wanted: Twist, most: float) -> Twist:
     return Twist(_mix(now.x, wanted.x, most / change), _mix(now.y, wanted.y, most / change), wanted.yaw)
 
 
-def straighten(begin: Body, stance: Stance, seconds: float = STRAIGHTEN) -> Iterator[MotionTick]:
+def straighten(begin: Body, stance: Stance) -> Iterator[MotionTick]:
     """Yield the ticks from any body to a straight stand."""
-    for part in _parts(seconds, stance):
+    for part in _parts(STRAIGHTEN, stance):
         yield MotionTick(begin.towards(stance.straight, ease(part)))
 
 
