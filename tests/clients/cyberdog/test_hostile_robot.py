@@ -83,7 +83,7 @@ fields = st.dictionaries(st.sampled_from(("success", "result", "code", "message"
 @settings(max_examples=25, deadline=None)
 @example(['{"success":false,"code":"x"}', '{"result":[],"code":{}}', '{"success":false,"code":2.0}'])
 @given(st.lists(fields.map(json.dumps) | st.text(), max_size=8))
-def test_any_text_is_success_or_an_error_of_clients(texts: list[str]) -> None:
+def test_any_text_is_success_or_clients_error(texts: list[str]) -> None:
     asyncio.run(failures([said(text) for text in texts]))
 
 

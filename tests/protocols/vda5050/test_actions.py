@@ -130,7 +130,7 @@ async def test_a_log_report_is_kept_as_a_file(yard: Opened) -> None:
     assert "it stood still" in text.splitlines()[0]
 
 
-async def test_log_report_is_kept_though_another_removed_old_ones(
+async def test_log_report_is_kept_when_old_ones_go(
     yard: Opened, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = await yard()

@@ -139,7 +139,7 @@ async def test_no_mqtt_ends_the_connection(sent: bytes, dialled: Dialled, refusa
     assert await refusals.get() == "headerId is missing"
 
 
-async def test_of_a_long_message_only_the_beginning_is_kept(
+async def test_only_the_beginning_of_long_messages_is_kept(
     dialled: Dialled, refusals: Refusals, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kept: list[int] = []
