@@ -11,7 +11,7 @@ import logging
 from collections.abc import Awaitable, Callable, Iterable
 from contextlib import nullcontext
 from contextvars import copy_context
-from functools import partial
+from functools import lru_cache, partial
 from inspect import iscoroutinefunction
 from time import perf_counter
 from typing import get_args
@@ -71,6 +71,7 @@ from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
 LOGGED_MAX = 200  # characters of a path or a refusal in a log line
+HEADS_MAX = 64  # heads of responses that are kept
 
 Repeated = Callable[[], bytes | None]  # a whole response, or None: the request has to be read anew
 Send = Callable[[dict[str, object]], Awaitable[None]]
@@ -152,6 +153,8 @@ class Application:
         operation, match = self._found(scope)
         if operation is None or match is None or self._admission.asks or robot.stand_in is not None:
             return None
+        if log.isEnabledFor(logging.DEBUG):
+            return None
         try:
             values = operation.parse(self._parameters.named(operation, match, scope))
             shared = self._admit(scope)
@@ -170,10 +173,10 @@ class Application:
                 headers, body = self._render(answer, scope)
             except Exception:  # noqa: BLE001 - it only read: asked once more, it is worded and logged
                 return None
-            return written([*headers, *shared], body)
+            return head(*headers, *shared) % len(body) + body
 
         def reply() -> bytes | None:
-            if tap.watched or (card is not None and card.delay) or log.isEnabledFor(logging.DEBUG):
+            if tap.watched or (card is not None and card.delay):
                 return None
             return fairness.timed(fairness.of(address), read) if fairness else read()  # a map takes ten times a pose
 
@@ -338,10 +341,11 @@ class Application:
                 return [JSON], self._encode(answer)
 
 
-def written(headers: Headers, body: bytes) -> bytes:
-    """Return a response with status 200 as the server writes it."""
+@lru_cache(HEADS_MAX)
+def head(*headers: tuple[bytes, bytes]) -> bytes:
+    """Return the head of a response with status 200 as the server writes it, with %d for the length of its body."""
     rows = [b"%s: %s\r\n" % row for row in headers]
-    return b"HTTP/1.1 200 OK\r\n%scontent-length: %d\r\n\r\n%s" % (b"".join(rows), len(body), body)
+    return b"HTTP/1.1 200 OK\r\n%scontent-length: %%d\r\n\r\n" % b"".join(rows).replace(b"%", b"%%")
 
 
 def _wire_form(scope: Scope) -> bytes:

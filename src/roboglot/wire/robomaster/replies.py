@@ -1,7 +1,7 @@
 """Answers of the robot, word for word, in the forms of its firmware builds.
 
-A profile is one row of a table: format of numbers and ends of texts. ``SPEC`` follows the published text, with two
-exceptions that every known client needs: three decimals, and no ``;`` after the broadcast address.
+A profile is one row of a table: the ends of texts. ``SPEC`` follows the published text, with two exceptions that every
+known client needs: three decimals, and no ``;`` after the broadcast address.
 """
 
 from __future__ import annotations
@@ -42,7 +42,6 @@ class Profile:
     values_end: str
     push_end: str
     broadcast_end: str
-    decimals: int
     as_robots: bool
     separator: str  # between attributes in one datagram
 
@@ -51,14 +50,14 @@ class Profile:
         return _joined(text, seq, self.result_end)
 
     def values(self, values: Sequence[Number | str], seq: int | None = None) -> bytes:
-        """Return the answer to a query: one value unchanged, several with floats rounded to the profile's decimals."""
-        text = str(values[0]) if len(values) == 1 else self._numbers(values)
+        """Return the answer to a query: one value unchanged, several with floats rounded to three decimals."""
+        text = str(values[0]) if len(values) == 1 else _numbers(values)
         return _joined(text, seq, self.values_end)
 
     def push(self, module: str, *attributes: tuple[str, Sequence[Number]], separator: str | None = None) -> bytes:
         """Return one datagram, such as ``chassis push attitude 0.100 1.000 3.000;``, with one or more attributes."""
         between = self.separator if separator is None else separator
-        texts = [f"{name} {self._numbers(values)}" for name, values in attributes]
+        texts = [f"{name} {_numbers(values)}" for name, values in attributes]
         return _joined(f"{module} push {between.join(texts)}", None, self.push_end)
 
     def event(self, text: str) -> bytes:
@@ -73,13 +72,11 @@ class Profile:
         """Return the robot's address for clients that search for it, such as ``robot ip 192.168.1.102``."""
         return _joined(f"robot ip {address}", None, self.broadcast_end)
 
-    def _numbers(self, values: Sequence[Number | str]) -> str:
-        return " ".join([self._fixed(value) if isinstance(value, float) else str(value) for value in values])
 
-    def _fixed(self, number: float) -> str:
-        """Return a number with the profile's decimals, and never ``-0.000``."""
-        text = f"{number:.{self.decimals}f}"
-        return text[1:] if text[0] == "-" and not float(text) else text
+def _numbers(values: Sequence[Number | str]) -> str:
+    """Return values with a blank between two; floats have three decimals, and are never ``-0.000``."""
+    texts = [f"{value:.3f}" if isinstance(value, float) else str(value) for value in values]
+    return " ".join(texts).replace("-0.000", "0.000")
 
 
 def _joined(text: str, seq: int | None, end: str) -> bytes:
@@ -90,15 +87,15 @@ def _joined(text: str, seq: int | None, end: str) -> bytes:
 
 
 SPEC = Profile(
-    name="spec", version="00.00.00.70", result_end=";", values_end=";", push_end=";", broadcast_end="", decimals=3,
+    name="spec", version="00.00.00.70", result_end=";", values_end=";", push_end=";", broadcast_end="",
     as_robots=False, separator=";",
 )  # fmt: skip
 FW60 = Profile(
-    name="fw60", version="00.00.00.60", result_end="", values_end=" ", push_end=" ;", broadcast_end="", decimals=3,
+    name="fw60", version="00.00.00.60", result_end="", values_end=" ", push_end=" ;", broadcast_end="",
     as_robots=True, separator=" ; ",
 )  # fmt: skip
 FW70 = Profile(
-    name="fw70", version="00.00.00.70", result_end=";", values_end=" ;", push_end=" ;;", broadcast_end="", decimals=3,
+    name="fw70", version="00.00.00.70", result_end=";", values_end=" ;", push_end=" ;;", broadcast_end="",
     as_robots=True, separator=" ; ",
 )  # fmt: skip
 PROFILES = {profile.name: profile for profile in (SPEC, FW60, FW70)}
