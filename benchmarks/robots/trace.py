@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import hashlib
 import random
 import subprocess
@@ -44,7 +45,7 @@ from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.components.system.network import Network
-from roboglot.model.errors import RobotError
+from roboglot.model.errors import Refused, RobotError
 from roboglot.model.events import Event, ScanTaken
 from roboglot.model.feed import Viewer
 from roboglot.model.geometry import Point, Pose
@@ -131,7 +132,8 @@ async def scenario(seed: int, minutes: float, file: str) -> None:
             if (step + 6 * index) % round(COMMANDS / STEP) == 0:
                 command(robot, dice)
         if step % round(45.0 / STEP) == 0:
-            fleet.world.faults.inject(dice.choice(FAULTS), dice.choice(("a", "h")), duration=10.0)
+            with contextlib.suppress(Refused):  # a robot stands where a path would be blocked
+                fleet.world.faults.inject(dice.choice(FAULTS), dice.choice(("a", "h")), duration=10.0)
         if step % round(60.0 / STEP) == 0:
             for robot in fleet.robots.values():
                 digest.update(robot[Mapping].grid.log_odds.tobytes() if Mapping in robot else b"")

@@ -45,11 +45,13 @@ class ServedRobot:
 
 
 @contextlib.contextmanager
-def served(data: Path, *arguments: str, address: str = "127.0.0.1", log: Path | None = None) -> Iterator[ServedRobot]:
-    """Start ``roboglot up``, wait for its ``ready``, stop it at the end. Raises NotUp with its log."""
+def served(
+    data: Path, *arguments: str, address: str = "127.0.0.1", log: Path | None = None, module: str = "roboglot"
+) -> Iterator[ServedRobot]:
+    """Start ``roboglot up`` (or ``module``), wait for its ``ready``, stop it at the end. Raises NotUp with its log."""
     log = log or data.with_name(f"{data.name}.log")
     log.parent.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", "roboglot", "up", "--data", str(data), "--address", address, *arguments]
+    command = [sys.executable, "-m", module, "up", "--data", str(data), "--address", address, *arguments]
     began = time.monotonic()
     with (
         log.open("w") as output,
