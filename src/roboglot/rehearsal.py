@@ -125,7 +125,7 @@ class Rehearsals:
 
     def _started(self) -> asyncio.AbstractEventLoop:
         if self._loop is None:
-            loop = self._loop = asyncio.new_event_loop()  # asyncio's own: the clock must see when it is idle
+            loop = self._loop = asyncio.new_event_loop()
             self._thread = threading.Thread(target=loop.run_forever, name="rehearsals", daemon=True)
             self._thread.start()
         return self._loop

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +14,14 @@ from roboglot.cli.up import LINE_MAX, lines_of
 
 TEXT = b"1\n" + b"9" * (LINE_MAX + 1) + b"\n 0.5\n"
 LINES = ["1", "(a line that is too long)", "0.5"]
+PROCESS = """
+import os, uvloop
+from roboglot.cli import up
+up.prepare()
+async def main():
+    print([line async for line in up.lines_of(0)], os.path.exists("/proc/self/fd/0"))
+uvloop.run(main())
+"""
 
 
 @pytest.mark.asyncio
@@ -35,3 +46,17 @@ async def test_nothing_is_read_without_input() -> None:
     os.close(closed)
     os.close(other)
     assert [line async for line in lines_of(closed)] == []
+
+
+@pytest.mark.parametrize(
+    ("given", "lines"),
+    [("< /dev/null", []), ("< {file}", LINES), ("< <(cat {file})", LINES), ("<&-", []), ("<&- >&2 2>&-", [])],
+)
+def test_standard_input_of_any_kind_aborts_no_loop(given: str, lines: list[str], tmp_path: Path) -> None:
+    """A socket with its number, if it were closed or never open, would abort uvloop or stay open for good."""
+    file = tmp_path / "steps"
+    file.write_bytes(TEXT)
+    command = f"{shlex.quote(sys.executable)} -c {shlex.quote(PROCESS)} {given.format(file=shlex.quote(str(file)))}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (done.stdout or done.stderr) == f"{lines} True\n"

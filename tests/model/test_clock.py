@@ -10,6 +10,7 @@ from contextvars import ContextVar
 from functools import partial
 
 import pytest
+import uvloop
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -27,7 +28,13 @@ async def test_nothing_happens_until_time_passes() -> None:
     assert clock.epoch() == LOCKSTEP_EPOCH + clock.time()
 
 
-async def test_what_follows_from_instant_happens_before_the_next() -> None:
+@pytest.mark.parametrize("loop", [asyncio.new_event_loop, uvloop.new_event_loop])
+def test_what_follows_from_instant_happens_before_the_next(loop: Callable[[], asyncio.AbstractEventLoop]) -> None:
+    with asyncio.Runner(loop_factory=loop) as runner:
+        runner.run(chains_of_wake_ups())
+
+
+async def chains_of_wake_ups() -> None:
     clock, trace = LockstepClock(), []
 
     async def relay(name: str, delay: float) -> None:

@@ -135,8 +135,6 @@ def command(
     if shortage := open_files.shortage(len(settings.robots)):
         sys.exit(f"roboglot up: {shortage}")
     prepare()
-    if settings.lockstep:
-        sys.exit(asyncio.run(_serve(settings, open_console=open_console)))
     import uvloop
 
     sys.exit(uvloop.run(_serve(settings, open_console=open_console)))
@@ -247,13 +245,13 @@ async def _step(clock: LockstepClock) -> None:
             await clock.advance(seconds)
         else:
             print(f"expected seconds from 0 to {STEP_MAX:g}, not {line!r}", file=sys.stderr)
-        print(f"time {clock.time():.3f}", flush=True)
+        print(f"time {clock.time():.3f}\n", end="", flush=True)  # in one piece, also if output has no buffer
 
 
 async def lines_of(descriptor: int) -> AsyncIterator[str]:
-    """Yield the lines of a file, a pipe or a terminal, until it ends or is closed."""
+    """Yield the lines of a file, a pipe or a terminal until it ends; it stays open: no socket gets its number."""
     reader = asyncio.StreamReader(limit=LINE_MAX)
-    with contextlib.suppress(OSError), os.fdopen(descriptor, "rb") as file:
+    with contextlib.suppress(OSError), os.fdopen(descriptor, "rb", closefd=False) as file:
         if _can_wait(descriptor):
             await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), file)
         else:

@@ -7,6 +7,7 @@ clock stands still until ``advance`` is called; the same program on it gives the
 from __future__ import annotations
 
 import asyncio
+import gc
 import heapq
 import itertools
 import math
@@ -204,8 +205,8 @@ class _LockstepTimer:
 class LockstepClock(Clock):
     """Time that passes only in ``advance``; callbacks run in the order of their time, then of their registration.
 
-    Needs asyncio's own event loop: after each instant it waits until the loop has nothing ready to run, and only that
-    loop lets us see it (uvloop does not). Sockets are not waited for: code that uses one awaits the reply itself.
+    Needs asyncio's own event loop or uvloop: after each instant it waits until the loop has nothing ready to run.
+    Sockets are not waited for: code that uses one awaits the reply itself.
     Work announced by ``hold`` is waited for, at most HOLD_MAX seconds each. What ``arrive`` brings happens when
     nothing is ready to run any more, one after the other; at rest after ROUNDS_MAX rounds of the loop at the latest.
     """
@@ -263,7 +264,7 @@ class LockstepClock(Clock):
             raise ValueError("time does not go back")
         if self._letting_in is not None:
             await asyncio.wait((self._letting_in,))
-        self._advancing = True
+        self._advancing, self._ready = True, _ready()
         try:
             await asyncio.sleep(0)
             await self._settle()
@@ -274,9 +275,8 @@ class LockstepClock(Clock):
 
     async def _fire(self, end: float, turn: int) -> None:
         yielded = self._now
-        self._ready, limit = _ready(), end if turn >= 0 else end + 1e-9
+        ready, limit = self._ready, end if turn >= 0 else end + 1e-9
         self._end = math.nextafter(end, -math.inf) if turn >= 0 else limit
-        ready = self._ready
         while self._heap and self._heap[0][0] <= limit:
             when, _, timer = self._heap[0]
             if (callback := timer.callback) is not None and max(when, self._now) == end:
@@ -301,9 +301,8 @@ class LockstepClock(Clock):
 
     async def _settle(self) -> None:
         """Yield until no callback of the loop is ready and all outside events have been handled."""
-        ready = _ready()
-        while ready or self._held or self._arrived:
-            if ready:
+        while self._ready or self._held or self._arrived:
+            if self._ready:
                 await asyncio.sleep(0)
             elif self._arrived:
                 self._arrived.popleft()()
@@ -355,8 +354,9 @@ class LockstepClock(Clock):
 
 
 def _ready() -> Sized:
-    """Return the running loop's queue of ready callbacks."""
-    ready: Sized | None = getattr(asyncio.get_running_loop(), "_ready", None)
-    if ready is None:
-        raise RuntimeError("a lockstep clock needs asyncio's own event loop")
-    return ready
+    """Return the running loop's queue of ready callbacks, the only deque that uvloop's has."""
+    loop = asyncio.get_running_loop()
+    for part in (getattr(loop, "_ready", None), *gc.get_referents(loop)):
+        if isinstance(part, deque):
+            return part
+    raise RuntimeError("a lockstep clock needs asyncio's own event loop or uvloop")

@@ -54,8 +54,6 @@ def run(folder: str, link: socket.socket) -> int:
         reporter.send(Refusal(shortage, lasting=True))
         return 1
     prepare()
-    if config.lockstep:
-        return asyncio.run(_serve(config, reporter, _class_home(Path(folder))))
     import uvloop
 
     return uvloop.run(_serve(config, reporter, _class_home(Path(folder))))

@@ -73,7 +73,7 @@ class RobotServer:
         configs = self.wanted.configs(free_addresses(len(self.wanted.robots)))
         self.addresses = {robot.name: robot.address for robot in configs}
         self.app_port = free_port()
-        loop = _new_loop(lockstep=self.wanted.lockstep)
+        loop = _new_loop()
         self._loop = Loop(loop)
         self.clients = Clients(self.addresses, self.data, self.app_port, self._loop)
         self._thread = threading.Thread(target=_serve, args=(loop,), name="roboglot", daemon=True)
@@ -265,13 +265,12 @@ class _There:
         return call
 
 
-def _new_loop(*, lockstep: bool) -> asyncio.AbstractEventLoop:
-    if not lockstep:
-        with contextlib.suppress(ImportError):
-            import uvloop
-
-            return uvloop.new_event_loop()
-    return asyncio.SelectorEventLoop()
+def _new_loop() -> asyncio.AbstractEventLoop:
+    try:
+        import uvloop
+    except ImportError:
+        return asyncio.SelectorEventLoop()
+    return uvloop.new_event_loop()
 
 
 def _serve(loop: asyncio.AbstractEventLoop) -> None:
