@@ -9,7 +9,7 @@ import pytest
 from rich.text import Text
 from typer.main import get_command
 
-from roboglot.cli import COMMANDS, loaded, screen
+from roboglot.cli import COMMANDS, loaded, screen, up
 
 
 def ended(*arguments: str, reader: str = "cat") -> "subprocess.CompletedProcess[str]":
@@ -55,3 +55,10 @@ def test_lines_to_copy_name_a_program(
     assert screen.as_typed("WHERE='tcp/a' ros2 topic list") == "WHERE='tcp/a' ros2 topic list"
     monkeypatch.setenv("PATH", str(program.parent))
     assert screen.as_typed("roboglot scan") == "roboglot scan"
+
+
+def test_a_robot_is_given_once() -> None:
+    bodies = [(robot["name"], robot["body"]) for robot in up._robots(["b=hermes", "a=cyberdog2"])]
+    assert bodies == [("a", "cyberdog2"), ("b", "hermes")]
+    with pytest.raises(ValueError, match=r"robot b is given twice: by 'b=hermes', and before$"):
+        up._robots(["b=universal", "b=hermes"])

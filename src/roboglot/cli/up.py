@@ -182,8 +182,12 @@ def _sections(given: Mapping[str, object]) -> dict[str, object]:
 
 
 def _robots(texts: list[str]) -> list[dict[str, object]]:
-    """Return robot a first, with the options of the command line, then the others."""
-    robots = {"a": RobotConfig()} | {r.name: r for r in map(parse_robot, texts)}
+    """Return robot a first, with the options of the command line, then the others. Raises ValueError."""
+    robots = {"a": RobotConfig()}
+    for number, robot in enumerate(map(parse_robot, texts)):
+        if any(text.startswith(f"{robot.name}=") for text in texts[:number]):
+            raise ValueError(f"robot {robot.name} is given twice: by {texts[number]!r}, and before")
+        robots[robot.name] = robot
     return [dataclasses.asdict(robot) for robot in robots.values()]
 
 

@@ -130,9 +130,7 @@ async def test_a_log_report_is_kept_as_a_file(yard: Opened) -> None:
     assert "it stood still" in text.splitlines()[0]
 
 
-async def test_log_report_is_kept_when_old_ones_go(
-    yard: Opened, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_log_report_is_kept_when_old_ones_go(yard: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
     one = await yard()
     store = one.robot[FileStore]
     for number in range(REPORTS_MAX):

@@ -203,18 +203,20 @@ def verb_of(value: Step | Check, verbs: Sequence[str]) -> str:
 
 def read(path: Path) -> Found:
     """Read one file. Raises BadScenario."""
-    import yaml
+    from yaml import YAMLError
+
+    from roboglot.testing.scenarios.strict_yaml import read_yaml
 
     try:
         if path.stat().st_size > BYTES_MAX:
             raise BadScenario(f"longer than {BYTES_MAX} bytes")
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+        values = read_yaml(path.read_text(encoding="utf-8"))
         if isinstance(values, dict):
             values.pop("$schema", None)
         scenario = msgspec.convert(values, Scenario)
         _check(scenario)
         scenario.given.wanted(path.parent)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
+    except (OSError, UnicodeDecodeError, YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else misfit(error)
         raise BadScenario(f"{path}: {' '.join(why.split())}") from None
     return Found(path, scenario)
