@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import errno
+import os
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
 from unittest.mock import Mock
 
+import numba
 import numpy as np
 import pytest
 from numba import njit
+from numba.core import caching
 from numba.core.registry import cpu_target
 
 from roboglot.kernels.ahead import compile_ahead
@@ -53,6 +60,41 @@ def test_a_cached_kernel_needs_no_declarations(monkeypatch: pytest.MonkeyPatch) 
     refresh.assert_not_called()
     (overload,) = vars(cached)["overloads"].values()
     assert overload.type_annotation == ""  # 20 kB for each kernel
+
+
+def module_at(source: Path) -> ModuleType:
+    spec = spec_from_file_location(source.stem, source)
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_kernels_of_a_read_only_folder_are_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def write_nothing(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    source = tmp_path / "doubling.py"
+    source.write_text("def double(x):\n    return 2 * x\n")
+    doubling = module_at(source)
+    kernel("int64(int64)")(doubling.double)
+    kept = sorted(tmp_path.rglob("*.nb?"))
+    assert kept
+    monkeypatch.setattr(caching.tempfile, "TemporaryFile", write_nothing)
+    monkeypatch.setattr(caching.IndexDataCacheFile, "_open_for_write", write_nothing)
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    refresh = Mock()
+    monkeypatch.setattr(cpu_target.target_context, "refresh", refresh)
+    cached = kernel("int64(int64)")(doubling.double)
+    refresh.assert_not_called()  # nothing is compiled
+    assert cached(21) == 42
+    monkeypatch.undo()
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert kernel("float64(float64)")(doubling.double)(1.5) == 3.0  # not kept
+    assert sorted(tmp_path.rglob("*.nb?")) == kept
 
 
 def test_cached_kernels_import_no_lowering_of_arrays() -> None:

@@ -8,16 +8,18 @@ divides only by what cannot be 0, or asks for CHECKED.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import TypeVar, cast
 
 import numpy as np
 from llvmlite.binding import ModuleRef, parse_bitcode
 from numba import njit, types
 from numba.core import dispatcher, environment
-from numba.core.caching import FunctionCache
+from numba.core.caching import CacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompileResult
 from numba.core.cpu import CPUContext
@@ -61,6 +63,14 @@ class LeanLibrary(JITCodeLibrary):
         return super()._get_module_for_linking()
 
 
+class ReadableFolder(UserProvidedCacheLocator):
+    """Locates kernels in ``NUMBA_CACHE_DIR`` even if it is read-only; Numba would compile anew."""
+
+    def ensure_cache_path(self) -> None:
+        """Raise OSError if the folder is not there and cannot be made; called by Numba."""
+        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
+
+
 class LeanCache(FunctionCache):
     """Cache of a kernel that is loaded without Numba's declarations, which only the compiler needs.
 
@@ -77,6 +87,11 @@ class LeanCache(FunctionCache):
             found.library._shared_module = None
             found.library.stored = partial(self._bitcode, self._index_key(signature, context.codegen()))
         return found
+
+    def save_overload(self, signature: Signature, data: CompileResult) -> None:
+        """Keep a compiled function, if the folder can be written; called by Numba."""
+        if os.access(self.cache_path, os.W_OK):
+            super().save_overload(signature, data)
 
     def _bitcode(self, key: object) -> bytes:
         """Return a library's module. Raises RuntimeError if another process has emptied the cache."""
@@ -100,3 +115,4 @@ _rebuild_env.__module__ = environment.__name__  # pickles name Numba's
 vars(environment)["_rebuild_env"] = _rebuild_env
 JITCPUCodegen._library_class = LeanLibrary
 vars(dispatcher)["FunctionCache"] = LeanCache
+CacheImpl._locator_classes.insert(0, ReadableFolder)
