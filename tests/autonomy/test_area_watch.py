@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
-from typing import TYPE_CHECKING
 
 import pytest
 
-from roboglot.config import RobotConfig
-from roboglot.fleet import Fleet, build_fleet
+from roboglot.fleet import Fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
 from roboglot.model.components.sensing.sensor_masks import SensorKind, SensorMasks
-from roboglot.storage.database import Database
-
-if TYPE_CHECKING:
-    from tests.autonomy.conftest import Tour
+from tests.autonomy.conftest import Tour, delivering
 
 
 @pytest.fixture
 async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    database = Database(":memory:")
-    built = build_fleet("office", [RobotConfig(body="hermes")], clock=clock, seed=1, database=database)
-    await built.start(wait=True)
-    yield built
-    await built.close()
-    database.close()
+    async with delivering(clock) as built:
+        yield built
 
 
 async def test_sensors_are_masked_only_inside_the_area(tour: Tour) -> None:

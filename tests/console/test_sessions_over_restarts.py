@@ -26,6 +26,7 @@ from tests.console.test_classes import asked, grid, opened, world
 from tests.console.test_studio_socket import SAVE
 
 PROOF = Proof(ProofKind.HTTP, "Basic a secret")
+ASKING = AccessConfig(on=True, local=False)
 
 
 async def test_file_lets_no_one_in_but_the_cookie(tmp_path: Path) -> None:
@@ -107,12 +108,8 @@ async def names(shown: Shown, *cookies: str) -> list[str]:
 
 async def test_a_class_goes_on_after_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
-    asking = AccessConfig(on=True, local=False)
-    (tmp_path / "w").mkdir()
-    store = open_store(tmp_path / "w")
-    for name in ("mx", "gone", "changed"):
-        store.add_person(name, PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+    add_admins(tmp_path / "w", "mx", "gone", "changed")
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
         _, _, gone = await signed(shown, name="gone", password=PASSWORD)
         _, _, changed = await signed(shown, name="changed", password=PASSWORD)
@@ -123,9 +120,10 @@ async def test_a_class_goes_on_after_a_restart(tmp_path: Path, monkeypatch: pyte
         assert await names(shown, teacher, gone, anna) == ["mx", "gone", f"Anna@{code}"]
         request = Request(f"{shown.url}/api/sign_out", data=b"{}", headers={"Cookie": gone})
         await asyncio.to_thread(lambda: urlopen(request, timeout=60).close())
+    store = open_store(tmp_path / "w")
     store.rotate("changed", "another long secret")
     store.close()
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         port = shown.url.rpartition(":")[2]  # another one, and cookies have it in their names
         again = [f"roboglot-{port}={cookie.partition('=')[2]}" for cookie in (teacher, anna, ben, gone, changed)]
         assert await names(shown, *again[3:]) == ["", ""]
@@ -154,18 +152,27 @@ def lesson(url: str, cookie: str, **wish: object) -> dict[str, Any]:
         return found
 
 
+def add_admins(folder: Path, *names: str) -> None:
+    folder.mkdir()
+    store = open_store(folder)
+    for name in names:
+        store.add_person(name, PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
+    store.close()
+
+
+async def opened_class(shown: Shown) -> tuple[str, str]:
+    """Open a class on the console's own page; return its teacher's cookie and its code."""
+    _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
+    return teacher, str((await asyncio.to_thread(lesson, shown.url, teacher, do="open", name="7b"))["code"])
+
+
 async def test_consoles_class_takes_pupils_after_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
-    asking = AccessConfig(on=True, local=False)
-    (tmp_path / "w").mkdir()
-    store = open_store(tmp_path / "w")
-    store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
-    store.close()
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
-        _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
-        code = str((await asyncio.to_thread(lesson, shown.url, teacher, do="open", name="7b"))["code"])
+    add_admins(tmp_path / "w", "mx")
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
+        teacher, code = await opened_class(shown)
         _, anna, _ = await signed(shown, name="Anna", code=code)
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         teacher = f"roboglot-{shown.url.rpartition(':')[2]}={teacher.partition('=')[2]}"
         assert (await signed(shown, name="Anna", code=code))[:2] == (200, anna)
         assert (await signed(shown, name="Cem", code=code))[0] == 200
@@ -174,27 +181,22 @@ async def test_consoles_class_takes_pupils_after_a_restart(tmp_path: Path, monke
         assert [pupil["name"] for pupil in left["pupils"]] == ["Anna", "Cem"]
         assert await asyncio.to_thread(lesson, shown.url, teacher, do="close") == {}
         assert (await signed(shown, name="Anna", code=code))[0] == 401
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         assert (await signed(shown, name="Cem", code=code))[0] == 401
 
 
 async def test_robots_locked_in_a_class_that_is_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They stay locked over a restart, and their teacher can still unlock them."""
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
-    asking = AccessConfig(on=True, local=False)
-    (tmp_path / "w").mkdir()
-    store = open_store(tmp_path / "w")
-    store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
-    store.close()
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
-        _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
-        code = str((await asyncio.to_thread(lesson, shown.url, teacher, do="open", name="7b"))["code"])
+    add_admins(tmp_path / "w", "mx")
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
+        teacher, code = await opened_class(shown)
         await signed(shown, name="Anna", code=code)
         await asyncio.to_thread(lesson, shown.url, teacher, do="lock")
         assert shown.robot[Lease].taken_by
     [file] = tmp_path.rglob("lesson.json")  # noqa: ASYNC240 - small
     file.write_text(json.dumps(json.loads(file.read_text()) | {"until": 1.0}))
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown:
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         teacher = f"roboglot-{shown.url.rpartition(':')[2]}={teacher.partition('=')[2]}"
         assert shown.robot[Lease].taken_by
         assert (await signed(shown, name="Cem", code=code))[0] == 401

@@ -8,7 +8,11 @@ import asyncio
 import os
 import threading
 import time
+from typing import TypeVar
 
+from roboglot.model.clock import LockstepClock
+
+T = TypeVar("T")
 ROUNDS = 3  # idle samples in a row: a thread that waits for Python's lock seems to sleep
 GLANCE = 0.0005  # real s between two samples of a working thread
 SETTLE_MAX = 2.0  # real s: some threads never rest
@@ -34,6 +38,17 @@ async def settle(patience: float = SETTLE_MAX) -> None:
         else:
             quiet = 0
             await asyncio.sleep(GLANCE)
+
+
+async def late(answer: asyncio.Future[T], seconds: float, clock: LockstepClock) -> T:
+    """Return the answer, which comes after ``seconds`` of robot time, and within 20 s more."""
+    began = clock.time()
+    while not answer.done():
+        assert clock.time() < began + seconds + 20.0, "no answer"
+        await settle()
+        await clock.advance(0.1)
+    assert clock.time() > began + seconds - 0.05, "too soon"
+    return await answer
 
 
 def _working() -> bool:

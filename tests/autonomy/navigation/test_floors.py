@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
 import numpy as np
 import pytest
 
 from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
 from roboglot.autonomy.slam.evidence import EvidenceGrid
-from roboglot.config import RobotConfig
-from roboglot.fleet import Fleet, build_fleet
+from roboglot.fleet import Fleet
 from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import (
@@ -30,21 +29,13 @@ from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
-from roboglot.storage.database import Database
-
-if TYPE_CHECKING:
-    from tests.autonomy.conftest import Tour
+from tests.autonomy.conftest import Tour, delivering
 
 
 @pytest.fixture
 async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    """The delivery robot, which has a lift radio."""
-    database = Database(":memory:")
-    built = build_fleet("office", [RobotConfig(body="hermes")], clock=clock, seed=1, database=database)
-    await built.start(wait=True)
-    yield built
-    await built.close()
-    database.close()
+    async with delivering(clock) as built:
+        yield built
 
 
 def say_where_the_lift_is(tour: Tour) -> None:

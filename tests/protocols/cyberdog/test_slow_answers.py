@@ -4,20 +4,11 @@ import asyncio
 
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
-from tests.drivers.pace import settle
+from tests.drivers.pace import late
 
 
 async def test_answers_come_late(client, world: World, clock: LockstepClock) -> None:
     world.faults.inject("slow_answers", "a", seconds=3.0)
     answer = asyncio.ensure_future(client.raw(10001, "{}"))
-    for _ in range(29):
-        await settle()
-        await clock.advance(0.1)
-    assert not answer.done()
-    for _ in range(200):
-        await settle()
-        await clock.advance(0.1)
-        if answer.done():
-            break
-    [(code, _)] = await answer
+    [(code, _)] = await late(answer, 3.0, clock)
     assert code == 10001

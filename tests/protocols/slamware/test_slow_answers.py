@@ -6,19 +6,10 @@ import httpx
 
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
-from tests.drivers.pace import settle
+from tests.drivers.pace import late
 
 
 async def test_answers_come_late(client: httpx.AsyncClient, world: World, clock: LockstepClock) -> None:
     world.faults.inject("slow_answers", "a", seconds=3.0)
     answer = asyncio.ensure_future(client.get("/api/core/system/v1/power/status"))
-    for _ in range(29):
-        await settle()
-        await clock.advance(0.1)
-    assert not answer.done()
-    for _ in range(200):
-        await settle()
-        await clock.advance(0.1)
-        if answer.done():
-            break
-    assert (await answer).status_code == 200
+    assert (await late(answer, 3.0, clock)).status_code == 200
