@@ -39,7 +39,7 @@ class Peer:
         self.clock, self.session = clock, zenoh.open(config)
         self.heard: dict[str, list[Any]] = {}
         self._subscribers: list[Any] = []
-        self.attachments: list[tuple[int, int, int, bytes]] = []
+        self.attachments: dict[str, list[tuple[int, int, int, bytes]]] = {}  # by topic
 
     def close(self) -> None:
         self.session.close()
@@ -49,10 +49,10 @@ class Peer:
         return f"0/{topic.strip('/')}/{package}::{kind}::dds_::{name}_/{STORE.hash_rihs01(type)}"
 
     def listen(self, topic: str, type: str, *, history: bool = False) -> None:
-        found = self.heard.setdefault(topic, [])
+        found, attached = self.heard.setdefault(topic, []), self.attachments.setdefault(topic, [])
 
         def hear(sample: Any) -> None:
-            self.attachments.append(struct.unpack("<qqB16s", sample.attachment.to_bytes()))
+            attached.append(struct.unpack("<qqB16s", sample.attachment.to_bytes()))
             found.append(STORE.deserialize_cdr(sample.payload.to_bytes(), type))
 
         if history:

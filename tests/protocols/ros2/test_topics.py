@@ -12,7 +12,8 @@ import pytest
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
-from roboglot.protocols.ros2.server import PENDING_MAX
+from roboglot.protocols.ros2.dispatch import MESSAGE_MAX
+from roboglot.protocols.ros2.server import PASSED_MAX, PENDING_MAX
 from tests.protocols.held import held
 from tests.protocols.ros2.conftest import STORE, Opened, Peer, Scene
 
@@ -105,8 +106,31 @@ async def test_topics_come_with_the_robots_values(opened: Opened) -> None:
     picture = peer.heard["/a/image/compressed"][-1]
     assert (picture.format, bytes(picture.data[:2])) == ("jpeg", b"\xff\xd8")
     assert peer.heard["/a/joint_states"][-1].name == ["gimbal_pitch", "gimbal_yaw"]
-    assert all(length == 16 for _, _, length, _ in peer.attachments)
-    assert len({gid for *_, gid in peer.attachments}) == 1
+
+
+async def test_each_publisher_numbers_its_own_messages(opened: Opened) -> None:
+    """By gaps in them rmw_zenoh tells nodes that messages were lost."""
+    scene = await opened()
+    peer, senders = scene.peer, set[bytes]()
+    for topic, type in (("/a/odom", "nav_msgs/msg/Odometry"), ("/a/pose", STAMPED)):
+        peer.listen(topic, type)
+    await peer.until(lambda: all(len(attached) > 4 for attached in peer.attachments.values()), 5.0)
+    for attached in peer.attachments.values():
+        numbers = [number for number, *_ in attached]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        assert {length for _, _, length, _ in attached} == {16}
+        (sender,) = {gid for *_, gid in attached}
+        senders.add(sender)
+    assert len(senders) == 2
+
+
+async def test_longest_message_is_dropped_by_the_router(opened: Opened) -> None:
+    scene = await opened()
+    scene.peer.listen("/rosout", LOG)
+    for size in (PASSED_MAX + 100_000, MESSAGE_MAX + 1, 1):
+        await asyncio.to_thread(scene.peer.publish, "/a/goal_pose", STAMPED, bytes(size))
+    await scene.peer.until(lambda: len(scene.peer.heard["/rosout"]) == 2)
+    assert ["at most" in line.msg for line in scene.peer.heard["/rosout"]] == [True, False]
 
 
 async def test_the_battery_is_there_for_who_comes_late(opened: Opened) -> None:

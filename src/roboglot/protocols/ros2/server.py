@@ -6,7 +6,7 @@ import asyncio
 import json
 import logging
 import time
-import uuid
+from collections import defaultdict
 from collections.abc import Coroutine, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
@@ -27,7 +27,7 @@ from roboglot.protocols.ros2.table import PUBLISHED
 from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
 from roboglot.protocols.turns import Turns
 from roboglot.transport.seldom import Seldom
-from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, attachment, topic_key
+from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, Sender, topic_key
 
 if TYPE_CHECKING:
     import zenoh
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 PENDING_MAX = 32  # messages of a topic queued for handling; beyond this the oldest are dropped and logged
 FULL = "robot %s: too many messages of %s come: the oldest are dropped"
+PASSED_MAX = 32 * 1024 * 1024  # bytes of a message between other nodes; longer ones are dropped
 PICTURE_PERIOD = 0.2  # s
 JPEG_QUALITY = 80
 NODE = "roboglot"
@@ -57,9 +58,8 @@ class Ros2Door:
         self._node: Node | None = None
         self._tokens: list[object] = []  # announcements, which end when they are released
         self._publishers: dict[str, zenoh.Publisher | AdvancedPublisher] = {}
+        self._senders = defaultdict[str, Sender](Sender)
         self._numbers = 0
-        self._sequence = 0
-        self._gid = uuid.uuid4().bytes
         self._seldom = Seldom(log)
         self._heard = Intake(PENDING_MAX, partial(self._seldom.warning, "full", FULL, robot.id))
         self._turns = Turns(robot, f"{DOOR} {robot.id}:zenoh")
@@ -123,6 +123,7 @@ class Ros2Door:
             "listen/endpoints": [self._locator],
             "connect/endpoints": list(self._config.connect),
             "scouting/multicast/enabled": False,
+            "transport/link/rx/max_message_size": PASSED_MAX,
         }.items():
             config.insert_json5(key, json.dumps(value))
         return config
@@ -278,8 +279,7 @@ class Ros2Door:
             topic = self._topic(topic.removeprefix(f"/{self._robot.id}/"))
         topic = self._topic(name) if name else topic
         publisher = self._publishers.get(topic) or self._declare(topic, message.type, kept=message.kept)
-        self._sequence += 1
-        publisher.put(message.data, attachment=attachment(self._sequence, time.time_ns(), self._gid))
+        publisher.put(message.data, attachment=self._senders[topic].attachment(time.time_ns()))
 
     def _declare(self, topic: str, type: str, *, kept: bool) -> zenoh.Publisher | AdvancedPublisher:
         import zenoh

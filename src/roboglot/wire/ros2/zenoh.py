@@ -6,11 +6,12 @@ A topic's messages have the key ``DOMAIN/TOPIC/TYPE/HASH``; each node, publisher
 from __future__ import annotations
 
 import struct
+from uuid import uuid4
 
 from roboglot.values import dataclass
 
 _ATTACHMENT = struct.Struct("<qqB16s")
-RELIABLE, KEPT, SENSORS = "::,10:,:,:,,", ":1:,1:,:,:,,", "2::,5:,:,:,,"  # QoS in the syntax of liveliness tokens
+RELIABLE, KEPT = "::,10:,:,:,,", ":1:,1:,:,:,,"  # QoS in the syntax of liveliness tokens
 GRAPH = "@ros2_lv"
 
 
@@ -58,6 +59,13 @@ def mangled(name: str) -> str:
     return name.replace("/", "%")
 
 
-def attachment(sequence: int, at: int, gid: bytes) -> bytes:
-    """Return a message's attachment: number, time (ns since 1970) and sender (16 bytes)."""
-    return _ATTACHMENT.pack(sequence, at, len(gid), gid)
+class Sender:
+    """The id of a publisher, and the number of its last message, by which nodes notice that messages were lost."""
+
+    def __init__(self) -> None:
+        self._gid, self._sequence = uuid4().bytes, 0
+
+    def attachment(self, at: int) -> bytes:
+        """Return the next message's attachment: number, time (``at``, ns since 1970) and sender."""
+        self._sequence += 1
+        return _ATTACHMENT.pack(self._sequence, at, len(self._gid), self._gid)
