@@ -263,7 +263,7 @@ class RealTimers:
             self._cancelled = 0
 
     def arm(self, least: float = 0.0) -> None:
-        """Wait anew for the earliest, ``least`` s or more: it is another one, or the clock's pace has changed."""
+        """Wait for the earliest timer, ``least`` s or more: it is another one, or the clock's pace has changed."""
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None

@@ -148,7 +148,7 @@ class Stage(ABC):
 
     @abstractmethod
     def reseed(self, seed: int) -> None:
-        """Have chance begin anew from ``seed``; what bodies were built with (scale errors, biases) stays."""
+        """Restart random numbers from ``seed``; bodies keep the errors (scale, bias) they were built with."""
 
     # -- what is there -------------------------------------------------------------------------------------------------
 

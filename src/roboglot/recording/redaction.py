@@ -68,7 +68,7 @@ _quoted = re.compile(r"(['\"]).*\1", re.DOTALL)
 _quoted_in_json = re.compile(rb"'[^\"]*'|\\\".*\\\"", re.DOTALL)
 # People in the lists of visual programming, at its own door and inside a dog's 2001: the name is what describes each.
 PEOPLE = (b"personnel", b"face", b"voiceprint")  # modes
-# \1: what escapes a quote, in JSON inside a JSON string once or more. Looked for from its begin on alone, and without
+# \1: what escapes a quote, in JSON inside a JSON string once or more. Looked for from its beginning only, and without
 # going back, since a regular expression lets no other thread run: a client's message must not stop the robot.
 _TEXT = rb".*?(?<!\\)(?:\1\\\1\\)*"  # to its end, with the escaped backslashes there
 _listed = re.compile(rb'(?<!\\)(\\{0,63})"(mode|describe)\1"\s*:\s*\1"(?P<value>' + _TEXT + rb')\1"', re.DOTALL)

@@ -281,7 +281,7 @@ class OdometryDriving(Driving):
 
 
 def _way(offset: Pose, speed: float) -> Twist:
-    """Return the velocity at the begin of a move; STILL if it only turns."""
+    """Return the velocity at the start of a move; STILL if it only turns."""
     way = math.hypot(offset.x, offset.y)
     return Twist(speed * offset.x / way, speed * offset.y / way, 0.0) if way > 0.0 else STILL
 

@@ -141,7 +141,7 @@ class Pilot:
         return State.TURNING
 
     async def _give_way(self, follower: Follower) -> State:
-        """Move aside, wait there, and set out anew."""
+        """Move aside, wait there, and set out again."""
         self._report("waiting", Path(), 0.0)
         aside = await self._courtesy.give_way(follower)
         self._replanner.begin_again(follower)

@@ -44,7 +44,7 @@ class Replanner:
             self._plan.cancel()
 
     def distrust(self) -> None:
-        """Plan anew as soon as possible."""
+        """Plan again as soon as possible."""
         self._stale = True
 
     def _distrust(self, _: Event) -> None:

@@ -19,7 +19,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 class Cells(Generic[Scalar]):
-    """A number for each cell of a map, 0 at first; grows with the map, and begins anew with another one.
+    """A number for each cell of a map, 0 at first; grows with the map, and starts again with another one.
 
     Pages that hold only zeros are never written, so the system need not provide them.
     """

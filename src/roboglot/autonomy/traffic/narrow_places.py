@@ -117,7 +117,7 @@ class NarrowPlaces:
     def _examined(self, piece: tuple[int, int]) -> NDArray[np.uint8]:
         """Return OPEN or NARROW for each cell of one piece (TILE, TILE), with the cells around it that matter.
 
-        It is only examined anew if it shows something else than the last time.
+        It is examined again only if it has changed since the last time.
         """
         top, left = (number * TILE - first for number, first in zip(piece, self._first, strict=True))
         rows, columns = (slice(max(0, first - AROUND), first + TILE + AROUND) for first in (top, left))

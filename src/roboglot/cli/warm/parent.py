@@ -150,7 +150,7 @@ class WarmParent:
     def _fork(self, wanted: Wanted, descriptors: list[int], caller: socket.socket) -> int:
         pid = fork()
         if pid == 0:
-            caller.send(b"+")  # first: if we are killed now, its caller must not begin anew
+            caller.send(b"+")  # first: if we are killed now, its caller must not start again
             ctypes.CDLL(None).prctl(PR_SET_NAME, b"roboglot", 0, 0, 0)
             os.setpgid(0, 0)  # in our session, so that the commands of one caller share its part of the processors
             become(wanted, descriptors, _run_code if wanted["kind"] == CODE else _run_command)

@@ -1,6 +1,6 @@
 """Sessions of browsers: a cookie stands for a person's proof at the log-in page, until they log out.
 
-With a file, a session outlives the program. It holds the proof, not the verdict: every request is checked anew, so that
+With a file, a session outlives the program. It holds the proof, not the verdict: every request is checked again, so
 changed passwords and revoked rights apply to signed-in browsers, too.
 """
 

@@ -25,7 +25,7 @@ WORLD_VERBS: OperationTable[str] = OperationTable("console world", Right.ADMIN)
 
 @WORLD_VERBS.on("reseed")
 async def reseed(stage: Stage, *, seed: Seed) -> None:
-    """Have noise and outages begin anew from another seed; bodies keep the errors they were built with."""
+    """Restart noise and outages from another seed; bodies keep the errors they were built with."""
     stage.reseed(seed)
 
 

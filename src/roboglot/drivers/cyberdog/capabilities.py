@@ -39,7 +39,7 @@ APPROXIMATIONS: dict[type[Component], str] = {
     Speaker: "speaks by a program of one line; plays no sounds",
     ElectronicSkin: "set at every connection, at first dark; shows what was commanded, no patches of the legs",
     Camera: "single pictures are its photos; its mount and angle are those of a dog that stands",
-    VideoStream: "encoded anew",
+    VideoStream: "re-encoded",
     Recorder: "",
     Power: "low power, where it goes by itself alone; no sleep; restarts at once or not at all",
     DockContact: "charging without a wire",

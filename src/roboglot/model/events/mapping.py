@@ -85,7 +85,7 @@ class LocalizationRecovered(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapReplaced(Event):
-    """The map was cleared, loaded or begun anew; ``origin``: of the new map in the old one, if they are related."""
+    """The map was cleared, loaded or started again; ``origin``: of the new map in the old one, if they are related."""
 
     origin: Pose | None = None
 

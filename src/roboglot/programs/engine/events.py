@@ -38,8 +38,8 @@ class Limits:
 class Stops:
     """Stops of a watched program: ``lines`` of a module or of the program (""), ``blocks``, its ``first`` statement.
 
-    ``first_block``: the begin of its next block. ``watched`` alone: no stops, but stepping is possible. The engine
-    handles lines; the host handles blocks, as it knows their begin.
+    ``first_block``: the beginning of its next block. ``watched`` alone: no stops, but stepping is possible. The engine
+    handles lines; the host handles blocks, as it knows where they begin.
     """
 
     lines: frozenset[tuple[str, int]] = frozenset()

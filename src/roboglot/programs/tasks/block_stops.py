@@ -1,7 +1,7 @@
 """Blocks at which a run halts: those with a breakpoint, the next one, and the next one after a step.
 
 The worker does steps over and out of calls: it knows the call stack, but halts before statements only. This module
-skips its halts until the begin of a block.
+skips its halts until the beginning of a block.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class BlockStops:
         self._blocks, self._next = stops.blocks, stops.first_block
 
     def step(self, step: Step) -> None:
-        """Halt at the begin of the first block after a step."""
+        """Halt at the beginning of the first block after a step."""
         self._next = step is Step.INTO
         self._seeking = step is not Step.INTO
         if self._seeking:
@@ -48,7 +48,7 @@ class BlockStops:
         return True
 
     def halts(self, block: str) -> bool:
-        """Return whether to halt at the begin of this block."""
+        """Return whether to halt at the beginning of this block."""
         if not self._next and block not in self._blocks:
             return False
         self._next = False

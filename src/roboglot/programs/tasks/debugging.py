@@ -23,7 +23,7 @@ Line = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True):
-    """Breakpoints at ``lines`` of the task's own text and of ``modules`` (by name) and at the begin of ``blocks``.
+    """Breakpoints at ``lines`` of the task's own text and of ``modules`` (by name) and at the beginning of ``blocks``.
 
     ``first``: halt before the next statement. ``first_block``: halt at the next begin of a block. ``watched``: allow
     stepping even without breakpoints.

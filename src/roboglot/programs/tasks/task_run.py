@@ -220,7 +220,7 @@ class TaskRun:
         self._run.calls.go_on()
 
     def step(self, step: Step = Step.INTO, *, to_block: bool = False) -> None:
-        """Halt after a step: before a statement, or at the begin of a block."""
+        """Halt after a step: before a statement, or at the beginning of a block."""
         (self._block_stops if to_block else self._run.position).step(step)
 
     def stop_at(self, stops: Stops) -> None:

@@ -28,4 +28,4 @@ class Answer:
 
 
 Repeated = Callable[[], bytes | Answer | None]
-"""Answer to a line that was said before: bytes, a refusal, or None: nothing was done, and it has to be read anew."""
+"""Answer to a repeated line: bytes, a refusal, or None: nothing was done, and the line must be parsed."""

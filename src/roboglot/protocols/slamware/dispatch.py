@@ -73,7 +73,7 @@ log = logging.getLogger(__name__)
 LOGGED_MAX = 200  # characters of a path or a refusal in a log line
 HEADS_MAX = 64  # heads of responses that are kept
 
-Repeated = Callable[[], bytes | None]  # a whole response, or None: the request has to be read anew
+Repeated = Callable[[], bytes | None]  # a whole response, or None: the request must be parsed
 Send = Callable[[dict[str, object]], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
 

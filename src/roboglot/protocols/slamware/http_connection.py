@@ -46,7 +46,7 @@ class Answering(Protocol):
     """An ASGI application that may know how to answer a request whenever it comes again."""
 
     def at_once(self, scope: Scope) -> Callable[[], bytes | None] | None:
-        """Return a function for the whole response, or for None, where the request has to be read anew."""
+        """Return a function for the whole response, or for None, where the request must be parsed."""
 
 
 class ReasonTransport(asyncio.Transport):

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 DRIVE_GAIN = 150.0  # 1/s: gain from the wheels' velocity to the body's: done in one step of physics, or it swings
-STOREY = 0.05  # m up or down after which the floor is counted anew
+STOREY = 0.05  # m up or down after which the floor is counted again
 FALLING = 0.05  # m/s up or down at which wheel contact is checked
 TIPPED = 1.0  # rad
 SHELL = 0.4  # friction of the shell, relative to the wheels'

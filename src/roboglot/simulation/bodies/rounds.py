@@ -133,7 +133,7 @@ class Rounds:
             yield
 
     def _gather(self, robots: tuple[SimulatedRobot, ...]) -> None:
-        """Make the functions of all robots' parts anew."""
+        """Make the functions of all robots' parts again."""
         self._robots = robots
         self.gathered += 1
         self.controls.clear()

@@ -31,7 +31,7 @@ def blank() -> memoryview[float]:
 
 
 class PersonState:
-    """Numbers of a person; the properties read them anew each time."""
+    """Numbers of a person. Kernels may update them, so the properties read them each time."""
 
     def __init__(self, floor: int) -> None:
         self._row = blank()

@@ -47,12 +47,12 @@ class Mesh:
     rooms: NDArray[np.int32]
 
     def placed(self, x: float, y: float, z: float, yaw: float) -> Mesh:
-        """Return the mesh turned by ``yaw`` (rad), then moved (m), and lit anew."""
+        """Return the mesh turned by ``yaw`` (rad), then moved (m), and lit again."""
         c, s = math.cos(yaw), math.sin(yaw)
         return self.moved(np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))), (x, y, z))
 
     def moved(self, rotation: Floats, to: tuple[float, float, float]) -> Mesh:
-        """Return the mesh turned by a rotation matrix, then moved (m), and lit anew."""
+        """Return the mesh turned by a rotation matrix, then moved (m), and lit again."""
         return posed([(self, rotation, to)])
 
 
@@ -63,7 +63,7 @@ def joined(meshes: Iterable[Mesh]) -> Mesh:
 
 
 def posed(parts: Sequence[tuple[Mesh, Floats, tuple[float, float, float]]]) -> Mesh:
-    """Return one mesh of all, each turned by its matrix, moved, and lit anew; mostly without the GIL."""
+    """Return one mesh of all, each turned by its matrix, moved, and lit again; mostly without the GIL."""
     whole = joined(mesh for mesh, _, _ in parts)
     counts = [len(mesh.textures) for mesh, _, _ in parts]
     owners = np.repeat(np.arange(len(parts), dtype=np.int32), counts)

@@ -1,4 +1,4 @@
-"""Scenery for a camera's renderer: still meshes per floor, made once, and moving figures, made anew.
+"""Scenery for a camera's renderer: still meshes per floor, made once, and moving figures, made for each picture.
 
 Truth, world frame, z from the ground floor. Knows no sensor.
 """

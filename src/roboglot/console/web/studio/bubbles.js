@@ -54,7 +54,7 @@ function soon() {
   requestAnimationFrame(() => { due = false; draw(); });
 }
 
-/** Draw what is new, take away what is no more; also after the blocks were made anew. */
+/** Draw new bubbles and remove old ones, also after the blocks were replaced. */
 export function draw() {
   for (const old of document.querySelectorAll(".blocklyBlockCanvas .value-bubble")) if (!shown.has(/** @type {any} */ (old).dataset.of)) old.remove();
   for (const [id, text] of shown) {

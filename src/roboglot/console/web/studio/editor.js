@@ -32,7 +32,7 @@ export function remake() {
   if (place) keepingKeyboard(build);
 }
 
-/** Have the keyboard where it was, in the toolbox or among the blocks, when `act` makes them anew. @param {() => void} act */
+/** Have the keyboard where it was, in the toolbox or among the blocks, when `act` replaces them. @param {() => void} act */
 function keepingKeyboard(act) {
   const at = place.contains(document.activeElement) && document.activeElement;
   const boxed = at && at.closest(".blocklyToolbox");
@@ -84,7 +84,7 @@ function soon() {
   });
 }
 
-/** Make the Python anew. */
+/** Generate the Python again. */
 export function refresh() {
   if (!workspace) return;
   code.value = pythonOf(workspace);

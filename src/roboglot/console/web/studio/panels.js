@@ -28,7 +28,7 @@ function coloured(text) {
   return [...parts, text.slice(at)];
 }
 
-/** Mark the lines of the lit block; a light changes many times a second, so nothing is made anew for it.
+/** Mark the lines of the lit block; a light changes many times a second, so nothing is rebuilt for it.
  * @param {HTMLElement | null} list @param {string} block */
 function mark(list, block) {
   for (const old of list?.querySelectorAll(".here") ?? []) if (/** @type {any} */ (old).dataset.of !== block) old.classList.remove("here");

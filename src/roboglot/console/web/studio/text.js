@@ -62,7 +62,7 @@ export async function makeText(element) {
   });
   turnBack = (redo) => { cm.historyKeymap.find((/** @type {any} */ one) => one.key === (redo ? "Mod-y" : "Mod-z")).run(view); };
   let looked = 0, known = /** @type {any[]} */ ([]);
-  /** What the checker found, once: a message that is made anew all the time cannot be read. */
+  /** What the checker found, once: a message that is replaced all the time cannot be read. */
   const verdict = () => {
     const same = known[0] === problems.value && known[1] === language.value;
     known = [problems.value, language.value];

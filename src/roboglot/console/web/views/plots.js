@@ -27,7 +27,7 @@ function note() {
   const robot = current.value, now = clock.value;
   if (!robot || !poses.value[robot]) return;
   let rows = noted.get(robot);
-  if (!rows || now < Number(rows.time.at(-1))) { // another robot, or a server that began anew
+  if (!rows || now < Number(rows.time.at(-1))) { // another robot, or a restarted server
     rows = Object.fromEntries(["time", ...Object.keys(SOURCES)].map((name) => [name, []]));
     noted.set(robot, rows);
   }

@@ -58,7 +58,7 @@ class SkinState:
 
 
 class ElectronicSkin(Component):
-    """Switched off, the whole skin is dark; switched on again, the pattern begins anew."""
+    """Switched off, the whole skin is dark; switched on again, the pattern starts again."""
 
     @property
     @abstractmethod

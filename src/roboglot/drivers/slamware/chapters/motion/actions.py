@@ -134,7 +134,7 @@ class ActionRunner:
             self._orphan = running
 
     async def stop_orphan(self) -> None:
-        """Stop the orphaned action after a reconnection. A restarted robot numbers its actions anew."""
+        """Stop the orphaned action after a reconnection. A restarted robot numbers its actions from the start."""
         orphan, self._orphan = self._orphan, None
         unanswered, self._unanswered = self._unanswered, ""
         ours, self._ours = self._ours, []

@@ -42,7 +42,7 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     try:
         await robot.clock.wait_for(_begun(robot, action), ANSWER_MAX)
     except TimeoutError:
-        action.cancel("its begin could not be reported")
+        action.cancel("its start could not be reported")
         return {"error_code": int(InBandError.TIMEOUT)}
     return {"success": action.feedback in BEGUN}
 
