@@ -23,6 +23,7 @@ NAVIGATION = (
     "touring",
     "placing",
     "search",
+    "ways",
 )
 WORLD = ("sweep", "rays", "together", "gliding", "ticks")
 MODULES = (*NAVIGATION, "raster", "raster_shading", *WORLD, "posing")

@@ -110,17 +110,17 @@ def _clear_ray(
     per_row = 1.0 / abs(dy) if dy != 0 else np.inf
     next_col = ((col + 1 - cell_x) if dx > 0 else (cell_x - col)) * per_col if dx != 0 else np.inf
     next_row = ((row + 1 - cell_y) if dy > 0 else (cell_y - row)) * per_row if dy != 0 else np.inf
-    gone, touched, at, down = 0.0, marks.reshape(-1), row * width + col, step_row * width
+    gone, cells, touched, at, down = 0.0, evidence.reshape(-1), marks.reshape(-1), row * width + col, step_row * width
     while gone < last:
         if not (np.uintp(row) < np.uintp(height) and np.uintp(col) < np.uintp(width)):  # both signs in one comparison
             return
-        mark = touched[np.uintp(at)]
-        if mark != scan and mark != FROZEN:
-            before = evidence[np.uintp(row), np.uintp(col)]
-            if not (before > 0 and (gentle or _is_grazed(evidence, slots, surfaces, row, col, dx, dy, resolution))):
-                touched[np.uintp(at)] = scan
-                value = max(EVIDENCE_MIN, before + MISS)
-                evidence[np.uintp(row), np.uintp(col)] = value if value != 0 else -1
+        before = cells[np.uintp(at)]
+        if before == EVIDENCE_MIN or touched[np.uintp(at)] == scan or touched[np.uintp(at)] == FROZEN:
+            pass  # most floor is as free as can be: its mark need not be looked up
+        elif before <= 0 or not (gentle or _is_grazed(evidence, slots, surfaces, row, col, dx, dy, resolution)):
+            touched[np.uintp(at)] = scan
+            value = max(EVIDENCE_MIN, before + MISS)
+            cells[np.uintp(at)] = value if value != 0 else -1
         if next_col < next_row:
             gone = next_col
             next_col += per_col

@@ -7,7 +7,7 @@ import pytest
 
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.traffic.narrow_places import NarrowPlaces, narrow
-from roboglot.autonomy.traffic.right_of_way import joined
+from roboglot.kernels.ways import join
 
 
 @pytest.mark.parametrize("shape", [(90, 300), (128, 70)])
@@ -59,5 +59,7 @@ def test_a_door_at_a_slant_is_narrow() -> None:
 
 def test_places_between_narrow_ones_count_as_narrow() -> None:
     way = np.array([0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0], bool)
-    assert joined(way, 3).astype(int).tolist() == [0, 1, 1, 1, 1, 0, 0, 0, 0, 1, 0]
-    assert not joined(np.zeros(4, bool), 3).any()
+    join(way, 3)
+    assert way.astype(int).tolist() == [0, 1, 1, 1, 1, 0, 0, 0, 0, 1, 0]
+    join(none := np.zeros(4, bool), 3)
+    assert not none.any()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.kernels.distance import distances, gaps
+from roboglot.kernels.ways import kinds_at
 from roboglot.model.geometry import Point
 
 HALF = 0.62  # m: half the width that two hulls of 0.27 m need side by side, with 5 cm around each
@@ -61,19 +62,12 @@ class NarrowPlaces:
         No disc as wide as two robots fits into the free floor there, or it is a door.
         """
         self._update(grid, Point(float(points[0, 0]), float(points[0, 1])), now)
-        cells = np.floor(points / RESOLUTION).astype(np.intp)
-        height, width = self._found.shape
-        if not height or not width:
-            return np.zeros(len(points), bool)
-        rows, columns = cells[:, 1] - self._corner[0], cells[:, 0] - self._corner[1]
-        within = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-        rows *= within
-        columns *= within
-        found = self._found[rows, columns]
-        if not (found | ~within).all():
-            self._examine(rows[within], columns[within])
-            found = self._found[rows, columns]
-        is_narrow: NDArray[np.bool_] = (found == NARROW) & within
+        found = kinds_at(self._found, points, *self._corner, RESOLUTION, OPEN)
+        if UNSEEN in found:
+            cells = np.floor(points[found == UNSEEN] / RESOLUTION).astype(np.intp)
+            self._examine(cells[:, 1] - self._corner[0], cells[:, 0] - self._corner[1])
+            found = kinds_at(self._found, points, *self._corner, RESOLUTION, OPEN)
+        is_narrow: NDArray[np.bool_] = found == NARROW
         return is_narrow
 
     def holds(self, grid: EvidenceGrid, here: Point, place: Point, now: float) -> bool:

@@ -65,17 +65,10 @@ class Way:
         x, y = self.points[0].tolist()
         return math.hypot(x - pose.x, y - pose.y) < reach
 
-    def stopping(self) -> Points:
-        """Return the points within its stopping distance, and the place where it stops."""
-        reach = self.speed * REACTION + self.speed**2 / (2.0 * DECELERATION)
-        ahead = self.points[1:] - self.points[:-1]
-        along = np.concatenate(([0.0], np.cumsum(np.hypot(ahead[:, 0], ahead[:, 1]))))
-        within = self.points[along <= reach]
-        if not 0.0 < reach < along[-1]:
-            return within
-        last = len(within)
-        share = (reach - along[last - 1]) / (along[last] - along[last - 1])
-        return np.concatenate((within, within[-1:] + share * ahead[last - 1]))
+    @property
+    def stops(self) -> float:
+        """Distance within which the robot can come to a stop, m."""
+        return self.speed * REACTION + self.speed**2 / (2.0 * DECELERATION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,15 +119,6 @@ def through_narrow(mover: Mover, points: Points, narrow: NDArray[np.bool_]) -> W
     return Way(points[:end], mover.speed, mover.radius, outranks=True, lively=True)
 
 
-def joined(narrow: NDArray[np.bool_], longest: int) -> NDArray[np.bool_]:
-    """Return ``narrow``, by point of a way, with gaps of up to ``longest`` points between such places filled."""
-    filled, at = narrow.copy(), np.flatnonzero(narrow)
-    gaps = np.diff(at)
-    for gap in np.flatnonzero((gaps > 1) & (gaps <= longest)).tolist():
-        filled[at[gap] : at[gap + 1]] = True
-    return filled
-
-
 def shifted(way: Way) -> Points:
     """Return the way's points shifted to its right, so that plans pass on the other side."""
     if len(way.points) < 2:
@@ -147,7 +131,9 @@ def shifted(way: Way) -> Points:
 
 def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> Iterator[Meeting]:
     """Yield the meetings with others if the hull continues along ``path`` (dense) at ``speed`` m/s."""
-    mine = path[:: round(STEP / SPACING)]
+    from roboglot.kernels.ways import facing  # it needs Numba
+
+    mine = np.ascontiguousarray(path[:: round(STEP / SPACING)])
     if len(mine) < 2:
         return
     seconds = np.arange(len(mine)) * STEP / max(speed, SLOW)
@@ -155,12 +141,10 @@ def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> 
     for way in ways:
         if len(way.points) < 2 or _is_far(way, x, y, len(path), radius + CLEAR):
             continue
-        close = way.distances(mine) < radius + way.radius + CLEAR
+        close = facing(mine, way.points, radius + way.radius + CLEAR, ALIKE)
         if not close.any():
             continue
-        against = directions(mine) @ directions(way.points).T < ALIKE
         later = way.seconds[None, :] - seconds[:, None]
-        close &= against
         meets = np.asarray((close & (later > -BEFORE) & (later < AFTER)).any(axis=1))
         stands = bool(close[0].any())
         if stands:  # a robot that is leaving the other's route continues
@@ -193,16 +177,13 @@ def directions(points: Points) -> Points:
 
 def free_of_movers(path: Points, pose: Pose, radius: float, ways: Sequence[Way]) -> float:
     """Return the distance along ``path`` that stays clear of others that brake now, m; inf: all of it."""
+    from roboglot.kernels.ways import meets_mover  # it needs Numba
+
     free, (x, y) = math.inf, path[0].tolist()
     for way in ways:
+        reach = radius + way.radius + CLEAR_MOVING
         if len(way.points) < 2 or _is_far(way, x, y, len(path), radius + CLEAR_MOVING):
             continue
-        points = way.stopping()
-        if len(points) < 2:
-            continue
-        away = np.hypot(path[:, None, 0] - points[None, :, 0], path[:, None, 1] - points[None, :, 1])
-        now = np.hypot(points[:, 0] - pose.x, points[:, 1] - pose.y)
-        hits = ((away < radius + way.radius + CLEAR_MOVING) & (away < now[None, :] - 0.01)).any(axis=1)
-        if hits.any():
-            free = min(free, float(hits.argmax()) * SPACING)
+        at = meets_mover(path, way.points, way.stops, pose.x, pose.y, reach)
+        free = min(free, at * SPACING) if at >= 0 else free
     return free

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.route import SPACING
 from roboglot.autonomy.slam.belief import Belief
-from roboglot.autonomy.traffic.right_of_way import joined
 from roboglot.model.clock import Clock
 from roboglot.model.geometry import Point
 
@@ -33,8 +32,11 @@ class Tight:
 
         The first point is the robot's; the first ``skipped`` ones do not belong to the path.
         """
+        from roboglot.kernels.ways import join  # it needs Numba
+
         narrow = self._found().at(self._belief.map, path, self._clock.time())[skipped:]
-        return joined(narrow, round(BETWEEN / spacing))
+        join(narrow, round(BETWEEN / spacing))
+        return narrow
 
     def holds(self, here: Point, place: Point) -> bool:
         """True if ``place`` itself is too narrow for two; the robot is ``here``."""

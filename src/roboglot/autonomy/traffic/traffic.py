@@ -105,8 +105,8 @@ class Traffic:
         if not heard and not any(stamp - mover.moved_at <= LIVELY for mover in movers):
             return False
         behind = [(point.x, point.y) for point in self._trail]
-        ahead = self._announcer.way[: round(BETWEEN / STEP)]
-        line = np.concatenate([[(pose.x, pose.y)], np.reshape(behind, (-1, 2)), [(pose.x, pose.y)], ahead])
+        ahead = self._announcer.way[: round(BETWEEN / STEP)].tolist()
+        line = np.array([(pose.x, pose.y), *behind, (pose.x, pose.y), *ahead])
         return bool(self._tight.along(line, STEP, skipped=1)[len(behind)])
 
     def _goes(self, other: Announcement) -> bool:
