@@ -69,7 +69,7 @@ class Follower:
     @property
     def end(self) -> Point:
         """End of the route."""
-        return self.route.point_at(self.route.length)
+        return self.route.end
 
     def locate(self, pose: Pose) -> None:
         """Update the place on the route, and count the goals reached since the last call."""
@@ -101,7 +101,7 @@ class Follower:
         allowed = math.sqrt(braking * max(0.0, self.stop_at - STOP_GAP - reached))
         allowed = min(allowed, math.sqrt(SLOW * SLOW + braking * max(0.0, self.slow_at - reached)))
         error = 0.0
-        near = pose.distance_to(self.route.point_at(self.route.length))
+        near = pose.distance_to(self.route.end)
         closing = self.last and self.left < FINAL
         if closing:
             allowed = min(allowed, self.top, FINAL_SPEED, self.route.ceiling_here)

@@ -122,23 +122,38 @@ class Pilot:
 
     async def _follow(self, follower: Follower) -> State:
         """Drive until close enough to the end, and brake."""
-        while not await self._is_over(follower):
-            pose = self._belief.pose
-            if self._replanner.advance(follower):
-                self._patience.take(follower.left)
-            if not self._lookout.watches(follower) or self._belief.in_doubt:
-                follower.stop_at = follower.along
-            self._base.set_velocity(follower.command(pose))
-            waiting = follower.stop_at - follower.along < self._tuning.waiting_gap and follower.speed < WAITING_SPEED
-            if waiting:
-                self._journey.waits(self._robot, self._action)
-            self._report_progress(follower, pose, "waiting" if waiting else "driving")
-            if self._courtesy.is_due(follower):
-                return State.GIVING_WAY
-            await self._clock.sleep(PERIOD)
-        await stand_still(self._robot)
-        follower.halt()
-        return State.TURNING
+        state = State.FOLLOWING
+
+        def step() -> float | None:
+            nonlocal state
+            if self._action.paused:
+                return None
+            state = self._step(follower)
+            return PERIOD if state is State.FOLLOWING else None
+
+        while state is State.FOLLOWING:
+            await self._hold(follower)
+            await self._clock.keep_calling(step)
+        if state is State.TURNING:
+            await stand_still(self._robot)
+            follower.halt()
+        return state
+
+    def _step(self, follower: Follower) -> State:
+        """Set the base's velocity for the next period; return the state that follows. Raises Blocked, NotLocalized."""
+        if self._is_over(follower):
+            return State.TURNING
+        pose = self._belief.pose
+        if self._replanner.advance(follower):
+            self._patience.take(follower.left)
+        if not self._lookout.watches(follower) or self._belief.in_doubt:
+            follower.stop_at = follower.along
+        self._base.set_velocity(follower.command(pose))
+        waiting = follower.stop_at - follower.along < self._tuning.waiting_gap and follower.speed < WAITING_SPEED
+        if waiting:
+            self._journey.waits(self._robot, self._action)
+        self._report_progress(follower, pose, "waiting" if waiting else "driving")
+        return State.GIVING_WAY if self._courtesy.is_due(follower) else State.FOLLOWING
 
     async def _give_way(self, follower: Follower) -> State:
         """Move aside, wait there, and set out again."""
@@ -151,9 +166,8 @@ class Pilot:
         self._patience.begin_anew()
         return State.FOLLOWING
 
-    async def _is_over(self, follower: Follower) -> bool:
+    def _is_over(self, follower: Follower) -> bool:
         """Return whether to brake at the end of the route. Raises Blocked or NotLocalized to give up."""
-        await self._hold(follower)
         pose, patience, tuning = self._belief.pose, self._patience, self._tuning
         follower.locate(pose)
         self._journey.far += follower.speed * PERIOD

@@ -59,6 +59,7 @@ class Route:
         self.unknown = 0.0  # m over floor that was never seen
         self.ends_known = False  # whether the map knows the floor at all goals
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
+        self.end = self.goals[-1]
         self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
         self._spots: list[list[float]] = self.points.tolist()
         self._at = 0
