@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from roboglot.kernels.ways import facing, join, kinds_at, meets_mover
+from roboglot.kernels.distance import facing, join, kinds_at, meets_mover
 
 OFF = 9  # of a place that lies on no cell
 

@@ -23,7 +23,6 @@ NAVIGATION = (
     "touring",
     "placing",
     "search",
-    "ways",
 )
 WORLD = ("sweep", "rays", "together", "gliding", "ticks")
 MODULES = (*NAVIGATION, "raster", "raster_shading", *WORLD, "posing")

@@ -7,7 +7,7 @@ import pytest
 
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.traffic.narrow_places import NarrowPlaces, narrow
-from roboglot.kernels.ways import join
+from roboglot.kernels.distance import join
 
 
 @pytest.mark.parametrize("shape", [(90, 300), (128, 70)])

@@ -323,14 +323,14 @@ class Planner:
         last, self._last = self._last, pose
         if not (self._belief.localizing and self._belief.quality >= TRODDEN_QUALITY):
             return
-        grid = self._belief.map
-        if (here := (grid, last, pose, self.radius)) == self._stood:
+        grid, radius = self._belief.map, self.radius
+        if (here := (grid, last, pose, radius)) == self._stood:
             return  # already marked
         self._stood = here
         trodden = self._trodden.of(grid)
-        if self.radius > self._trodden_radius:  # the load is wider than whatever passed there before
+        if radius > self._trodden_radius:  # the load is wider than whatever passed there before
             trodden[:] = 0
-        self._trodden_radius = self.radius
+        self._trodden_radius = radius
         begin = pose if last is None or last.distance_to(pose) > TREAD_MAX else last
         _mark_line(trodden, grid.corner, begin.point, pose.point)
 

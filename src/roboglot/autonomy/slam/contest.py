@@ -9,6 +9,7 @@ the kernels.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import deque
 from dataclasses import replace
 
@@ -93,7 +94,7 @@ class WheelWitness:
         for seconds in PASTS:
             if driven is not None:
                 break
-            then = next(moment for moment in self._past if last.stamp - moment.stamp < seconds)
+            then = self._past[bisect_right(self._past, -seconds, key=lambda moment: moment.stamp - last.stamp)]
             moved, driven_way = self._wheels.relative_to(then.wheels), last.way - then.way + way
             if abs(moved.yaw) > PAST_TURN_MAX:
                 break

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
-from roboglot.kernels.distance import distances, gaps
-from roboglot.kernels.ways import kinds_at
+from roboglot.kernels.distance import distances, gaps, kinds_at
 from roboglot.model.geometry import Point
 
 HALF = 0.62  # m: half the width that two hulls of 0.27 m need side by side, with 5 cm around each

@@ -131,7 +131,7 @@ def shifted(way: Way) -> Points:
 
 def meetings(path: Points, speed: float, radius: float, ways: Sequence[Way]) -> Iterator[Meeting]:
     """Yield the meetings with others if the hull continues along ``path`` (dense) at ``speed`` m/s."""
-    from roboglot.kernels.ways import facing  # it needs Numba
+    from roboglot.kernels.distance import facing  # it needs Numba
 
     mine = np.ascontiguousarray(path[:: round(STEP / SPACING)])
     if len(mine) < 2:
@@ -177,7 +177,7 @@ def directions(points: Points) -> Points:
 
 def free_of_movers(path: Points, pose: Pose, radius: float, ways: Sequence[Way]) -> float:
     """Return the distance along ``path`` that stays clear of others that brake now, m; inf: all of it."""
-    from roboglot.kernels.ways import meets_mover  # it needs Numba
+    from roboglot.kernels.distance import meets_mover  # it needs Numba
 
     free, (x, y) = math.inf, path[0].tolist()
     for way in ways:

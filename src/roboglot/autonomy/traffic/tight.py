@@ -32,7 +32,7 @@ class Tight:
 
         The first point is the robot's; the first ``skipped`` ones do not belong to the path.
         """
-        from roboglot.kernels.ways import join  # it needs Numba
+        from roboglot.kernels.distance import join  # it needs Numba
 
         narrow = self._found().at(self._belief.map, path, self._clock.time())[skipped:]
         join(narrow, round(BETWEEN / spacing))

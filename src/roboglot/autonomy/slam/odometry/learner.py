@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.matcher import Match
-from roboglot.autonomy.slam.odometry.noise import Doubt, LearntBias, LearntNoise
+from roboglot.autonomy.slam.odometry.noise import Doubt, LearntBias, LearntNoise, Rows
 from roboglot.model.components.sensing.odometry import OdometryNoise
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.values import dataclass
@@ -65,21 +65,17 @@ class OdometryLearner:
 
     def learn(self, correction: Correction, driven: float, still: Callable[[], bool]) -> None:
         """Learn from a correction at ``driven`` m; the noise rises only if everything around is ``still``."""
-        before, here, after, prior = (
-            correction.before,
-            correction.best.pose,
-            correction.best.covariance,
-            correction.prior,
-        )
+        before, here, step = correction.before, correction.best.pose, correction.step
+        prior: Rows = correction.prior.tolist()
+        after: Rows = correction.best.covariance.tolist()
         off = (here.x - before.x, here.y - before.y, wrap_angle(here.yaw - before.yaw))
-        step = correction.step
         direction = here.yaw - step.yaw + math.atan2(step.y, step.x)
         self.noise.learn(off, prior, after, direction, rising=lambda: self.learns(driven) and still())
         if correction.moved is None:
             return
         c, s = abs(math.cos(here.yaw)), abs(math.sin(here.yaw))
-        seen_x, seen_y = (1.0 - after[k, k] / prior[k, k] for k in (0, 1))
+        seen_x, seen_y = 1.0 - after[0][0] / prior[0][0], 1.0 - after[1][1] / prior[1][1]
         seen = (c * seen_x + s * seen_y, s * seen_x + c * seen_y) if self.learns(driven) else (0.0, 0.0)
         newest = self.noise.newest
-        doubt = Doubt(float(max(after[0, 0], after[1, 1])) + newest.way, float(after[2, 2]) + newest.yaw)
+        doubt = Doubt(max(after[0][0], after[1][1]) + newest.way, after[2][2] + newest.yaw)
         self.bias.learn(correction.moved, correction.seconds, here.relative_to(before), seen, doubt)

@@ -24,6 +24,8 @@ TURN_BIAS_MAX, SCALE_BIAS_MAX = 0.05, 0.25  # rad/s; share of the distance
 LEARNT_TURN_MAX, LEARNT_WAY_MAX = math.radians(1.0), 0.05  # rad, m: larger corrections have other reasons
 LEARNT_WAY_MIN = 0.03  # m driven from which a correction indicates the wheels' scale
 
+Rows = list[list[float]]  # of a covariance
+
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
@@ -56,8 +58,8 @@ class LearntNoise:
     def learn(
         self,
         correction: tuple[float, float, float],
-        prior: NDArray[np.float64],
-        posterior: NDArray[np.float64],
+        prior: Rows,
+        posterior: Rows,
         direction: float,
         *,
         rising: Callable[[], bool] = lambda: True,
@@ -69,14 +71,13 @@ class LearntNoise:
         """
         c, s = math.cos(direction), math.sin(direction)
         before, (way, around) = self._before.tolist(), self._described
-        wide, narrow = prior.tolist(), posterior.tolist()
         correction_along = c * correction[0] + s * correction[1]
         factor = _learnt(
-            self.way_factor, correction_along, _along(wide, c, s), _along(narrow, c, s), _along(before, c, s), way
+            self.way_factor, correction_along, _along(prior, c, s), _along(posterior, c, s), _along(before, c, s), way
         )
         if factor <= self.way_factor or rising():
             self.way_factor = factor
-        self.yaw_factor = _learnt(self.yaw_factor, correction[2], wide[2][2], narrow[2][2], before[2][2], around)
+        self.yaw_factor = _learnt(self.yaw_factor, correction[2], prior[2][2], posterior[2][2], before[2][2], around)
 
     @property
     def newest(self) -> Doubt:
@@ -100,7 +101,7 @@ class LearntNoise:
         return math.sqrt(self.way_factor), math.sqrt(self.yaw_factor)
 
 
-def _along(matrix: list[list[float]], c: float, s: float) -> float:
+def _along(matrix: Rows, c: float, s: float) -> float:
     """Return the variance in the direction with cosine ``c`` and sine ``s``."""
     return c * c * matrix[0][0] + 2.0 * c * s * matrix[0][1] + s * s * matrix[1][1]
 
