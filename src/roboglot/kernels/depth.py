@@ -6,7 +6,7 @@ import numpy as np
 
 from roboglot.kernels.arrays import FloatArray, Int16Array, Int32Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
-from roboglot.kernels.obstacles import beside_occupied
+from roboglot.kernels.obstacles import beside_occupied, still_noted
 
 LOW, FLOOR = 0.10, 0.04  # m above the floor: lower objects are stepped over; certainly floor
 STEEP = 0.7  # slope from which a surface is a wall
@@ -72,17 +72,6 @@ def sort_out_all(
     return obstacles[:standing].copy(), floor[:lying].copy()
 
 
-@kernel("int64(float32[:,::1], int32[:,::1], int64)")
-def _still_noted(seen: SingleArray, noted: Int32Array, count: int) -> int:
-    """Leave those of the first ``count`` rows of ``noted`` whose cells are not 0; returns how many."""
-    left = 0
-    for k in range(count):
-        if seen[noted[k, 0], noted[k, 1]] > 0.0:
-            noted[left, 0], noted[left, 1] = noted[k, 0], noted[k, 1]
-            left += 1
-    return left
-
-
 @kernel(
     "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float32[:,::1], float64[:,::1], float64[:,::1],"
     " float64[:,::1], float64[::1], float64[::1], float64, float64, float64, int32[:,::1], int64)",
@@ -120,8 +109,7 @@ def remember_low(
         row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
         if 0 <= row < height and 0 <= col < width and heights[row, col] <= floor[i, 2]:
             seen[row, col] = 0.0
-    if listed > 0:
-        listed = _still_noted(seen, noted, listed)
+    listed = still_noted(seen, noted, listed)
     for i in range(len(obstacles)):
         x = cos * obstacles[i, 0] - sin * obstacles[i, 1] + pose[0]
         y = sin * obstacles[i, 0] + cos * obstacles[i, 1] + pose[1]

@@ -1,6 +1,6 @@
 """Distances in a grid: the exact Euclidean transform, cut off at a cap; and straight on, for gaps between obstacles.
 
-Distances between ways: where a robot's meets another's, and which of its places lie in cells of a kind.
+And between a robot's way and another's.
 
 Near ones are compared one by one in wide instructions, far ones by parabolas (Felzenszwalb and Huttenlocher 2012): the
 same to the last bit, since squares of whole cells are exact.
@@ -13,7 +13,6 @@ import numpy as np
 from roboglot.kernels.arrays import BoolArray, ByteArray, FloatArray, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
 
-SHORTEST = 1e-6  # m: shorter pieces of a way have no direction
 NEAR_MAX = 24  # cells of a cap up to which comparing one by one is quicker
 
 
@@ -223,13 +222,13 @@ def join(marked: BoolArray, longest: int) -> None:
 
 
 @kernel("float64[:,::1](float64[:,::1])")
-def _directions(way: FloatArray) -> FloatArray:
+def directions(way: FloatArray) -> FloatArray:
     """Return unit vectors along a way (n, 2), from each point to the next; the last is as the one before."""
     found, last = np.zeros(way.shape), len(way) - 1
     for i in range(last + 1 if last > 0 else 0):
         k = min(i, last - 1)
         x, y = way[k + 1, 0] - way[k, 0], way[k + 1, 1] - way[k, 1]
-        length = max(np.hypot(x, y), SHORTEST)
+        length = max(np.hypot(x, y), 1e-6)
         found[i, 0], found[i, 1] = x / length, y / length
     return found
 
@@ -240,7 +239,7 @@ def facing(path: FloatArray, way: FloatArray, reach: float, alike: float) -> Boo
 
     That is, the cosine of the angle between the two directions is less than ``alike``.
     """
-    found, ahead, its = np.zeros((len(path), len(way)), np.bool_), _directions(path), _directions(way)
+    found, ahead, its = np.zeros((len(path), len(way)), np.bool_), directions(path), directions(way)
     for i in range(len(path)):
         for j in range(len(way)):
             if np.hypot(path[i, 0] - way[j, 0], path[i, 1] - way[j, 1]) < reach:
@@ -250,10 +249,9 @@ def facing(path: FloatArray, way: FloatArray, reach: float, alike: float) -> Boo
 
 @kernel("int64(float64[:,::1], float64[:,::1], float64, float64, float64, float64)")
 def meets_mover(path: FloatArray, way: FloatArray, stops: float, x: float, y: float, reach: float) -> int:
-    """Return the number of the first point of ``path`` (n, 2; m) within ``reach`` of a mover that brakes; -1: none is.
+    """Return the first point of ``path`` (n, 2; m) within ``reach`` of a mover's ``way`` (k, 2; m); -1: none is.
 
-    It may be at the points of its ``way`` (k, 2; m) up to ``stops`` m. Those that a robot at (x, y) moves away from do
-    not count.
+    The way counts up to ``stops`` m. What a robot at (x, y) moves away from does not count.
     """
     spots, count, along = np.empty((len(way), 2)), 0, 0.0
     for j in range(len(way)):

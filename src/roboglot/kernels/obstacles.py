@@ -78,6 +78,17 @@ def _aimed(ends: FloatArray, x: float, y: float, near: FloatArray, count: int) -
     return aimed
 
 
+@kernel("int64(float32[:,::1], int32[:,::1], int64)")
+def still_noted(seen: SingleArray, noted: Int32Array, count: int) -> int:
+    """Leave those of the first ``count`` rows of ``noted`` whose cells are not 0; returns how many, or -1 as before."""
+    left = min(count, 0)
+    for k in range(count):
+        if seen[noted[k, 0], noted[k, 1]] > 0.0:
+            noted[left, 0], noted[left, 1] = noted[k, 0], noted[k, 1]
+            left += 1
+    return left
+
+
 @kernel(
     "Tuple((int64, float64[:,::1]))(int16[:,::1], float32[:,::1], float64[:,::1], uint8[::1], float64[::1], float64,"
     " float64, int32[:,::1], int64)",
@@ -170,12 +181,7 @@ def remember(
             row = int(np.floor(y / resolution + k * step_y))
             if 0 <= row < height and 0 <= col < width:
                 seen[row, col] = 0.0
-    left = 0
-    for k in range(listed):
-        if seen[noted[k, 0], noted[k, 1]] > 0.0:
-            noted[left, 0], noted[left, 1] = noted[k, 0], noted[k, 1]
-            left += 1
-    return _note(evidence, seen, ends, hits, pose, now, resolution, noted, left if count >= 0 else -1)
+    return _note(evidence, seen, ends, hits, pose, now, resolution, noted, still_noted(seen, noted, count))
 
 
 @kernel("Tuple((int64, float64))(float64[:,::1], int64, int64, float64, float64)")

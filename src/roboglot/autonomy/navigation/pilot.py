@@ -126,10 +126,9 @@ class Pilot:
 
         def step() -> float | None:
             nonlocal state
-            if self._action.paused:
-                return None
-            state = self._step(follower)
-            return PERIOD if state is State.FOLLOWING else None
+            if not (paused := self._action.paused):
+                state = self._step(follower)
+            return PERIOD if state is State.FOLLOWING and not paused else None
 
         while state is State.FOLLOWING:
             await self._hold(follower)

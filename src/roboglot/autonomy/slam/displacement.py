@@ -47,9 +47,7 @@ class DisplacementWatch:
         corrections.append((stamp, seen.x - before.x, seen.y - before.y, way, sigma))
         x = y = driven = widest = 0.0
         for _, along, up, some, sigma in corrections:
-            x, y, driven = x + along, y + up, driven + some
-            if sigma > widest:
-                widest = sigma
+            x, y, driven, widest = x + along, y + up, driven + some, max(widest, sigma)
         shoved = math.hypot(x, y)
         if shoved <= SHOVED + SHOVED_PER_METRE * driven + SIGMAS * widest:
             return None

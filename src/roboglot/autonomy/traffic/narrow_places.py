@@ -61,25 +61,17 @@ class NarrowPlaces:
         No disc as wide as two robots fits into the free floor there, or it is a door.
         """
         self._update(grid, Point(float(points[0, 0]), float(points[0, 1])), now)
-        found = kinds_at(self._found, points, *self._corner, RESOLUTION, OPEN)
-        if UNSEEN in found:
-            cells = np.floor(points[found == UNSEEN] / RESOLUTION).astype(np.intp)
-            self._examine(cells[:, 1] - self._corner[0], cells[:, 0] - self._corner[1])
-            found = kinds_at(self._found, points, *self._corner, RESOLUTION, OPEN)
+        while UNSEEN in (found := kinds_at(self._found, points, *self._corner, RESOLUTION, OPEN)):
+            x, y = points[found.tolist().index(UNSEEN)].tolist()
+            piece = math.floor(y / RESOLUTION) // TILE, math.floor(x / RESOLUTION) // TILE
+            top, left = (number * TILE - first for number, first in zip(piece, self._corner, strict=True))
+            self._found[top : top + TILE, left : left + TILE] = self._examined(piece)
         is_narrow: NDArray[np.bool_] = found == NARROW
         return is_narrow
 
     def holds(self, grid: EvidenceGrid, here: Point, place: Point, now: float) -> bool:
         """Return the same for one ``place``; the robot is ``here``."""
-        self._update(grid, here, now)
-        height, width = self._found.shape
-        row = math.floor(place.y / RESOLUTION) - self._corner[0]
-        column = math.floor(place.x / RESOLUTION) - self._corner[1]
-        if not (0 <= row < height and 0 <= column < width):
-            return False
-        if self._found[row, column] == UNSEEN:
-            self._examine(np.array([row]), np.array([column]))
-        return bool(self._found[row, column] == NARROW)
+        return bool(self.at(grid, np.array([(here.x, here.y), (place.x, place.y)]), now)[1])
 
     def _update(self, grid: EvidenceGrid, here: Point, now: float) -> None:
         """Copy the map around ``here`` if the copy is too old, or of another place."""
@@ -98,14 +90,6 @@ class NarrowPlaces:
         self._found = np.full((height, width), UNSEEN, np.uint8)
         if grid is not self._grid:
             self._before = {}
-
-    def _examine(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> None:
-        """Fill in the pieces in which these cells lie."""
-        for down, along in set(zip((rows // TILE).tolist(), (columns // TILE).tolist(), strict=True)):
-            top, left = down * TILE, along * TILE
-            if self._found[top, left] == UNSEEN:
-                piece = (self._corner[0] + top) // TILE, (self._corner[1] + left) // TILE
-                self._found[top : top + TILE, left : left + TILE] = self._examined(piece)
 
     def _examined(self, piece: tuple[int, int]) -> NDArray[np.uint8]:
         """Return OPEN or NARROW for each cell of one piece (TILE, TILE), with the cells around it that matter.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.route import SPACING
-from roboglot.autonomy.traffic.right_of_way import CLEAR, SLOW, STEP, Meeting, Way, directions
+from roboglot.autonomy.traffic.right_of_way import CLEAR, SLOW, STEP, Meeting, Way
 
 NEAR = 3.0  # m ahead within which a stretch may begin
 OPPOSITE = -0.3  # cosine below which two drive against each other
@@ -70,7 +70,7 @@ class OneWay:
 def _stretches(narrow: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last index, exclusive, of each run."""
     edges = np.flatnonzero(np.diff(narrow.astype(np.int8), prepend=0, append=0))
-    return [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]
+    return [(begin, end) for begin, end in edges.reshape(-1, 2).tolist()]
 
 
 def _goes_first(way: Way, mine: Points, radius: float, arrives: float, leaves: float) -> bool:
@@ -78,13 +78,13 @@ def _goes_first(way: Way, mine: Points, radius: float, arrives: float, leaves: f
 
     The robot would come in and out in so many seconds.
     """
-    close = way.distances(mine) < radius + way.radius + CLEAR
-    if not close.any():
-        return False
-    against = close & (directions(mine) @ directions(way.points).T < OPPOSITE)
+    from roboglot.kernels.distance import facing  # it needs Numba
+
+    reach = radius + way.radius + CLEAR
+    against = facing(np.ascontiguousarray(mine), way.points, reach, OPPOSITE)
     if np.count_nonzero(against.any(axis=1)) * STEP < LONG:
         return False
-    comes = float(way.seconds[close.any(axis=0).argmax()])
+    comes = float(way.seconds[(way.distances(mine) < reach).any(axis=0).argmax()])
     if comes == 0.0:
         return True  # it is inside
     if not way.name or leaves + SPARE < comes:

@@ -65,11 +65,6 @@ class Way:
         x, y = self.points[0].tolist()
         return math.hypot(x - pose.x, y - pose.y) < reach
 
-    @property
-    def stops(self) -> float:
-        """Distance within which the robot can come to a stop, m."""
-        return self.speed * REACTION + self.speed**2 / (2.0 * DECELERATION)
-
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
@@ -114,8 +109,7 @@ def straight_on(mover: Mover, far: float) -> Points:
 
 def through_narrow(mover: Mover, points: Points, narrow: NDArray[np.bool_]) -> Way:
     """Return the way of a mover in a narrow place: along ``points`` (straight on) out of it, with right of way."""
-    wide = np.flatnonzero(~narrow)
-    end = (int(wide[0]) if len(wide) else len(points)) + OUT
+    end = int(np.argmin([*narrow, False])) + OUT
     return Way(points[:end], mover.speed, mover.radius, outranks=True, lively=True)
 
 
@@ -161,18 +155,7 @@ def _is_far(way: Way, x: float, y: float, count: int, reach: float) -> bool:
 
     Announced ways are not looked at: their points may lie farther apart than STEP.
     """
-    if way.name:
-        return False
-    return not way.is_within(SPACING * count + STEP * len(way.points) + reach + way.radius, Pose(x, y))
-
-
-def directions(points: Points) -> Points:
-    """Return unit vectors along a way (n, 2)."""
-    ahead = np.diff(points, axis=0, append=points[-1:])
-    ahead[-1] = ahead[-2]
-    length = np.hypot(*ahead.T)
-    directions: Points = ahead / np.maximum(length, 1e-6)[:, None]
-    return directions
+    return not way.name and not way.is_within(SPACING * count + STEP * len(way.points) + reach + way.radius, Pose(x, y))
 
 
 def free_of_movers(path: Points, pose: Pose, radius: float, ways: Sequence[Way]) -> float:
@@ -181,9 +164,8 @@ def free_of_movers(path: Points, pose: Pose, radius: float, ways: Sequence[Way])
 
     free, (x, y) = math.inf, path[0].tolist()
     for way in ways:
-        reach = radius + way.radius + CLEAR_MOVING
-        if len(way.points) < 2 or _is_far(way, x, y, len(path), radius + CLEAR_MOVING):
-            continue
-        at = meets_mover(path, way.points, way.stops, pose.x, pose.y, reach)
-        free = min(free, at * SPACING) if at >= 0 else free
+        if len(way.points) >= 2 and not _is_far(way, x, y, len(path), radius + CLEAR_MOVING):
+            stops = way.speed * REACTION + way.speed**2 / (2.0 * DECELERATION)
+            at = meets_mover(path, way.points, stops, pose.x, pose.y, radius + way.radius + CLEAR_MOVING)
+            free = min(free, at * SPACING) if at >= 0 else free
     return free

@@ -22,7 +22,6 @@ from roboglot.autonomy.traffic.right_of_way import (
     Meeting,
     Way,
     announced_way,
-    directions,
     expected_way,
     free_of_movers,
     meetings,
@@ -138,8 +137,10 @@ class Traffic:
 
     def leaves(self, path: Points) -> float:
         """Return the time until all others are expected to have left ``path`` (dense), s; inf: one will not."""
+        from roboglot.kernels.distance import directions  # it needs Numba
+
         radius, latest = self._robot.description.radius + CLEAR, 0.0
-        mine = path[:: round(STEP / SPACING)]
+        mine = np.ascontiguousarray(path[:: round(STEP / SPACING)])
         for way in self._ways if len(mine) >= 2 else ():
             close = way.distances(mine) < radius + way.radius
             on = np.flatnonzero(close.any(axis=0))
