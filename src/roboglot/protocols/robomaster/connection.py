@@ -112,7 +112,7 @@ class ControlConnection(asyncio.Protocol):
             self._read(data)
 
     def _repeat(self, repeated: Repeated) -> object:
-        """Return the answer to a line that was said before; None if it has to go the long way now."""
+        """Return the answer to a repeated line; None if the line must be parsed."""
         use = self._use
         if not use.left:
             fairness = self._context.robot.fairness
