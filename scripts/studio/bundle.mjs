@@ -47,18 +47,23 @@ async function packed(folder, name, code) {
   return there && !Buffer.compare(gunzipSync(there), bundle) ? there : gzipSync(bundle, { level: 9 });
 }
 
+// Each text of terms once, below the notices of all packages that are under it.
 async function licences(packages) {
-  const texts = new Map();
   const apache = await readFile(join(CONSOLE, "Apache-2.0.txt"), "utf-8"); // shipped once
+  const notices = new Map();
   for (const name of packages) {
     const folder = join(here, "node_modules", name);
     const { version } = JSON.parse(await readFile(join(folder, "package.json"), "utf-8"));
     const file = (await readdir(folder)).find((entry) => /^licen[cs]e/i.test(entry));
     if (!file) continue;
-    const text = await readFile(join(folder, file), "utf-8"); // many packages have the same
-    texts.set(text, [...(texts.get(text) ?? []), `${name} ${version}`]);
+    const text = await readFile(join(folder, file), "utf-8");
+    const mit = /^(?:MIT License\n+)?(Copyright .*\n)\n(Permission is hereby granted[^]*)$/.exec(text);
+    const [owner, terms] = mit ? [mit[1], `MIT License\n\n${mit[2]}`] : ["", text === apache ? APACHE_NOTICE : text];
+    const owners = notices.get(terms) ?? new Map();
+    owners.set(owner, [...(owners.get(owner) ?? []), `${name} ${version}\n`]);
+    notices.set(terms, owners);
   }
-  const sections = [...texts].map(([text, names]) => `${names.join("\n")}\n\n${text === apache ? APACHE_NOTICE : text}`);
+  const sections = [...notices].map(([terms, owners]) => [...owners].map(([owner, names]) => `${names.join("")}${owner}\n`).join("") + terms);
   return Buffer.from(sections.join("\n\n----------------------------------------\n\n"));
 }
 
