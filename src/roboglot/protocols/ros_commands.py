@@ -17,7 +17,7 @@ FAR = 1e6  # m, m/s: larger values are mistakes
 
 
 def drive(robot: Robot, wish: Twist, dead_man: float, source: str) -> None:
-    """Drive with this velocity until the next command, at most for ``dead_man`` s of a person's time. Raises RobotError."""
+    """Drive at this velocity until the next command, for ``dead_man`` s of real time at most. Raises RobotError."""
     if not all(abs(value) < FAR for value in (wish.x, wish.y, wish.yaw)):
         raise InvalidGoal("a velocity is not finite")
     limits = robot[Base].limits
