@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -323,19 +324,36 @@ def test_older_programs_files_are_brought_up_to_date(tmp_path: Path) -> None:
         assert trail.verify().number == 3
 
 
+SCHEMA = resources.files("roboglot.storage.schema.postgresql")
+VERSIONS = sorted(int(match[1]) for f in SCHEMA.iterdir() if (match := re.fullmatch(r"v(\d+)\.sql", f.name)))
+COLUMNS = "SELECT table_name, column_name, data_type FROM information_schema.columns WHERE table_schema='public'"
+
+
+def columns(url: str) -> set[object]:
+    with psycopg.connect(url) as connection:
+        return set(connection.execute(COLUMNS.encode()).fetchall())
+
+
 @needs_postgresql
-def test_older_programs_database_is_brought_up_to_date(server: PostgreSQLServer, tmp_path: Path) -> None:
-    files = resources.files("roboglot.storage.schema.postgresql")
+@pytest.mark.parametrize("before", VERSIONS[:-1])
+def test_older_programs_database_is_brought_up_to_date(server: PostgreSQLServer, tmp_path: Path, before: int) -> None:
+    """From each earlier version, by two programs that start at the same time."""
+    open_store(tmp_path, server.url).close()
+    newest = columns(server.url)
+    server.empty()
     with psycopg.connect(server.url, autocommit=True) as connection:
         connection.execute("CREATE TABLE roboglot_schema (version INTEGER PRIMARY KEY)")
-        for version in range(1, 5):
-            connection.execute((files / f"v{version}.sql").read_text(encoding="utf-8").encode())
+        for version in VERSIONS[:before]:
+            connection.execute((SCHEMA / f"v{version}.sql").read_text(encoding="utf-8").encode())
             connection.execute("INSERT INTO roboglot_schema VALUES (%s)", (version,))
-        connection.execute("INSERT INTO setting VALUES ('a', 'speed', '0.5')")
-    with contextlib.closing(open_store(tmp_path, server.url)) as store:
-        store.allow("10.0.0.7", [])
-        assert len(store.identities()) == 1
-    newest = max(int(match[1]) for f in files.iterdir() if (match := re.fullmatch(r"v(\d+)\.sql", f.name)))
+        connection.execute("INSERT INTO cloud_account VALUES ('anna', 'x')")
+    with ThreadPoolExecutor(2) as programs:
+        one, two = programs.map(lambda _: open_store(tmp_path, server.url), range(2))
+    with contextlib.closing(one), contextlib.closing(two):
+        one.allow("10.0.0.7", [])
+        assert len(two.identities()) == 1
     with psycopg.connect(server.url) as connection:
-        assert connection.execute("SELECT max(version) FROM roboglot_schema").fetchone() == (newest,)
-        assert connection.execute("SELECT value FROM setting").fetchall() == [("0.5",)]
+        applied = connection.execute("SELECT version FROM roboglot_schema ORDER BY version").fetchall()
+        assert applied == [(version,) for version in VERSIONS]
+        assert connection.execute("SELECT name FROM cloud_account").fetchall() == [("anna",)]
+    assert columns(server.url) == newest

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 import pytest
@@ -15,6 +16,7 @@ from roboglot.cli.campaign import command as campaign
 from roboglot.cli.fleet import app
 
 KUBERAY = Path(__file__).parents[2] / "deploy/kuberay"
+USER = 1000  # in deploy/Containerfile
 LOCK = KUBERAY.parents[1] / "requirements/fleet.lock"
 
 
@@ -47,8 +49,8 @@ class Port(Part):
 
 
 class Amount(Part):
-    cpu: str
-    memory: str
+    cpu: Annotated[str, msgspec.Meta(pattern=r"^[0-9]+(\.[0-9]+|m)?$")]
+    memory: Annotated[str, msgspec.Meta(pattern="^[0-9]+[KMGT]i$")]
 
 
 class Resources(Part):
@@ -79,8 +81,14 @@ class Volume(Part):
     persistent_volume_claim: Claim
 
 
+class Security(Part):
+    run_as_non_root: bool
+    fs_group: int = 0
+
+
 class PodSpec(Part):
     containers: list[Container]
+    security_context: Security
     volumes: list[Volume] = []
 
 
@@ -88,8 +96,15 @@ class Pod(Part):
     spec: PodSpec
 
 
+class Start(Part, rename="kebab"):
+    """Options of `ray start`, all of them texts."""
+
+    num_cpus: str = ""
+    dashboard_host: str = ""
+
+
 class Head(Part):
-    ray_start_params: dict[str, str]
+    ray_start_params: Start
     template: Pod
 
 
@@ -126,20 +141,50 @@ class RayJob(Part, tag_field="kind"):
     spec: Job
 
 
+def manifest(text: str) -> RayCluster | RayJob:
+    return msgspec.convert(yaml.safe_load(text), type=RayCluster | RayJob)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("workerGroupSpecs:", "workerGroupSpec:"),
+        ("maxReplicas: 50", 'maxReplicas: "fifty"'),
+        ("dashboard-host:", "dashboard-hots:"),
+        ('num-cpus: "0"', "num-cpus: 0"),
+        ("memory: 4Gi", "memory: 4GB"),
+        ('cpu: "2"', "cpu: 2"),
+        ("containerPort: 6379", "port: 6379"),
+        ("secretKeyRef:", "secretRef:"),
+        ("runAsNonRoot: true", 'runAsNonRoot: "true"'),
+        ("kind: RayCluster", "kind: RayClusters"),
+    ],
+)
+def test_mistake_in_a_manifest_is_found(right: str, wrong: str) -> None:
+    text = (KUBERAY / "fleet.yaml").read_text()
+    assert right in text
+    with pytest.raises(msgspec.ValidationError):
+        manifest(text.replace(right, wrong))
+
+
 @pytest.mark.parametrize("name", ["fleet.yaml", "campaign.yaml"])
 def test_manifest_has_only_known_fields_and_locked_ray(name: str) -> None:
-    document = msgspec.convert(yaml.safe_load((KUBERAY / name).read_text()), type=RayCluster | RayJob)
+    document = manifest((KUBERAY / name).read_text())
     cluster = document.spec if isinstance(document, RayCluster) else document.spec.ray_cluster_spec
     assert document.api_version == "ray.io/v1"
     assert re.fullmatch("[a-z]([-a-z0-9]{0,45}[a-z0-9])?", document.metadata.name)  # the operator's rule
     locked = re.search(r"^ray==([\d.]+)", LOCK.read_text(), re.MULTILINE)
     assert locked
     assert cluster.ray_version == locked[1]
-    assert cluster.head_group_spec.ray_start_params["num-cpus"] == "0"
+    assert cluster.head_group_spec.ray_start_params.num_cpus == "0"
     for group in (cluster.head_group_spec, *cluster.worker_group_specs):
         volumes = {volume.name for volume in group.template.spec.volumes}
         for container in group.template.spec.containers:
             assert {mount.name for mount in container.volume_mounts} == volumes
+            assert not volumes or group.template.spec.security_context.fs_group == USER, "the volume is root's"
+            assert container.resources.requests == container.resources.limits, "it may be evicted"
+            secret = [variable for variable in container.env if re.search("DATABASE|REGISTRY|TOKEN", variable.name)]
+            assert all(variable.value_from and not variable.value for variable in secret)
             assert {"RAY_USAGE_STATS_ENABLED"} <= {variable.name for variable in container.env}
     if isinstance(document, RayJob):
         from typer import Typer
