@@ -39,13 +39,30 @@ class Echo(asyncio.Protocol):
         self.transport.resume_reading()
 
 
+class Late(Echo):
+    """Answers when nothing more comes, and closes."""
+
+    def data_received(self, data: bytes) -> None:
+        self.heard = data
+
+    def eof_received(self) -> bool:
+        asyncio.get_running_loop().call_soon(self._answer)
+        return True
+
+    def _answer(self) -> None:
+        self.transport.write(self.heard)
+        self.transport.close()
+
+
 @contextlib.asynccontextmanager
-async def port(folder: Path, *, plain: bool = True, admit: bool = True) -> AsyncIterator[tuple[int, ssl.SSLContext]]:
+async def port(
+    folder: Path, *, plain: bool = True, admit: bool = True, inner: type[Echo] = Echo
+) -> AsyncIterator[tuple[int, ssl.SSLContext]]:
     """Its port, and the certificate that a client must trust."""
     Echo.opened = 0
     tls = Tls(server_context(*ensure_site(folder, {"127.0.0.1", "localhost"})), plain)
     loop = asyncio.get_running_loop()
-    server = await loop.create_server(lambda: TlsPort(Echo, tls, lambda _host: admit), "127.0.0.1", 0)
+    server = await loop.create_server(lambda: TlsPort(inner, tls, lambda _host: admit), "127.0.0.1", 0)
     trusting = ssl.create_default_context(cafile=str(folder / "apps" / "ca-cert.pem"))
     trusting.verify_flags |= ssl.VERIFY_X509_STRICT  # the default since Python 3.13
     yield server.sockets[0].getsockname()[1], trusting
@@ -76,6 +93,33 @@ async def test_one_port_takes_both(tmp_path: Path) -> None:
         assert await echoed(number, b"secret", trusting) == b"secret"
         big = bytes(range(256)) * (BIG // 256)
         assert await echoed(number, big, trusting) == big
+
+
+@pytest.mark.parametrize("half", ["TLS", "TCP"])
+async def test_client_that_says_no_more_gets_its_answer(tmp_path: Path, half: str) -> None:
+    async with port(tmp_path, inner=Late) as (number, trusting):
+        reader, writer = await asyncio.open_connection("127.0.0.1", number)
+        incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+        client = trusting.wrap_bio(incoming, outgoing, server_hostname="127.0.0.1")
+        shaken = False
+        while not shaken:
+            try:
+                client.do_handshake()
+                shaken = True
+            except ssl.SSLWantReadError:
+                writer.write(outgoing.read())
+                incoming.write(await reader.read(65536))
+        client.write(b"ask")
+        if half == "TLS":
+            with contextlib.suppress(ssl.SSLWantReadError):
+                client.unwrap()
+        writer.write(outgoing.read() + b"what comes behind the end" * (half == "TLS"))
+        if half == "TCP":
+            writer.write_eof()
+        async with asyncio.timeout(60.0):
+            incoming.write(await reader.read())
+        assert client.read() == b"ask"
+        writer.close()
 
 
 async def test_plain_connections_can_be_refused(tmp_path: Path) -> None:

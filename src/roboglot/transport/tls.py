@@ -62,6 +62,7 @@ class TlsEnd(asyncio.Protocol):
         self._encrypted: Callable[[bytes | bytearray | memoryview], int]
         self._received = 0
         self._replied = 0
+        self._stays: bool | None = None  # since the end of the other side's data: the inner protocol has answers
         self._host = ""
         self._patience: asyncio.TimerHandle | None = None
 
@@ -74,17 +75,18 @@ class TlsEnd(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Continue the handshake, or decrypt after it."""
+        if self._stays is not None:
+            return  # behind the end
         self._incoming.write(data)
         if self.inner is None and not self._shake_hands(len(data)):
             return
         self._read()
 
-    def eof_received(self) -> bool | None:
-        """Pass on the end of the other side's data, and close."""
-        if self.inner is None:
-            return False
-        self.inner.eof_received()
-        return False
+    def eof_received(self) -> bool:
+        """Pass on the end of the other side's data; stay open for answers under way."""
+        if self._stays is None:
+            self._stays = self.inner is not None and bool(self.inner.eof_received())
+        return self._stays and not self._gone()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Notify the inner protocol."""
@@ -154,7 +156,8 @@ class TlsEnd(asyncio.Protocol):
             while incoming.pending and not self._gone():
                 data = self._tunnel.read(RECORD_MAX)  # one complete record
                 if not data:
-                    self._end()
+                    if not self.eof_received():
+                        self._end()
                     return
                 assert self.inner is not None
                 self.inner.data_received(data)
