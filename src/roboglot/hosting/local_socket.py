@@ -18,10 +18,10 @@ PATH_MAX = 107  # bytes of a socket's path: the system's limit
 
 
 class LocalServer:
-    """Answers the folder's owner. ``name``: command that a warning names if the server cannot listen."""
+    """Answers the folder's owner, line by line. ``name``: command that a warning names if it cannot listen."""
 
     def __init__(self, path: Path, name: str, answer: Callable[[bytes], Awaitable[bytes]]) -> None:
-        self._path, self._name, self._answer = path, name, answer
+        self._path, self._name, self._answer_to = path, name, answer
         self._server: asyncio.Server | None = None
         self._callers: set[asyncio.StreamWriter] = set()
 
@@ -34,7 +34,7 @@ class LocalServer:
                 raise OSError("its path is too long")
             os.fchmod(listening.fileno(), 0o600)  # before binding, so that other users never have access
             listening.bind(bytes(self._path))
-            self._server = await asyncio.start_unix_server(self._receive, sock=listening, limit=LINE_MAX)
+            self._server = await asyncio.start_unix_server(self._serve, sock=listening, limit=LINE_MAX)
         except OSError as error:
             listening.close()
             log.warning("`%s` cannot reach this program: %s: %s", self._name, self._path, error)
@@ -48,11 +48,11 @@ class LocalServer:
             caller.transport.abort()
         self._path.unlink(missing_ok=True)
 
-    async def _receive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._callers.add(writer)
         try:
             while len(self._callers) <= CALLERS_MAX and (line := await reader.readline()):
-                writer.write(await self._answer(line) + b"\n")
+                writer.write(await self._answer_to(line) + b"\n")
                 await writer.drain()
         except (ValueError, OSError):  # the line is too long; the caller has gone
             pass

@@ -54,20 +54,12 @@ class Answer(msgspec.Struct):
     error: str = ""
 
 
-class LeaseDesk:
+class LeaseDesk(LocalServer):
     """Control desk of all robots of one program."""
 
     def __init__(self, folder: Path, robots: Mapping[str, Robot], stage: Stage | None = None) -> None:
         self._robots, self._stage = robots, stage
-        self._server = LocalServer(folder / NAME, "roboglot lease", self._answer)
-
-    async def open(self) -> None:
-        """Listen; if that fails, log a warning: the robots work without it."""
-        await self._server.open()
-
-    async def close(self) -> None:
-        """Stop listening."""
-        await self._server.close()
+        super().__init__(folder / NAME, "roboglot lease", self._answer)
 
     async def _answer(self, line: bytes) -> bytes:
         error = ""

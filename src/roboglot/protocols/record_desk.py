@@ -38,20 +38,12 @@ class Answer(msgspec.Struct):
     error: str = ""
 
 
-class RecordDesk:
+class RecordDesk(LocalServer):
     """Recording desk of one program; ``recorder`` makes its recorder on first use."""
 
     def __init__(self, folder: Path, recorder: Callable[[], Recorder]) -> None:
         self._recorder = recorder
-        self._server = LocalServer(folder / NAME, "roboglot record", self._receive)
-
-    async def open(self) -> None:
-        """Listen."""
-        await self._server.open()
-
-    async def close(self) -> None:
-        """Stop listening."""
-        await self._server.close()
+        super().__init__(folder / NAME, "roboglot record", self._receive)
 
     async def _receive(self, line: bytes) -> bytes:
         try:

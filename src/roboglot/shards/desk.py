@@ -14,21 +14,13 @@ from roboglot.shards.supervisor import Shard
 from roboglot.shards.wishes import SOCKET, Answer, Request, RobotRow, Row
 
 
-class FleetDesk:
+class FleetDesk(LocalServer):
     """Command server of one fleet."""
 
     def __init__(self, supervisor: FleetHost, folder: Path) -> None:
         self._supervisor = supervisor
-        self._server = LocalServer(folder / SOCKET, "roboglot fleet", self._answer)
+        super().__init__(folder / SOCKET, "roboglot fleet", self._answer)
         self._turn = asyncio.Lock()
-
-    async def open(self) -> None:
-        """Listen."""
-        await self._server.open()
-
-    async def close(self) -> None:
-        """Stop listening."""
-        await self._server.close()
 
     async def _answer(self, line: bytes) -> bytes:
         error = ""
