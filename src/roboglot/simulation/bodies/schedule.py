@@ -51,10 +51,6 @@ class Job:
         """Return whether the job is called in this tick, counted from 1."""
         return tick >= self.first and (tick - self.first) % self.every == 0
 
-    def after(self, tick: int) -> int:
-        """Return the first tick after this one in which it is called."""
-        return max(self.first, tick + self.every - (tick - self.first) % self.every)
-
 
 class Schedule:
     """Calls in the order of ``jobs``; a job's duty is looked at when its turn comes.
@@ -78,8 +74,8 @@ class Schedule:
             if key not in lists:  # the seconds are summed like the clock's, to the last bit
                 lists[key] = [(self._jobs[rank].call, sum([tick] * past), self._jobs[rank].duty) for rank, past in key]
             self._rounds.append(lists[key])
-        timings = {(job.every, job.first): rank for rank, job in enumerate(self._jobs) if job.duty is None}
-        self._on = {rank: self._jobs[rank] for rank in timings.values()}  # of those without a duty, one per timing
+        timings = {(job.first, job.every): rank for rank, job in enumerate(self._jobs) if job.duty is None}
+        self._on = {rank: timing for timing, rank in timings.items()}  # by rank; those without a duty once per timing
         for rank, job in enumerate(self._jobs):
             if job.duty is not None:
                 job.duty.changed = _Change(self, rank)
@@ -96,7 +92,12 @@ class Schedule:
 
     def next_after(self, tick: int) -> int:
         """Return the first tick after this one in which something is due; 0: there is none."""
-        return min([job.after(tick) for job in self._on.values()], default=0)
+        later = 0
+        for first, every in self._on.values():
+            at = tick + every - (tick - first) % every if tick >= first else first
+            if at < later or not later:
+                later = at
+        return later
 
     def run(self, tick: int) -> None:
         """Call each function that is due with the s since its last call."""
@@ -111,7 +112,7 @@ class Schedule:
     def change(self, rank: int, on: bool) -> None:
         """Note that a part's duty began or ended."""
         if on:
-            self._on[rank] = self._jobs[rank]
+            self._on[rank] = self._jobs[rank].first, self._jobs[rank].every
         else:
             self._on.pop(rank, None)
         if self.changed is not None:
