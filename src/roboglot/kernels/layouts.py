@@ -29,7 +29,9 @@ HULL_GAZE_PITCH, HULL_GAZE_YAW = 33, 34  # of the gimbal; zero without one
 HULL_SERVO = 35  # control of the torso's servo
 HULL_RADIUS = 36
 HULL_FLOOR, HULL_WALLS = 37, 38  # where edges and walls were looked up; distance to the nearest wall from there, m
-HULL_WIDTH = 39
+HULL_GOAL_X, HULL_GOAL_Y, HULL_GOAL_YAW = 39, 40, 41  # velocity that the wheels approach, base_link
+HULL_LINEAR, HULL_ANGULAR = 42, 43  # by these steps a tick; both 0: they have their velocity
+HULL_WIDTH = 44
 
 TOGETHER, ALONE = 1.0, 2.0  # values of the first column of each table below; 0: no such part
 USE = 0

@@ -25,6 +25,7 @@ from roboglot.kernels.layouts import (
     GIMBAL_TURNED,
     GIMBAL_YAW,
     HULL_A,
+    HULL_ANGULAR,
     HULL_BEFORE,
     HULL_BELLY,
     HULL_COUNTED,
@@ -34,8 +35,12 @@ from roboglot.kernels.layouts import (
     HULL_FLOOR,
     HULL_FREE,
     HULL_GAZE_YAW,
+    HULL_GOAL_X,
+    HULL_GOAL_Y,
+    HULL_GOAL_YAW,
     HULL_HELD,
     HULL_LEANS,
+    HULL_LINEAR,
     HULL_LOOKED_X,
     HULL_LOOKED_Y,
     HULL_Q,
@@ -97,10 +102,31 @@ def still(numbers: FloatArray, least: float) -> bool:
     return len(numbers) > 0
 
 
+@kernel("void(float64[::1])")
+def _approach(row: FloatArray) -> None:
+    """Bring the wheels' velocity a step nearer to its goal, as ``SimulatedBase`` does."""
+    dx, dy = row[HULL_GOAL_X] - row[HULL_WHEEL_X], row[HULL_GOAL_Y] - row[HULL_WHEEL_Y]
+    dyaw, linear, angular = row[HULL_GOAL_YAW] - row[HULL_WHEEL_YAW], row[HULL_LINEAR], row[HULL_ANGULAR]
+    way = math.sqrt(dx * dx + dy * dy)
+    if way <= linear and abs(dyaw) <= angular:
+        for k in range(3):
+            row[HULL_WHEEL_X + k] = row[HULL_GOAL_X + k]
+        row[HULL_LINEAR] = row[HULL_ANGULAR] = 0.0
+    else:
+        part = min(1.0, linear / way) if way > 0.0 else 1.0
+        row[HULL_WHEEL_X] += dx * part
+        row[HULL_WHEEL_Y] += dy * part
+        row[HULL_WHEEL_YAW] += max(-angular, min(angular, dyaw))
+    for k in range(3):
+        row[HULL_DRIVE_X + k] = row[HULL_WHEEL_X + k]
+
+
 @kernel("void(float64[:,::1], float64[::1], float64)")
 def drive(hulls: FloatArray, controls: FloatArray, seconds: float) -> None:
     """Turn the wheels of all hulls as commanded: write the physics' ``controls`` for the next ``seconds``."""
     for i in range(hulls.shape[0]):
+        if hulls[i, HULL_LINEAR] > 0.0:
+            _approach(hulls[i])
         first = int(hulls[i, HULL_A])
         if hulls[i, HULL_HELD] != 0.0:
             controls[first] = controls[first + 1] = controls[first + 2] = 0.0

@@ -43,6 +43,32 @@ async def test_repeated_command_costs_nothing_once_robot_moves_so(simulate):
         assert not base.duty.on
 
 
+async def test_kernel_ramps_as_the_base_does(simulate):
+    async def speeds(*, compiled):
+        sim = simulate(start=Pose(5, 5))
+        base, seen = sim.robot[Base], []
+        if compiled:
+            sim.world._physics.rows.load_kernels()
+        sim.world.start()
+        for twist in (Twist(0.3, 0.2, 1.0), Twist(-0.2, 0.1, -2.0), Twist(0.1), STILL):
+            base.set_velocity(twist)
+            await sim.clock.advance(0.02)
+            busy = base.duty.on
+            seen.append((base.velocity, base.wheel_speeds))
+            assert base.velocity != twist
+            assert busy is not compiled
+            for _ in range(20):
+                await sim.clock.advance(0.02)
+                seen.append((base.velocity, base.wheel_speeds))
+            base.hindrances.limit(0.1, twist.speed)
+            await sim.clock.advance(0.1)
+            seen.append((base.velocity, base.wheel_speeds))
+            base.hindrances.limit(math.inf, 0.0)
+        return seen
+
+    assert await speeds(compiled=True) == await speeds(compiled=False)
+
+
 async def test_repeated_command_drives_on_after_a_cut(simulate):
     sim = simulate(start=Pose(5, 5))
     base = sim.robot[Base]

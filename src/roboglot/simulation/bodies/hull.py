@@ -82,7 +82,7 @@ def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
 class Hull(HullState):
     """Handles into MuJoCo's arrays for one robot.
 
-    ``rests``: it stood at the last check; ``disturbed``: moved by more than physics.
+    ``rests``: it stood at the last check; ``disturbed``: moved by more than physics. ``tilts``: by uneven ground.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Hull(HullState):
         self._applied = data.qfrc_applied
         self.mass = float(model.body_subtreemass[model.body(name).id])
         self._solid = [model.geom(f"{name} {part}").id for part in ("chassis", "torso")]
-        self._tilts = ground.uneven
+        self.tilts = ground.uneven
         self.wheels = [model.geom(f"{name} wheel {index}").id for index in range(4 if ground.uneven else 1)]
         self.support = Support(model, name, self.mass, self.wheels, self._row)
         own = model.body_rootid[model.geom_bodyid] == model.body(name).id
@@ -120,7 +120,7 @@ class Hull(HullState):
             self.legs = HullLegs(model, data, name, body)
             self._torso, self._sinking = self.legs.torso, self.legs.sinking
         self._level = slice(self._q, self._q + 4), slice(self._v, self._v + 4)  # x, y, z, yaw and their rates
-        self._rates = slice(self._v, self._v + 4 + 2 * self._tilts + bool(body.legs))
+        self._rates = slice(self._v, self._v + 4 + 2 * self.tilts + bool(body.legs))
         servos = data.actuator_force, data.ctrl
         self._servos = [of[self._drive].data.cast("B").cast("d") for of in servos]  # forces and speeds, as they are now
         self.floor = 0
@@ -148,7 +148,7 @@ class Hull(HullState):
         self.support.release()
         self.disturbed = True
         height = self._elevations[floor]
-        if self._tilts:
+        if self.tilts:
             wheels = [pose.compose(Pose(x, y)) for x, y in wheel_places(self.body)]
             height += max(self._ground.height(wheel.x, wheel.y, floor) for wheel in wheels)
             self._data.qpos[self._q + 4 : self._q + 6] = 0.0
@@ -178,11 +178,11 @@ class Hull(HullState):
         rising = vz
         row[HULL_X], row[HULL_X + 1], row[HULL_X + 2], row[HULL_TURNED] = x, y, z, turned
         row[HULL_BEFORE : HULL_BEFORE + 4] = row[HULL_VX : HULL_VX + 4]
-        if self._tilts and not self.overturned:
+        if self.tilts and not self.overturned:
             q, v = self._q, self._v
             self.tilt = positions[q + 5], positions[q + 4]
             self.tilting = velocities[v + 5], velocities[v + 4]
-        self.loose = self._tilts or not -FALLING <= vz <= FALLING or self.standing < 1.0 or self.hand is not None
+        self.loose = self.tilts or not -FALLING <= vz <= FALLING or self.standing < 1.0 or self.hand is not None
         if self._torso >= 0:
             row[HULL_BELLY] = positions[self._torso]
             vz += velocities[self._sinking]
@@ -250,7 +250,7 @@ class Hull(HullState):
             speeds[0] = speeds[1] = speeds[2] = 0.0  # held by a hand, or lying
             return
         vx, vy, turn = row[HULL_DRIVE_X], row[HULL_DRIVE_X + 1], row[HULL_DRIVE_YAW]
-        if self._tilts:  # the wheels measure along the slope and hold against it
+        if self.tilts:  # the wheels measure along the slope and hold against it
             roll, pitch = self.tilt
             vx = vx * math.cos(pitch) - GRAVITY * math.tan(pitch) / DRIVE_GAIN
             vy = vy * math.cos(roll) + GRAVITY * math.tan(roll) / DRIVE_GAIN
@@ -268,7 +268,7 @@ class Hull(HullState):
             share = 1.0
         elif self.overturned:
             share = SHELL
-        elif self._tilts:
+        elif self.tilts:
             share *= self._ground.grip(self.x, self.y, self.floor)
         if share != self._share:
             self._share = share
@@ -313,7 +313,7 @@ class Hull(HullState):
         mass = self.mass
         pull = mass * (GRAVITY + HAND_STIFFNESS * (self.hand - self.elevation) - HAND_DAMPING * self.motion[2])
         self._applied[self._v + 2] = pull
-        if self._tilts:
+        if self.tilts:
             inertia = mass * self.body.hull.radius**2
             for index, (angle, rate) in enumerate(zip(reversed(self.tilt), reversed(self.tilting), strict=True)):
                 torque = -inertia * (100.0 * angle + 20.0 * rate)

@@ -6,13 +6,16 @@ import math
 
 from roboglot.kernels.layouts import (
     HULL_A,
+    HULL_ANGULAR,
     HULL_BEFORE,
     HULL_BELLY,
     HULL_DRIVE_X,
     HULL_DRIVE_YAW,
     HULL_GAZE_PITCH,
+    HULL_GOAL_X,
     HULL_HELD,
     HULL_LEANS,
+    HULL_LINEAR,
     HULL_Q,
     HULL_RADIUS,
     HULL_SERVO,
@@ -165,7 +168,25 @@ class HullState:
 
     def drive(self, twist: Twist) -> None:
         """Drive the wheels at ``twist`` (base_link) from now on, if they are on the ground."""
-        self._row[HULL_DRIVE_X], self._row[HULL_DRIVE_X + 1], self._row[HULL_DRIVE_YAW] = twist.x, twist.y, twist.yaw
+        row = self._row
+        row[HULL_DRIVE_X], row[HULL_DRIVE_X + 1], row[HULL_DRIVE_YAW] = twist.x, twist.y, twist.yaw
+        row[HULL_LINEAR] = 0.0
+
+    def approach(self, goal: Twist, linear: float, angular: float) -> None:
+        """Let the kernel drive the wheels towards ``goal``, by these steps (m/s, rad/s) a tick, until ``drive``."""
+        row = self._row
+        row[HULL_GOAL_X], row[HULL_GOAL_X + 1], row[HULL_GOAL_X + 2] = goal.x, goal.y, goal.yaw
+        row[HULL_LINEAR], row[HULL_ANGULAR] = linear, angular
+
+    @property
+    def approaches(self) -> bool:
+        """True while the kernel does so."""
+        return self._row[HULL_LINEAR] > 0.0
+
+    @property
+    def wheels_velocity(self) -> Twist:
+        """Present velocity of the wheels (base_link), as noted."""
+        return Twist(*self._row[HULL_WHEEL_X : HULL_WHEEL_X + 3])
 
     def note_wheels(self, twist: Twist, *, slack: bool) -> None:
         """Note the wheels' present velocity (base_link) for sensors; ``slack``: some are dead, or all roll freely."""

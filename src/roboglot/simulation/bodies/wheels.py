@@ -57,6 +57,10 @@ class Wheels:
             rear_right=(twist.x - twist.y + turn) / self.radius,
         )
 
+    def motion_of(self, command: Twist | WheelSpeeds) -> Twist:
+        """Return the body's twist by a command of either kind."""
+        return command if isinstance(command, Twist) else self.twist_of(command)
+
     def twist_of(self, wheels: WheelSpeeds) -> Twist:
         """Return the body's twist as the mean of four wheels; their differences are slip."""
         fl, fr, rl, rr = four(wheels)

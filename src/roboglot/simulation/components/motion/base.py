@@ -18,6 +18,7 @@ from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.wheels import Wheels, four
 from roboglot.simulation.components.motion.drive_locks import DriveLocks
 from roboglot.simulation.components.motion.hindrances import STANDS, Hindrances
+from roboglot.simulation.components.motion.ramp import Ramp
 
 NO_WHEELS = WheelSpeeds()
 SLOW = 0.3  # m/s: up to here nothing watches how fast it is
@@ -42,8 +43,8 @@ class SimulatedBase(Base):
         )
         self._hull = hull
         self._target: Twist | WheelSpeeds = STILL
-        self._twist = STILL
-        self._speeds = NO_WHEELS
+        self._ramp = Ramp(hull)
+        self._speeds: WheelSpeeds | None = None  # None: those of the velocity
         self.locks, self.hindrances = DriveLocks(self._stop), Hindrances(self.duty)
         self._carried = False
         self._free = False
@@ -61,7 +62,7 @@ class SimulatedBase(Base):
             twist = Twist(twist.x, 0.0, twist.yaw)
         self.check_free(twist)
         wanted = self._walkable(twist.clamped(self.limits.twist))
-        if self._twist is self._target and wanted == self._target and not self._carried:
+        if self._ramp.now is self._target and wanted == self._target and not self._carried:
             self._haste = self._haste if wanted == STILL else 1.0
             return  # it moves so: drivers repeat a command at every tick
         self._target, self._carried = wanted, False
@@ -86,13 +87,14 @@ class SimulatedBase(Base):
 
     @property
     def wheel_speeds(self) -> WheelSpeeds:
-        return self.wheels.driven(self._speeds) if self.wheels.dead else self._speeds
+        speeds = self._speeds or self.wheels.speeds_of(self._ramp.now)
+        return self.wheels.driven(speeds) if self.wheels.dead else speeds
 
     @property
     def velocity(self) -> Twist:
         if self._free:
             return _rolled(self._hull, mecanum=self.wheels.mecanum)
-        return self.wheels.twist_of(self.wheels.driven(self._speeds)) if self.wheels.dead else self._twist
+        return self.wheels.twist_of(self.wheel_speeds) if self.wheels.dead else self._ramp.now
 
     def walk(self, walkable: Callable[[Twist], Twist] | None) -> None:
         """Limit velocities by ``walkable``, a gait's limits, from now on; None: by the base's own only."""
@@ -113,15 +115,15 @@ class SimulatedBase(Base):
     @property
     def wanted(self) -> Twist:
         """Commanded velocity; the present one if the command is to stand."""
-        target = self._twist_of(self._target)
-        return target if target.speed > STANDS else self._twist
+        target = self.wheels.motion_of(self._target)
+        return target if target.speed > STANDS else self._ramp.now
 
     def check_free(self, command: Twist | WheelSpeeds) -> None:
-        if self.hindrances.touching and self.hindrances.presses(self._twist_of(command)):
+        if self.hindrances.touching and self.hindrances.presses(self.wheels.motion_of(command)):
             raise Collided("the bumper is pressed: the robot moves only away from what it touches")
 
     def hindrance(self, command: Twist | WheelSpeeds) -> Blocked | None:
-        return self.hindrances.blocks(self._twist_of(command).x)
+        return self.hindrances.blocks(self.wheels.motion_of(command).x)
 
     def steer(self, rate: float | None) -> None:
         """Turn at ``rate`` (rad/s) instead of the commanded rate from now on; None: as commanded."""
@@ -136,13 +138,13 @@ class SimulatedBase(Base):
 
     def cut(self) -> None:
         """Block the wheels at once, without a ramp."""
-        self._target, self._speeds = STILL, NO_WHEELS
+        self._target, self._speeds = STILL, None
         self._turn_wheels(STILL)
 
     def carry(self, twist: Twist) -> None:
         """Move base_link at ``twist`` by the legs, at once and in spite of locks."""
         self._target = twist
-        self._speeds, self._carried = self.wheels.speeds_of(twist), twist != STILL
+        self._speeds, self._carried = None, twist != STILL
         self._note_pace()
         self._turn_wheels(twist)
 
@@ -150,31 +152,45 @@ class SimulatedBase(Base):
         """Approach the target velocity within the acceleration limits."""
         if self.hindrances.bars:
             self._respect_bars()
-        wanted = self._target
+        wanted, now = self._target, self._ramp.now
         if self._steered is not None and isinstance(wanted, Twist):
             wanted = Twist(wanted.x, wanted.y, self._steered)
-        if wanted is not self._twist:
-            linear = self._haste * self.limits.linear_acceleration * seconds
+        linear = self._haste * self.limits.linear_acceleration * seconds
+        angular = self._haste * self.limits.angular_acceleration * seconds
+        if self._goes_on(linear, angular):
+            self.duty.end()
+            return
+        if wanted is not now:
             match wanted:
                 case Twist() as target:
-                    angular = self._haste * self.limits.angular_acceleration * seconds
-                    self._twist = _nearer(self._twist, target, linear, angular)
-                    self._speeds = self.wheels.speeds_of(self._twist)
+                    now, self._speeds = _nearer(now, target, linear, angular), None
                 case WheelSpeeds() as target:
-                    self._speeds = _nearer_wheels(self._speeds, target, linear / self.wheels.radius)
-                    self._twist = self.wheels.twist_of(self._speeds)
+                    speeds = self._speeds or self.wheels.speeds_of(now)
+                    self._speeds = _nearer_wheels(speeds, target, linear / self.wheels.radius)
+                    now = self.wheels.twist_of(self._speeds)
         pace = self.hindrances.pace
-        if pace < math.inf and self._twist.speed > pace and not self._carried:
-            share = pace / self._twist.speed
-            self._twist = Twist(self._twist.x * share, self._twist.y * share, self._twist.yaw)
-            self._speeds = self.wheels.speeds_of(self._twist)
-        self._turn_wheels(self._twist)
-        if self._twist is self._target:
+        if pace < math.inf and now.speed > pace and not self._carried:
+            share = pace / now.speed
+            now, self._speeds = Twist(now.x * share, now.y * share, now.yaw), None
+        self._turn_wheels(now)
+        if now is self._target:
             self.duty.end()
+
+    def _goes_on(self, linear: float, angular: float) -> bool:
+        """Leave it to the kernel to approach the target, by these steps a tick, if nothing else changes the speed."""
+        target, watched = self._target, self.hindrances.bars or self.when_driven or self.wheels.dead
+        if watched or self._steered is not None or not isinstance(target, Twist):
+            return False
+        if max(target.speed, self._ramp.now.speed) > self.hindrances.pace:
+            return False
+        if not self._ramp.go_on(target, linear, angular):
+            return False
+        self._speeds = None
+        return True
 
     def _turn_wheels(self, twist: Twist) -> None:
         """Command the hull's wheels, of which some may be dead."""
-        self._twist = twist
+        self._ramp.set(twist)
         for notice in self.when_driven:
             notice()
         self._hull.drive(self.velocity if self.wheels.dead else twist)
@@ -182,7 +198,7 @@ class SimulatedBase(Base):
 
     def _rewired(self) -> None:
         """Note that wheels died or live again."""
-        self._hull.note_wheels(self._twist, slack=self._free or bool(self.wheels.dead))
+        self._hull.note_wheels(self._ramp.now, slack=self._free or bool(self.wheels.dead))
         self.duty.begin()
 
     def _take_time(self) -> None:
@@ -195,27 +211,24 @@ class SimulatedBase(Base):
     def _note_pace(self) -> None:
         """Start what watches a base that moves faster than SLOW, or will."""
         for duty in self.when_fast:
-            if not duty.on and max(self._twist_of(self._target).speed, self._twist.speed) > SLOW:
+            if not duty.on and max(self.wheels.motion_of(self._target).speed, self._ramp.now.speed) > SLOW:
                 duty.begin()
 
     def _respect_bars(self) -> None:
         """Stop at once in a barred direction; a turn on the spot stays possible."""
-        target = self._twist_of(self._target)
+        target = self.wheels.motion_of(self._target)
         if self.hindrances.blocks(target.x):
             self._target = Twist(0.0, 0.0, target.yaw)
             self._note_pace()
-        if self.hindrances.blocks(self._twist.x):
-            self._twist = Twist(0.0, 0.0, self._twist.yaw)
-            self._speeds = self.wheels.speeds_of(self._twist)
+        if self.hindrances.blocks(self._ramp.now.x):
+            self._ramp.set(Twist(0.0, 0.0, self._ramp.now.yaw))
+            self._speeds = None
 
     def _stop(self) -> None:
         """Brake at the next opportunity."""
         self._target = STILL
         self.duty.begin()
         self._note_pace()
-
-    def _twist_of(self, command: Twist | WheelSpeeds) -> Twist:
-        return command if isinstance(command, Twist) else self.wheels.twist_of(command)
 
 
 def _rolled(hull: Hull, *, mecanum: bool) -> Twist:
@@ -228,7 +241,7 @@ def _rolled(hull: Hull, *, mecanum: bool) -> Twist:
 def _nearer(now: Twist, target: Twist, linear: float, angular: float) -> Twist:
     """Return the velocity next to ``now`` on the way to ``target``, by steps of at most ``linear`` and ``angular``."""
     dx, dy, dyaw = target.x - now.x, target.y - now.y, target.yaw - now.yaw
-    way = math.hypot(dx, dy)
+    way = math.sqrt(dx * dx + dy * dy)  # as the kernel
     if way <= linear and abs(dyaw) <= angular:
         return target
     part = min(1.0, linear / way) if way else 1.0

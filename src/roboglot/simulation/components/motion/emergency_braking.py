@@ -39,8 +39,9 @@ class SimulatedEmergencyBraking(EmergencyBraking):
     ) -> None:
         self._section, self._radius, self._base, self._lidar, self._events = section, radius, base, lidar, events
         self.duty, self._enabled, self._braking = Duty(), section.on, False
-        base.when_driven.append(self._wake)
         events.listen(ScanTaken, self._wake)
+        if section.on:
+            base.when_driven.append(self._wake)
         self._seen: LaserScan | None = None
         self._free = (math.inf, math.inf)  # m ahead of the hull and behind it
 
@@ -49,9 +50,14 @@ class SimulatedEmergencyBraking(EmergencyBraking):
         return self._enabled
 
     def enable(self, on: bool) -> None:
-        self._enabled = on
-        self._wake()
-        if not on:
+        if on is self._enabled:
+            return
+        self._enabled, notices = on, self._base.when_driven
+        if on:
+            notices.append(self._wake)
+            self._wake()
+        else:
+            notices.remove(self._wake)
             self._hold(0.0, ahead=False, behind=False)
 
     @property

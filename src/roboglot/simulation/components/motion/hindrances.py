@@ -34,7 +34,7 @@ class Hindrances:
             self.bars.pop(who, None)
 
     def limit(self, pace: float, speed: float) -> None:
-        """Permit this pace (m/s) from now on, to a base that has this speed (m/s)."""
+        """Permit this pace (m/s) from now on, to a base that has this speed (m/s) or is to have it."""
         self.pace = pace
         if speed > pace:
             self._duty.begin()

@@ -51,7 +51,7 @@ class SoftTouch:
         reach = (now * now - self._speed**2) / (2.0 * DECELERATION) + now * REACTION + 2.0 * self._hull.body.hull.radius
         free = self._free(twist, reach) - now * REACTION
         pace = math.sqrt(self._speed**2 + 2.0 * DECELERATION * max(0.0, free))
-        base.hindrances.limit(pace, base.velocity.speed)
+        base.hindrances.limit(pace, max(base.velocity.speed, twist.speed))
 
     def _free(self, twist: Twist, reach: float) -> float:
         """Return the distance from the hull to an upright obstacle towards ``twist`` (base_link), m; inf: none near."""
