@@ -119,7 +119,9 @@ class Physics:
         self._plod(seconds, meanwhile)
 
     def _plod(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
-        """Do MuJoCo's steps."""
+        """Do MuJoCo's steps; touches last only if they are searched for."""
+        if self._touched:
+            self._meetings.switch(off=False)
         for hull in self._all_hulls:
             if hull.hand is not None:
                 hull.handle()
