@@ -45,14 +45,10 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
     return lives, calm, touched
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-async def test_what_is_not_looked_for_does_not_happen(
-    simulate: Simulate, monkeypatch: pytest.MonkeyPatch, *, compiled: bool
-) -> None:
+async def test_what_is_not_looked_for_does_not_happen(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
     simulation = simulate("office", robots=("a", "b"), seed=3)
-    if compiled:
-        simulation.world._physics.load_kernels()
-        monkeypatch.setattr(Gliding, "step", lambda *_: False)  # equals MuJoCo's steps up to rounding only
+    simulation.world._physics.load_kernels()
+    monkeypatch.setattr(Gliding, "step", lambda *_: False)  # equals MuJoCo's steps up to rounding only
     sparing, calm, touched = await lived(simulation)
     monkeypatch.setattr(Meetings, "look", lambda *_, **__: None)
     thorough, always, _ = await lived(simulate("office", robots=("a", "b"), seed=3))
@@ -65,32 +61,30 @@ async def test_what_is_not_looked_for_does_not_happen(
 async def test_alone_no_contact_is_looked_for(simulate: Simulate) -> None:
     simulation = simulate("empty")
     options = simulation.world._physics._model.opt
+    simulation.world._physics.load_kernels()
     simulation.world.start()
     simulation.robot[Base].set_velocity(Twist(0.2))  # away from walls
     await simulation.clock.advance(2.0)
     assert options.disableflags
-    simulation.world.hands.add_person(simulation.pose.compose(Pose(0.6)))
+    radius = simulation.robot.description.radius
+    simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(radius + 0.11)), (0.2, 0.2, 0.5))
     await simulation.clock.advance(0.02)
     assert not options.disableflags
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-async def test_robot_in_its_dock_sleeps(simulate: Simulate, *, compiled: bool) -> None:
+async def test_robot_in_its_dock_sleeps(simulate: Simulate) -> None:
     simulation = simulate("office")
     physics = simulation.world._physics
-    if compiled:
-        await simulation.world.prepare(wait=True)
+    await simulation.world.prepare(wait=True)
     simulation.world.start()
     await simulation.clock.advance(2.0)
     assert physics._meetings.off
     assert physics._sleep.lasts
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-async def test_robot_at_rest_feels_obstacles(simulate: Simulate, *, compiled: bool) -> None:
+async def test_robot_at_rest_feels_obstacles(simulate: Simulate) -> None:
     simulation = simulate("empty", start=Pose(4.0, 5.0))
-    if compiled:
-        simulation.world._physics.load_kernels()
+    simulation.world._physics.load_kernels()
     simulation.world.start()
     await simulation.clock.advance(1.0)
     assert simulation.world._physics._meetings.off

@@ -82,7 +82,7 @@ def rotation(tilt: tuple[float, float], yaw: float) -> Floats:
 class Hull(HullState):
     """Handles into MuJoCo's arrays for one robot.
 
-    ``rests``: it stood at the last check; ``disturbed``: moved by more than physics. ``tilts``: by uneven ground.
+    ``disturbed``: moved by more than physics. ``tilts``: by uneven ground.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class Hull(HullState):
         self._share = 1.0
         self.leash: tuple[float, float] | None = None  # N in the world: the pull of a leash
         self.standing = 1.0  # share of the wheels in contact with the ground
-        self.rests = self.disturbed = False
+        self.disturbed = False
         self._torso = self._sinking = -1  # its position and speed in the physics, if it has legs
         self.legs: HullLegs | None = None
         if body.legs:

@@ -34,7 +34,6 @@ class Nearness:
         self._floor = -1
         self._free = 0.0  # m from there
         self._next = -math.inf  # m from there to the nearest
-        self._radius = radius
         self._duties: list[Duty] = []
         self.near = True  # before the first check objects may be anywhere
 
@@ -61,10 +60,6 @@ class Nearness:
         if floor != self._floor or self._room is None:
             return -math.inf
         return self._next - abs(x - self._x) - abs(y - self._y)
-
-    def gap(self, x: float, y: float, floor: int) -> float:
-        """Return the least free distance (m) around a robot at a place; negative if unknown."""
-        return self.away(x, y, floor) - self._radius
 
     def look(self, x: float, y: float, floor: int) -> bool:
         """Update by the robot's place; return whether ``near`` changed."""

@@ -99,7 +99,7 @@ class Physics:
         self._gliding: Gliding | None = None
         if calm and self.hulls:
             self._gliding = Gliding(model, self._data, self._hull_rows, self.walls, car=world.lift is not None)
-        self._meetings = Meetings(model, self._data, self._all_hulls, self.props, self._gliding)
+        self._meetings = Meetings(model, self._all_hulls, self.props, self._gliding)
         self._sleep = Sleep(model, self._data)
 
     def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
@@ -234,7 +234,7 @@ class Physics:
         person = self._people[body]
         spots, at = self._spots, 3 * person.mocap
         if not (person.there and max(abs(pose.x - spots[at]), abs(pose.y - spots[at + 1])) < STRIDE_MAX):
-            self._meetings.forget()
+            self._meetings.switch(off=False)
         spots[at], spots[at + 1], spots[at + 2] = pose.x, pose.y, self._elevations[floor] + person.half
         turns, at = self._attitudes, 4 * person.mocap  # a quaternion around the vertical axis
         turns[at], turns[at + 3] = math.cos(pose.yaw / 2), math.sin(pose.yaw / 2)
