@@ -221,7 +221,10 @@ async def test_clients_see_no_host_of_the_database(
 
 
 @needs_postgresql
-async def test_a_robot_is_served_once(server: PostgreSQLServer, tmp_path: Path) -> None:
+async def test_a_robot_is_served_once(
+    server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(postgresql, "CLAIM_MAX", 1)
     server.empty()
     one = open_database(tmp_path / "unused", server.url, ["a", "b"])
     with pytest.raises(OSError, match="robot b is served by another program"):
@@ -230,6 +233,33 @@ async def test_a_robot_is_served_once(server: PostgreSQLServer, tmp_path: Path) 
     other.close()
     one.close()
     open_database(tmp_path / "unused", server.url, ["b", "c"]).close()
+
+
+@needs_postgresql
+async def test_start_waits_for_a_dying_programs_robots(
+    server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A shard that Ray starts before the server has noticed the old machine's end need not start twice."""
+    monkeypatch.setattr(postgresql, "CLAIM_MAX", 9000)
+    server.empty()
+    old = open_database(tmp_path / "unused", server.url, ["a", "b"])
+    starting = asyncio.create_task(asyncio.to_thread(open_database, tmp_path / "unused", server.url, ["b"]))
+    waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
+    with psycopg.connect(server.url, autocommit=True) as connection:
+        while not starting.done() and connection.execute(waiting).fetchone() != (1,):  # noqa: ASYNC110 - a server is asked
+            await asyncio.sleep(0.01)
+    assert not starting.done()
+    old.close()
+    new = await starting
+    await StoredSettings(new, "b").put("who", "new")
+    server.stop()  # its robots are another's when it comes back
+    server.start()
+    third = open_database(tmp_path / "unused", server.url, ["b"])
+    monkeypatch.setattr(postgresql, "CLAIM_MAX", 1)
+    with pytest.raises(DatabaseError, match="served by another program"):
+        await StoredSettings(new, "b").put("who", "new again")
+    third.close()
+    new.close()
 
 
 @needs_postgresql

@@ -28,6 +28,7 @@ from roboglot.hosting import open_files
 from roboglot.hosting.exclusive import FolderInUse
 from roboglot.hosting.logs import set_up_logging
 from roboglot.hosting.process import end_in_any_case, prepare
+from roboglot.hosting.reasons import in_words
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.protocols.door import Option
@@ -203,7 +204,8 @@ async def _serve(config: Config, *, open_console: bool) -> int:
     try:
         runtime = Runtime(config)
     except (FolderInUse, ValueError, OSError) as error:
-        print(f"roboglot up: {open_files.in_words() if open_files.ran_out(error) else error}", file=sys.stderr)
+        why = open_files.in_words() if open_files.ran_out(error) else in_words(error)
+        print(f"roboglot up: {why}", file=sys.stderr)
         return 1
     except sqlite3.Error as error:
         print(f"roboglot up: the database in {config.data} can't be used: {error}", file=sys.stderr)

@@ -22,6 +22,7 @@ from roboglot.hosting import open_files
 from roboglot.hosting.exclusive import FolderInUse
 from roboglot.hosting.logs import set_up_logging
 from roboglot.hosting.process import end_in_any_case, prepare
+from roboglot.hosting.reasons import in_words
 from roboglot.protocols import sections
 from roboglot.shards.messages import Beat, News, Ready, Refusal, encode
 
@@ -47,7 +48,7 @@ def run(folder: str, link: socket.socket) -> int:
     try:
         config = settings_of(msgspec.json.decode((Path(folder) / SETTINGS).read_bytes(), type=dict))
     except (ValueError, OSError) as error:
-        reporter.send(Refusal(str(error), lasting=True))
+        reporter.send(Refusal(in_words(error), lasting=True))
         return 1
     open_files.raise_limit()
     if shortage := open_files.shortage(len(config.robots)):
@@ -107,7 +108,7 @@ async def _serve(config: Config, reporter: Reporter, class_home: ClassHome | Non
         runtime = Runtime(config, class_home=class_home)
     except (FolderInUse, ValueError, OSError, sqlite3.Error) as error:
         # A killed predecessor may hold folder and addresses for a moment; wrong settings stay wrong.
-        reporter.send(Refusal(str(error), lasting=isinstance(error, ValueError)))
+        reporter.send(Refusal(in_words(error), lasting=isinstance(error, ValueError)))
         return 1
     try:
         await runtime.start()

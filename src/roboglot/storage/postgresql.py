@@ -25,10 +25,12 @@ from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseErro
 from roboglot.transport.seldom import Seldom
 
 T = TypeVar("T")
-seldom = Seldom(logging.getLogger(__name__))
+log = logging.getLogger(__name__)
+seldom = Seldom(log)
 
 CONNECTIONS_MAX = 4
 CONNECT_MAX, STATEMENT_MAX, IDLE_MAX = 5, 10, 10  # s for connecting, for a statement, for an idle transaction
+CLAIM_MAX = 6000  # ms; the server notices within five seconds that a machine is gone
 CLAIM_LOCKS = 0x626F74  # the class of the locks by which a program claims its robots
 ESCAPE = "\ue000"  # of Unicode's private use
 MIGRATION_LOCK = 0x726F626F  # the program that opens an empty database first creates the tables; others wait
@@ -52,6 +54,7 @@ class PostgreSQL:
         self._own = threading.local()
         self._opened: list[psycopg.Connection[object]] = []
         self._opening = threading.Lock()
+        self._patience = CLAIM_MAX
         self._threads = ThreadPoolExecutor(
             max_workers=connections,
             thread_name_prefix="database",
@@ -65,6 +68,7 @@ class PostgreSQL:
             if isinstance(error, psycopg.Error | DatabaseError):
                 raise OSError(in_one_line(error)) from None
             raise
+        self._patience = 0  # who loses a robot later must not wait for it
 
     def on(self, disk: Disk) -> PostgreSQL:
         """Return the same database for the robot with this disk: while the disk is full, writing raises DiskFull."""
@@ -137,13 +141,30 @@ class PostgreSQL:
         return connection
 
     def _claim(self, connection: psycopg.Connection[Any]) -> None:
-        """Take the robots' locks, which end with the connection. Raises DatabaseError if another program has one."""
+        """Take the robots' locks, which end with the connection. Raises DatabaseError if another program has one.
+
+        The first connection waits for those of a program whose machine is gone: a cluster would start the shard again,
+        which takes longer.
+        """
         for robot in self._robots:
-            query = "SELECT pg_try_advisory_lock(%s, hashtext(%s))"
-            (free,) = connection.execute(query, (CLAIM_LOCKS, robot)).fetchone() or (False,)
+            query, lock = "SELECT pg_try_advisory_lock(%s, hashtext(%s))", (CLAIM_LOCKS, robot)
+            (free,) = connection.execute(query, lock).fetchone() or (False,)
+            if not free and self._patience:
+                free = self._waited(connection, lock)
             if not free:
                 connection.close()
                 raise DatabaseError(f"robot {robot} is served by another program from the same database")
+
+    def _waited(self, connection: psycopg.Connection[Any], lock: tuple[int, str]) -> bool:
+        """Wait for a robot's lock; return whether it was released in time."""
+        log.info("another program serves robot %s: waiting %d ms for its end", lock[1], self._patience)
+        connection.execute(f"SET lock_timeout = {self._patience}".encode())
+        try:
+            connection.execute("SELECT pg_advisory_lock(%s, hashtext(%s))", lock)
+        except psycopg.errors.LockNotAvailable:
+            return False
+        connection.execute("SET lock_timeout = 0")
+        return True
 
     def _connect(self) -> psycopg.Connection[object]:
         limits = (
