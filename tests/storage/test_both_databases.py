@@ -246,7 +246,7 @@ async def test_start_waits_for_a_dying_programs_robots(
     starting = asyncio.create_task(asyncio.to_thread(open_database, tmp_path / "unused", server.url, ["b"]))
     waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
     with psycopg.connect(server.url, autocommit=True) as connection:
-        while not starting.done() and connection.execute(waiting).fetchone() != (1,):  # noqa: ASYNC110 - a server is asked
+        while not starting.done() and connection.execute(waiting).fetchone() != (1,):  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     assert not starting.done()
     old.close()
