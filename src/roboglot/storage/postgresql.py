@@ -155,7 +155,7 @@ class PostgreSQL:
                 connection.close()
                 raise DatabaseError(f"robot {robot} is served by another program from the same database")
 
-    def _waited(self, connection: psycopg.Connection[Any], lock: tuple[int, str]) -> bool:
+    def _waited(self, connection: psycopg.Connection[object], lock: tuple[int, str]) -> bool:
         """Wait for a robot's lock; return whether it was released in time."""
         log.info("another program serves robot %s: waiting %d ms for its end", lock[1], self._patience)
         connection.execute(f"SET lock_timeout = {self._patience}".encode())
