@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog import service
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.dispatch import KNOWN, answer
 from roboglot.testing.addresses import free_addresses
 from roboglot.testing.process import ServedRobot, served
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.text import NotJson, read_params, write
-from tests.protocols.cyberdog.phone import PATIENCE, Client, Messages, Pems
+from tests.protocols.cyberdog.phone import PATIENCE, Client, Messages, Pems, until
 
 STREAMS = 10_000
 GROWTH_MAX = 150.0  # MB
@@ -110,6 +113,23 @@ async def test_messages_that_are_too_long(client: Client) -> None:
     assert refused.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
     assert await client.raw(10001, "[1]")  # the connection survives
     assert await client.raw(10001, "x" * 1_000_000) == [(0, '{"error_code":323}')]
+
+
+@pytest.mark.world("empty")
+async def test_one_host_leaves_calls_to_others(client: Client, robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(service, "HOST_CALLS_MAX", 1)
+    slow = client.open(1004, {"motion_id": 101})
+    await until(lambda: robot.actions.running())
+    for attempt in (client.raw(10001), client.file(4003)):
+        with pytest.raises(grpc.aio.AioRpcError) as refused:
+            await attempt
+        assert refused.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+    slow.cancel()
+    answers: list[tuple[int, str]] = []
+    async with asyncio.timeout(PATIENCE):
+        while not answers:  # until the door has heard of it
+            with contextlib.suppress(grpc.aio.AioRpcError):
+                answers = await client.raw(10001)
 
 
 async def _idle(robot: ServedRobot) -> None:

@@ -45,7 +45,7 @@ from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.requests import add_calls
-from roboglot.protocols.cyberdog.service import Service
+from roboglot.protocols.cyberdog.service import CALLS_MAX, Service
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.door import Endpoint
 from roboglot.transport.wakes import prompt_wakes
@@ -55,7 +55,6 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.visual.relay import FrameRelay
 
 log = logging.getLogger(__name__)
-CALLS_MAX = 512  # at the same time, over all connections
 FOLDER = "cyberdog"  # in the data folder
 
 

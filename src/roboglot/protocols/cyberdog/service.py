@@ -31,13 +31,16 @@ log = logging.getLogger(__name__)
 FRAME = 64  # bytes of a message besides its text, with a margin
 CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message, whatever their encoding
 CALLERS_MAX = 1024  # whose names are kept
+CALLS_MAX = 512  # at the same time, over all connections
+HOST_CALLS_MAX = CALLS_MAX * 3 // 4  # of one host, so that others still reach the robot
 
 
 @dataclass(frozen=True, slots=True)
 class _Caller:
-    """Name of a client that did not prove another, and its address and port."""
+    """Name of a client that did not prove another, its host, and its address and port."""
 
     name: str
+    host: str
     address: str
 
 
@@ -47,11 +50,22 @@ class Service:
     def __init__(self, context: Context, handshakes: Handshakes) -> None:
         self._context, self._handshakes = context, handshakes
         self._callers: dict[str, _Caller] = {}  # by peer, as gRPC writes it
+        self._open: dict[str, int] = {}  # calls under way, by host
 
     async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:  # noqa: N802 - the service's name
-        """Serve one request with any number of answers, and return the last; the status is always OK."""
+        """Serve one request with any number of answers, and return the last; the status is OK but for too many."""
+        caller = self._enter(rpc.peer())
+        try:
+            if self._count_in(caller.host) > HOST_CALLS_MAX:
+                await _turn_away(rpc)
+            return await self._send(request, rpc, caller)
+        finally:
+            self._count_out(caller.host)
+
+    async def _send(
+        self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, caller: _Caller
+    ) -> pb.RecResponse | None:
         robot, peer = self._context.robot, rpc.peer()
-        caller = self._enter(peer)
         if robot.admission.asks:
             await self._admit(rpc, peer)
         if request is None:
@@ -92,8 +106,16 @@ class Service:
 
     async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
         """Serve photos and recordings in chunks; errors are chunks, too."""
+        caller = self._enter(rpc.peer())
+        try:
+            if self._count_in(caller.host) > HOST_CALLS_MAX:
+                await _turn_away(rpc)
+            await self._fetch(request, rpc)
+        finally:
+            self._count_out(caller.host)
+
+    async def _fetch(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:
         peer, tap = rpc.peer(), self._context.robot.tap
-        self._enter(peer)
         if self._context.robot.admission.asks:
             await self._admit(rpc, peer)
         if request is None:
@@ -111,6 +133,15 @@ class Service:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
                 await self._say(rpc, chunk)
                 await self._count(peer, len(chunk.buffer))
+
+    def _count_in(self, host: str) -> int:
+        count = self._open[host] = self._open.get(host, 0) + 1
+        return count
+
+    def _count_out(self, host: str) -> None:
+        self._open[host] -= 1
+        if not self._open[host]:
+            del self._open[host]
 
     def _note_end(self, peer: str, code: int, asked: float | None) -> None:
         outside = self._context.robot.outside
@@ -134,7 +165,8 @@ class Service:
             self._handshakes.asked(peer)
             if len(self._callers) >= CALLERS_MAX:
                 self._callers.clear()
-            caller = self._callers[peer] = _Caller(f"cyberdog {host_of(peer)}", peer.partition(":")[2])
+            host = host_of(peer)
+            caller = self._callers[peer] = _Caller(f"cyberdog {host}", host, peer.partition(":")[2])
         if not self._context.robot.admission.asks:
             self._context.app.seen(peer)
             ask_for(caller.name, peer)
@@ -157,6 +189,10 @@ class Service:
     async def heartbeat(self, _request: None, rpc: grpc.aio.ServicerContext) -> None:
         """Refuse: only apps serve heartbeats."""
         await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
+
+
+async def _turn_away(rpc: grpc.aio.ServicerContext) -> None:
+    await rpc.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, f"a host has at most {HOST_CALLS_MAX} calls at the same time")
 
 
 def _note_unreadable(peer: str) -> None:
