@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 from roboglot.values import dataclass
 
@@ -81,15 +81,6 @@ class Schedule:
                 job.duty.changed = _Change(self, rank)
                 job.duty.changed(job.duty.on)
 
-    def due(self, tick: int) -> Iterator[tuple[Callable[..., None], float]]:
-        """Yield the calls of a tick, counted from 1, with the s since the last one; those off duty are left out."""
-        at, start = tick - 1, self._start
-        if at >= self._length:
-            at = start + (at - start) % (self._length - start)
-        for call, seconds, duty in self._rounds[at]:
-            if duty is None or duty.on:
-                yield call, seconds
-
     def next_after(self, tick: int) -> int:
         """Return the first tick after this one in which something is due; 0: there is none."""
         later = 0
@@ -99,15 +90,22 @@ class Schedule:
                 later = at
         return later
 
+    def _listed(self, tick: int) -> list[Entry]:
+        """Return the calls of a tick, counted from 1, also those off duty."""
+        at, start = tick - 1, self._start
+        return self._rounds[at if at < self._length else start + (at - start) % (self._length - start)]
+
     def run(self, tick: int) -> None:
         """Call each function that is due with the s since its last call."""
-        for call, seconds in self.due(tick):
-            call(seconds)
+        for call, seconds, duty in self._listed(tick):
+            if duty is None or duty.on:
+                call(seconds)
 
     def run_at(self, tick: int, stamp: float) -> None:
         """Call functions that also take the stamp (s)."""
-        for call, seconds in self.due(tick):
-            call(stamp, seconds)
+        for call, seconds, duty in self._listed(tick):
+            if duty is None or duty.on:
+                call(stamp, seconds)
 
     def change(self, rank: int, on: bool) -> None:
         """Note that a part's duty began or ended."""
