@@ -148,8 +148,9 @@ class Physics:
     @property
     def _pressed(self) -> bool:
         """True if contacts must be searched for: something presses on a hull, moves at it, or was put there."""
-        leans = not self._data.nefc and all(map(_leans, self._touched))
-        return bool(self._touched) and not (leans and self._meetings.known)
+        if not self._touched:
+            return False
+        return bool(self._data.nefc) or not (all(map(_leans, self._touched)) and self._meetings.known)
 
     def moved(self, *, awake: bool, known: bool) -> None:
         """Note that a kernel moved everything, or (not ``awake``) nothing moves; ``known``: as in the course."""
