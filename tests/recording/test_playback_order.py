@@ -92,12 +92,12 @@ class BusyClock(LockstepClock):
     """Finds all that has become due at once, as a busy machine does: no task runs between two timers."""
 
     async def advance(self, seconds: float) -> None:
-        await self._settle()
+        await super().advance(0.0)
         self._now += seconds
         while self._heap and self._heap[0][0] <= self._now:
             if callback := heapq.heappop(self._heap)[2].callback:
                 callback()
-        await self._settle()
+        await super().advance(0.0)
 
 
 REQUESTS = {
