@@ -338,3 +338,23 @@ def test_what_cannot_begin_leaves_no_file(
     assert why in str(done.exception) + done.output
     assert "Errno" not in str(done.exception)
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"kept"]
+
+
+async def test_an_early_end_of_requests_is_passed_on(tmp_path: Path) -> None:
+    async def robot(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"heard " + await reader.read())
+        writer.close()
+
+    async def ask(address: str) -> bytes:
+        reader, writer = await asyncio.open_connection(address, 1448)
+        writer.write(b"all")
+        writer.write_eof()
+        answer = await reader.read()
+        writer.close()
+        return answer
+
+    server = await asyncio.start_server(robot, ROBOT, 1448)
+    try:
+        assert await between(f"slamware://{ROBOT}", tmp_path / "x.mcap", ask) == b"heard all"
+    finally:
+        server.close()

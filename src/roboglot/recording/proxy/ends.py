@@ -126,6 +126,7 @@ class End(asyncio.Protocol):
         self.other: End | None = None
         self.look: Callable[[bytes], None] | None = None
         self.waiting = bytearray()
+        self._ended = False  # its peer says no more
         self.gone: Callable[[End], None] = lambda _: None
         self.lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
@@ -166,6 +167,8 @@ class End(asyncio.Protocol):
             other.transport.write(bytes(self.waiting))
             self.waiting.clear()
             self.transport.resume_reading()
+        if self._ended and not self.eof_received():
+            self.transport.close()
 
     def pause_writing(self) -> None:
         if self.other is not None and not self.other.transport.is_closing():
@@ -176,9 +179,13 @@ class End(asyncio.Protocol):
             self.other.transport.resume_reading()
 
     def eof_received(self) -> bool:
-        if self.other is not None and self.other.transport.can_write_eof():
+        """Pass on the end of the peer's data; close both ends where that cannot be said alone, as under TLS."""
+        self._ended = True
+        if self.other is None:
+            return True  # until it is joined
+        if can_say := self.other.transport.can_write_eof():
             self.other.transport.write_eof()
-        return True
+        return can_say
 
     def connection_lost(self, _exc: Exception | None) -> None:
         self.gone(self)
