@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.cli.up import LINE_MAX, lines_of
+from roboglot.cli.up import FILE_MAX, LINE_MAX, lines_of
 
 TEXT = b"1\n" + b"9" * (LINE_MAX + 1) + b"\n 0.5\n"
 LINES = ["1", "(a line that is too long)", "0.5"]
@@ -29,6 +29,16 @@ async def test_lines_of_a_file_are_read(tmp_path: Path) -> None:
     file = tmp_path / "steps"
     file.write_bytes(TEXT)
     assert [line async for line in lines_of(os.open(file, os.O_RDONLY))] == LINES
+
+
+@pytest.mark.asyncio
+async def test_too_long_file_is_refused_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "steps"
+    file.write_bytes(b"1\n" * (FILE_MAX // 2))
+    assert len([line async for line in lines_of(os.open(file, os.O_RDONLY))]) == FILE_MAX // 2
+    file.write_bytes(b"1\n" * (FILE_MAX // 2) + b"1\n")
+    assert [line async for line in lines_of(os.open(file, os.O_RDONLY))] == []
+    assert "use a pipe" in capsys.readouterr().err
 
 
 @pytest.mark.asyncio

@@ -261,7 +261,11 @@ async def lines_of(descriptor: int) -> AsyncIterator[str]:
         if _can_wait(descriptor):
             await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), file)
         else:
-            reader.feed_data(file.read(FILE_MAX))
+            data = file.read(FILE_MAX + 1)
+            if len(data) > FILE_MAX:
+                print(f"expected at most {FILE_MAX} bytes in a file of seconds; use a pipe for more", file=sys.stderr)
+                return
+            reader.feed_data(data)
             reader.feed_eof()
         while True:
             try:

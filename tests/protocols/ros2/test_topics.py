@@ -109,7 +109,7 @@ async def test_topics_come_with_the_robots_values(opened: Opened) -> None:
 
 
 async def test_each_publisher_numbers_its_own_messages(opened: Opened) -> None:
-    """By gaps in them rmw_zenoh tells nodes that messages were lost."""
+    """Nodes of rmw_zenoh report gaps in them as lost messages."""
     scene = await opened()
     peer, senders = scene.peer, set[bytes]()
     for topic, type in (("/a/odom", "nav_msgs/msg/Odometry"), ("/a/pose", STAMPED)):

@@ -328,7 +328,7 @@ class Planner:
             return  # already marked
         self._stood = here
         trodden = self._trodden.of(grid)
-        if radius > self._trodden_radius:  # the load is wider than whatever passed there before
+        if radius > self._trodden_radius:  # the load is wider than what passed there before
             trodden[:] = 0
         self._trodden_radius = radius
         begin = pose if last is None or last.distance_to(pose) > TREAD_MAX else last

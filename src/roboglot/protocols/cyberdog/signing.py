@@ -97,7 +97,7 @@ def serves(path: Path, names: Collection[str]) -> bool:
 
 
 def _apps_ca(apps: Path) -> ec.EllipticCurvePrivateKey:
-    """Return the key that signs apps' certificates; made on first use; renew its certificate if clients reject it."""
+    """Return the key that signs apps' certificates, made on first use; renew its certificate if clients reject it."""
     if not (apps / CA_KEY).exists():
         apps.mkdir(parents=True, exist_ok=True, mode=0o700)
         write(apps / CA_KEY, _pem(ec.generate_private_key(ec.SECP256R1())), private=True)
