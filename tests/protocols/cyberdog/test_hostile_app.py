@@ -56,4 +56,5 @@ async def test_few_answers_to_a_push_are_read(answer: bytes, caplog: pytest.LogC
         assert await line.push(2001, "{}") == DONE
         await app.ended.wait()
         await line.close()
-    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
+    warnings = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+    assert not [text for text in warnings if "servicer method" not in text]  # the app's gRPC notes its cut-off answers
