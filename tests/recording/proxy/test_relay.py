@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import re
 import socket
+import struct
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from roboglot.protocols.robomaster.datagrams import Datagrams
 from roboglot.recording.lines import Target
 from roboglot.recording.proxy.dog import DogRelay, Proof
 from roboglot.recording.proxy.relay import Book, Relay
-from roboglot.recording.proxy.sniffers import RestSniffer, TextSniffer, rest_operation
+from roboglot.recording.proxy.sniffers import rest_operation
 from roboglot.recording.reader import pair, read_recording
 from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT
@@ -245,32 +246,32 @@ async def test_what_is_not_understood_passes_all_the_same(tmp_path: Path) -> Non
     await robot.wait_closed()
 
 
+async def test_robot_that_hangs_up_at_once_hangs_up_on_the_client(tmp_path: Path) -> None:
+    """The robot is gone before the two connections are joined."""
+
+    async def refuse(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        writer.transport.abort()
+
+    async def script(address: str) -> list[bytes]:
+        came = []
+        for _ in range(20):
+            reader, writer = await asyncio.open_connection(address, 40923)
+            try:
+                came.append(await reader.read())
+            except ConnectionResetError:
+                came.append(b"")
+            writer.close()
+        return came
+
+    async with await asyncio.start_server(refuse, ROBOT, 40923):
+        assert await between(f"robomaster://{ROBOT}", tmp_path / "x.mcap", script) == [b""] * 20
+
+
 def test_a_request_is_named_as_in_the_contract() -> None:
     assert rest_operation("GET", "/api/core/slam/v1/localization/pose?x=1") == "GET /api/core/slam/v1/localization/pose"
     assert rest_operation("GET", "/api/core/motion/v1/actions/7").startswith("GET /api/core/motion/v1/actions/{")
     assert rest_operation("GET", "/nowhere") == ""
-
-
-def test_pieces_of_any_size_are_put_together() -> None:
-    noted: list[tuple[str, bytes, str]] = []
-
-    def note(direction: Direction, operation: str, payload: bytes, status: str, began: float | None) -> float:
-        noted.append((operation, payload, status))
-        return 0.0
-
-    text = TextSniffer(note)
-    for byte in b"version;chassis speed ?;":
-        text.from_client(bytes([byte]))
-    for byte in b"version 1;fail;":
-        text.from_robot(bytes([byte]))
-    assert noted[2:] == [("version", b"version 1;", "ok"), ("chassis speed ?", b"fail;", "fail")]
-    noted.clear()
-    rest = RestSniffer(note)
-    for byte in b"POST /a?b=1 HTTP/1.1\r\nhost: x\r\ncontent-length: 2\r\n\r\n{}":
-        rest.from_client(bytes([byte]))
-    for byte in b"HTTP/1.1 404 Not Found\r\ntransfer-encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n":
-        rest.from_robot(bytes([byte]))
-    assert noted == [("", b"POST /a?b=1\n\n{}", ""), ("", b"abc", "404")]
 
 
 UNREADABLE = b"\xff\xff\xff\xff not of the service"

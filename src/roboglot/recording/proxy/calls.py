@@ -157,7 +157,7 @@ class OneWay:
             message = bytes(way.waiting[MESSAGE_HEAD : MESSAGE_HEAD + size])
             packed = way.waiting[0] & 1
             del way.waiting[: MESSAGE_HEAD + size]
-            self._heard(call, _unpacked(way.packing, message) if packed else message)
+            self._heard(call, unpacked(way.packing, message) if packed else message)
 
     def _settings(self, payload: bytes) -> None:
         """Apply settings: this side's header table size limits the other side's compression."""
@@ -178,7 +178,7 @@ def _unpadded(flags: Flag, payload: bytes) -> bytes:
     return payload[1 : len(payload) - payload[0]] if flags & Flag.PADDED else payload
 
 
-def _unpacked(packing: str, message: bytes) -> bytes:
+def unpacked(packing: str, message: bytes) -> bytes:
     """Return a message decompressed; unchanged if the compression is unknown. Raises ValueError."""
     if packing not in ("gzip", "deflate"):
         return message

@@ -114,7 +114,7 @@ class _TimedPort(TlsPort):
 
 
 class End(asyncio.Protocol):
-    """One end of a connection; ``other`` gets its bytes first, then the sniffer a copy."""
+    """One end of a connection; ``other`` gets its bytes first, then the sniffer a copy; no bytes are the end."""
 
     transport: asyncio.Transport
 
@@ -153,6 +153,9 @@ class End(asyncio.Protocol):
         else:
             self.other.transport.write(data)
             self.watch.end()
+        self._look(data)
+
+    def _look(self, data: bytes) -> None:
         if self.look is not None:
             try:
                 self.look(data)
@@ -163,10 +166,14 @@ class End(asyncio.Protocol):
     def join(self, other: End) -> None:
         """Pass everything to ``other`` from now on, received data first."""
         self.other = other
+        if other.lost.done():
+            self.transport.close()
+            return
         if self.waiting:
             other.transport.write(bytes(self.waiting))
             self.waiting.clear()
-            self.transport.resume_reading()
+            if not self.lost.done():
+                self.transport.resume_reading()
         if self._ended and not self.eof_received():
             self.transport.close()
 
@@ -181,6 +188,7 @@ class End(asyncio.Protocol):
     def eof_received(self) -> bool:
         """Pass on the end of the peer's data; close both ends where that cannot be said alone, as under TLS."""
         self._ended = True
+        self._look(b"")
         if self.other is None:
             return True  # until it is joined
         if can_say := self.other.transport.can_write_eof():
@@ -221,7 +229,7 @@ class Crossing:
         task.add_done_callback(self._dialling.discard)
 
     async def _cross(self, came: End, to: Place, made: End, joining: Joining | None) -> None:
-        if len(self._ends) >= 2 * CONNECTIONS_MAX:
+        if len(self._ends) + 2 * len(self._dialling) > 2 * CONNECTIONS_MAX:
             came.transport.abort()
             return
         try:

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import json
+import re
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import httptools
 
 from roboglot.model.tap import PAYLOAD_MAX, Direction
 from roboglot.recording.lines import FRAMES, LOG, status_of
+from roboglot.recording.proxy.calls import unpacked
 from roboglot.wire.contracts import contract
 from roboglot.wire.robomaster.commands import Malformed, parse
 from roboglot.wire.robomaster.lines import LineSplitter
 from roboglot.wire.visual.requests import BadFrame, FrameSubject, parse_request
 
+if TYPE_CHECKING:
+    from wsproto.connection import Connection
+
 BEYOND = {"version", "version ?"}  # commands that robots know although the manual does not list them
 WAITING_MAX = 1000  # requests awaiting an answer
 PATH_MAX = 128  # bytes of a request's first line
+HEAD_MAX = 1 << 16  # bytes of a handshake
+EXTENSION = re.compile(rb"^sec-websocket-extensions:\s*(permessage-deflate[^,\r]*)", re.IGNORECASE | re.MULTILINE)
+PIECE = 1 << 14  # bytes of frames read at once
 Note = Callable[[Direction, str, bytes, str, float | None], float]
 
 
@@ -77,22 +85,38 @@ class TextSniffer(Sniffer):
 class _Message:
     """Contents of one HTTP message, collected by httptools."""
 
-    def __init__(self, done: Callable[[_Message], None]) -> None:
+    def __init__(self, done: Callable[[], None]) -> None:
         self._done = done
-        self.target, self.body = b"", bytearray()
+        self.on_message_begin()
 
     def on_message_begin(self) -> None:
-        self.target, self.body = b"", bytearray()
+        self.target, self.packing, self.has_size, self.has_head = b"", "", False, False
+        self.body = bytearray()
 
     def on_url(self, url: bytes) -> None:
         self.target += url
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        match name.lower():
+            case b"content-encoding":
+                self.packing = value.decode("latin-1").strip().lower()
+            case b"content-length" | b"transfer-encoding":
+                self.has_size = True
+
+    def on_headers_complete(self) -> None:
+        self.has_head = True
 
     def on_body(self, body: bytes) -> None:
         if len(self.body) < PAYLOAD_MAX:
             self.body += body
 
     def on_message_complete(self) -> None:
-        self._done(self)
+        self._done()
+
+    @property
+    def payload(self) -> bytes:
+        """The body without its compression: what it hides could not be redacted."""
+        return unpacked(self.packing, bytes(self.body))
 
 
 class RestSniffer(Sniffer):
@@ -100,22 +124,38 @@ class RestSniffer(Sniffer):
 
     def __init__(self, note: Note) -> None:
         super().__init__(note)
-        self._requests: Any = httptools.HttpRequestParser(_Message(self._request))
-        self._replies: Any = httptools.HttpResponseParser(_Message(self._reply))
+        self._asking, self._answering = _Message(self._request), _Message(self._reply)
+        self._requests: Any = httptools.HttpRequestParser(self._asking)
+        self._replies: Any = httptools.HttpResponseParser(self._answering)
+        self._methods: deque[str] = deque(maxlen=WAITING_MAX)
 
     def from_client(self, data: bytes) -> None:
         self._requests.feed_data(data)
 
     def from_robot(self, data: bytes) -> None:
-        self._replies.feed_data(data)
+        message = self._answering
+        if data:
+            self._replies.feed_data(data)
+            ends = message.has_head and next(iter(self._methods), "") == "HEAD"  # the size in its head is another's
+        else:
+            ends = message.has_head and not message.has_size  # the end of the connection ends it
+        if ends:
+            self._reply()
+            self._replies = httptools.HttpResponseParser(message)
 
-    def _request(self, message: _Message) -> None:
-        method = self._requests.get_method().decode()
+    def _request(self) -> None:
+        method, message = self._requests.get_method().decode(), self._asking
         path = message.target.decode("latin-1")
-        self._asked(rest_operation(method, path), f"{method} {path}\n\n".encode("latin-1") + bytes(message.body))
+        self._methods.append(method)
+        self._asked(rest_operation(method, path), f"{method} {path}\n\n".encode("latin-1") + message.payload)
 
-    def _reply(self, message: _Message) -> None:
-        self._answered(bytes(message.body), str(self._replies.get_status_code()))
+    def _reply(self) -> None:
+        message, status = self._answering, self._replies.get_status_code()
+        if status >= 200:  # others only announce an answer
+            if self._methods:
+                self._methods.popleft()
+            self._answered(message.payload, str(status))
+        message.on_message_begin()
 
 
 @cache
@@ -147,14 +187,11 @@ class FrameSniffer(Sniffer):
     """
 
     def __init__(self, note: Note) -> None:
-        from wsproto import ConnectionType, WSConnection
-
         super().__init__(note)
-        self._client: object = WSConnection(ConnectionType.SERVER)  # parses the client's bytes as a server would
-        self._robot: object = None
+        self._ends: dict[bool, Connection] = {}  # by whether the client sends; filled when the robot has agreed
         self._began: dict[str, tuple[str, float]] = {}
         self._partial = {True: "", False: ""}
-        self._upgraded = {True: b"", False: b""}
+        self._early = {True: b"", False: b""}  # bytes before that
         self._path = FRAMES
         self._path_asked = 0.0  # the time of that request
 
@@ -165,30 +202,48 @@ class FrameSniffer(Sniffer):
         self._feed(data, client=False)
 
     def _feed(self, data: bytes, *, client: bool) -> None:
+        if self._ends:
+            self._frames(data, client=client)
+            return
+        self._early[client] += data
+        (asked, _, sent), (agreed, end, came) = (self._early[one].partition(b"\r\n\r\n") for one in (True, False))
+        if max(len(asked), len(agreed)) > HEAD_MAX or len(sent) > PAYLOAD_MAX:
+            raise ValueError("no end of a handshake in sight")
+        if end:
+            self._path = (
+                asked[:PATH_MAX].partition(b" ")[2].partition(b" ")[0].partition(b"?")[0].decode("ascii", "replace")
+            )
+            self._agree(agreed)
+            self._early.clear()
+            self._frames(sent, client=True)
+            self._frames(came, client=False)
+
+    def _agree(self, head: bytes) -> None:
+        """Read frames from now on, compressed ones if the robot's answer says so."""
         from wsproto.connection import Connection, ConnectionType
+        from wsproto.extensions import Extension, PerMessageDeflate
+
+        packing = EXTENSION.search(head)
+        for client, kind in ((True, ConnectionType.SERVER), (False, ConnectionType.CLIENT)):  # as the receiver would
+            unpacking = list[Extension]()
+            if packing:
+                unpacking.append(PerMessageDeflate())
+                unpacking[0].finalize(packing[1].decode("latin-1"))
+            self._ends[client] = Connection(kind, unpacking)
+
+    def _frames(self, data: bytes, *, client: bool) -> None:
         from wsproto.events import TextMessage
 
-        connection = self._client if client else self._robot
-        if not isinstance(connection, Connection):  # the handshake, up to the blank line
-            head, end, rest = (self._upgraded[client] + data).partition(b"\r\n\r\n")
-            if not end:
-                self._upgraded[client] = head[: 1 << 16]
-                return
-            connection = Connection(ConnectionType.SERVER if client else ConnectionType.CLIENT)
-            data = rest
-            if client:
-                self._client = connection
-                target = head[:PATH_MAX].partition(b" ")[2].partition(b" ")[0]
-                self._path = target.partition(b"?")[0].decode("ascii", "replace")
-            else:
-                self._robot = connection
-        connection.receive_data(data)
-        for event in connection.events():
-            if isinstance(event, TextMessage):
-                self._partial[client] += event.data
-                if event.message_finished:
-                    text, self._partial[client] = self._partial[client], ""
-                    (self._frame_asked if client else self._frame_came)(text)
+        for at in range(0, len(data), PIECE):  # that unpacks to little at once
+            self._ends[client].receive_data(data[at : at + PIECE])
+            for event in self._ends[client].events():
+                if isinstance(event, TextMessage):
+                    self._partial[client] += event.data
+                    if len(self._partial[client]) > PAYLOAD_MAX:
+                        raise ValueError("no end of a message in sight")
+                    if event.message_finished:
+                        text, self._partial[client] = self._partial[client], ""
+                        (self._frame_asked if client else self._frame_came)(text)
 
     def _frame_asked(self, text: str) -> None:
         if self._path != FRAMES:
