@@ -7,9 +7,9 @@ import logging
 
 import pytest
 
-from roboglot.model.actions import HISTORY_MAX, Action, Actions, ActionStatus, OnBusy
+from roboglot.model.actions import HISTORY_MAX, Action, Actions, ActionStatus
 from roboglot.model.clock import LockstepClock
-from roboglot.model.errors import Busy, NotFound, Unreachable
+from roboglot.model.errors import NotFound, Unreachable
 from roboglot.model.events import ActionChanged, EventStream
 
 
@@ -81,11 +81,9 @@ async def test_one_that_never_ran_can_be_cancelled(actions: Actions) -> None:
     assert actions.running() == []
 
 
-async def test_a_busy_resource_may_refuse(actions: Actions) -> None:
+async def test_other_resources_are_left_alone(actions: Actions) -> None:
     holder = actions.start("hold", forever, resources=["base"])
-    with pytest.raises(Busy, match="hold"):
-        actions.start("polite", forever, resources=["base"], on_busy=OnBusy.REFUSE)
-    other = actions.start("light", forever, resources=["light"], on_busy=OnBusy.REFUSE)
+    other = actions.start("light", forever, resources=["light"])
     assert actions.running() == [holder, other]
     await actions.cancel()
 

@@ -10,24 +10,16 @@ import itertools
 import logging
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterable
-from enum import Enum
 
 from roboglot.model.action import Action, ActionStatus
 from roboglot.model.clock import Clock
-from roboglot.model.errors import Busy, NotFound, RobotError, forget_stack
+from roboglot.model.errors import NotFound, RobotError, forget_stack
 from roboglot.model.events import ActionChanged, EventStream
 
-__all__ = ["Action", "ActionStatus", "Actions", "OnBusy"]
+__all__ = ["Action", "ActionStatus", "Actions"]
 
 log = logging.getLogger(__name__)
 HISTORY_MAX = 20
-
-
-class OnBusy(Enum):
-    """Policy for a new action whose resource is held: replace the holder, or be refused."""
-
-    REPLACE = "replace"
-    REFUSE = "refuse"
 
 
 class Actions:
@@ -53,21 +45,17 @@ class Actions:
         resources: Iterable[str],
         goal: object = None,
         source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
         after: Action | None = None,
     ) -> Action:
         """Accept a goal and execute ``run(action)`` once its resources are free.
 
         ``run`` ends by returning (SUCCEEDED), raising RobotError (ABORTED) or being cancelled (CANCELED); it must leave
-        the hardware still in every case. With ``OnBusy.REPLACE`` the holder of a resource is cancelled first; with
-        ``REFUSE`` this raises ``Busy``. ``after`` is no rival: it is let end before this one begins (standing up, then
-        driving).
+        the hardware still in every case. The holder of a resource is cancelled first. ``after`` is no rival: it is let
+        end before this one begins (standing up, then driving).
         """
         action = Action(self, next(self._ids), name, goal, frozenset(resources), source)
         self._admit(action)
         rivals = [o for o in self._running.values() if o.resources & action.resources and o is not after]
-        if rivals and on_busy is OnBusy.REFUSE:
-            raise Busy(f"{rivals[0].name} is under way")
         for rival in rivals:
             rival.cancel(f"{name} took over")
         self._running[action.id] = action

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from roboglot.autonomy.navigation.driving import MOVE_MAX, OdometryDriving
 from roboglot.autonomy.navigation.speed_profile import cruise_speed, trapezoid_time
-from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base, BaseLimits, WheelSpeeds
 from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.motion.legs import LEGS, Legs, Posture
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.errors import Blocked, Busy, EmergencyStopped, InvalidGoal
+from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sensing import OdometryReading
@@ -297,14 +297,6 @@ async def test_who_cannot_stand_up_does_not_drive(carted: Robot, cart: Cart, clo
     await clock.advance(1.0)
     assert action.status is ActionStatus.ABORTED
     assert cart.pose == Pose()
-
-
-async def test_refuse_leaves_the_one_under_way(carted: Robot, clock: LockstepClock) -> None:
-    first = carted[Driving].drive(Twist(x=0.5))
-    with pytest.raises(Busy):
-        carted[Driving].move_by(Pose(x=1.0), on_busy=OnBusy.REFUSE)
-    await clock.advance(0.5)
-    assert first.status is ActionStatus.EXECUTING
 
 
 async def test_nonsense_is_refused_before_anything_moves(carted: Robot) -> None:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from roboglot.model.actions import ActionStatus, OnBusy
+from roboglot.model.actions import ActionStatus
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
-from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotLocalized, Unreachable
+from roboglot.model.errors import Blocked, InvalidGoal, NotLocalized, Unreachable
 from roboglot.model.events import ActionChanged, LocalizationLost, LocalizationRecovered
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid
@@ -245,8 +245,6 @@ async def test_navigation_gives_up_on_a_foreign_map(tour: Tour) -> None:
 async def test_driving_by_hand_takes_over(tour: Tour) -> None:
     action = tour.head_for((8.5, 5.0))
     await tour.clock.advance(2.0)
-    with pytest.raises(Busy):
-        tour.robot[Navigation].navigate_to([Point()], NavigationOptions(), on_busy=OnBusy.REFUSE)
     tour.robot[Driving].drive(Twist(x=0.2), lifetime=1.0)
     await tour.clock.advance(2.0)
     assert action.status is ActionStatus.CANCELED

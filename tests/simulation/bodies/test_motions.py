@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from roboglot.model.actions import ActionStatus, OnBusy
+from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.base import Base
@@ -20,7 +20,7 @@ from roboglot.model.components.motion.motions import MOTIONS, Motion
 from roboglot.model.components.motion.motors import Motors
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.errors import Blocked, Busy, InvalidGoal, Refused
+from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.geometry import STILL, Orientation, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.files import BODIES
@@ -160,12 +160,10 @@ async def test_refused(dog, why):
         assert getting_up.status is ActionStatus.SUCCEEDED
 
 
-async def test_busy(dog):
+async def test_new_motion_replaces_the_running_one(dog):
     legs = dog.robot[Legs]
     bow = legs.perform(Motion.BOW)
     await dog.clock.advance(2.0)
-    with pytest.raises(Busy):
-        legs.perform(Motion.BACK_FLIP, on_busy=OnBusy.REFUSE)
     legs.perform(Motion.JUMP_UP_30)
     await dog.clock.advance(4.0)
     assert bow.status is ActionStatus.CANCELED

@@ -17,7 +17,7 @@ from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start
 from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.slam.scan_points import ScanReader
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.logistics.lift_client import LiftClient, LiftDoor
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.floors import Floors, RideStage
@@ -70,7 +70,7 @@ class LiftFloors(Floors):
         yaw = waiting.point.bearing_to(inside)
         self._places = Pose(waiting.x, waiting.y, yaw), Pose(inside.x, inside.y, yaw)
 
-    def ride(self, floor: int, *, redraw: bool = True, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def ride(self, floor: int, *, redraw: bool = True, source: str = "") -> Action:
         self._check(floor)
         if self._places is None:
             raise InvalidGoal("the lift's place on this map is unknown")
@@ -78,7 +78,7 @@ class LiftFloors(Floors):
         async def run(action: Action) -> None:
             await self._ride(action, floor, redraw)
 
-        return start_on_base(self.robot, "ride the lift", run, goal=floor, source=source, on_busy=on_busy)
+        return start_on_base(self.robot, "ride the lift", run, goal=floor, source=source)
 
     def _check(self, floor: int) -> None:
         if not 0 <= floor < len(self.robot[LiftClient].floors):

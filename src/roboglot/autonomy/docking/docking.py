@@ -19,7 +19,7 @@ from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start
 from roboglot.autonomy.navigation.course import Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.slam.scan_points import ScanReader
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
@@ -68,11 +68,11 @@ class RearDocking(Docking):
             raise InvalidGoal(f"not a place on this map: {pose}")
         self._known.put(pose)
 
-    def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        return start_on_base(self._robot, "dock", self._run, goal=self.home, source=source, on_busy=on_busy)
+    def dock(self, *, source: str = "") -> Action:
+        return start_on_base(self._robot, "dock", self._run, goal=self.home, source=source)
 
-    def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
-        return start_on_base(self._robot, "undock", self._leave, goal=None, source=source, on_busy=on_busy)
+    def undock(self, *, source: str = "") -> Action:
+        return start_on_base(self._robot, "undock", self._leave, goal=None, source=source)
 
     async def _leave(self, action: Action) -> None:
         """Drive ahead by odometry, as there may be no map yet. Raises Blocked."""

@@ -9,7 +9,7 @@ from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start
 from roboglot.autonomy.navigation.course import Goal
 from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.autonomy.navigation.navigation import GridNavigation
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.logistics.jack import Jack, JackStage
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
@@ -47,7 +47,7 @@ class MarkDocking(TagDocking):
     def marks(self) -> frozenset[Mark]:
         return frozenset(mark for mark, sense in SENSES.items() if sense in self._robot)
 
-    def dock_at(self, goal: MarkGoal, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def dock_at(self, goal: MarkGoal, *, source: str = "") -> Action:
         self._check(goal)
 
         async def run(action: Action) -> None:
@@ -59,7 +59,7 @@ class MarkDocking(TagDocking):
                     if not tries_left:
                         raise
 
-        return start_on_base(self._robot, "dock at mark", run, goal=goal, source=source, on_busy=on_busy)
+        return start_on_base(self._robot, "dock at mark", run, goal=goal, source=source)
 
     def back_off(
         self,
@@ -69,7 +69,6 @@ class MarkDocking(TagDocking):
         ahead: bool = False,
         watchful: bool = False,
         source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
         self._need(mark)
         way = self._robot.description.radius + ROOM_TO_TURN if distance is None else distance
@@ -85,7 +84,7 @@ class MarkDocking(TagDocking):
             watch = MarkWatch(self._robot, goal) if watchful and not ahead else None
             await self._leave(action, way if ahead else -way, watch)
 
-        return start_on_base(self._robot, "back off from mark", run, goal=mark, source=source, on_busy=on_busy)
+        return start_on_base(self._robot, "back off from mark", run, goal=mark, source=source)
 
     def _check(self, goal: MarkGoal) -> None:
         self._need(goal.mark)

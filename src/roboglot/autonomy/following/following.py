@@ -15,7 +15,7 @@ from roboglot.autonomy.following.trail import (
 )
 from roboglot.autonomy.navigation.base_actions import PERIOD, start_on_base
 from roboglot.autonomy.slam.scan_points import ScanReader
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.following import Following, FollowSide
 from roboglot.model.components.sensing.lidar import Lidar
@@ -90,7 +90,6 @@ class SightFollowing(Following):
         side: FollowSide = FollowSide.BEHIND,
         distance: float = 1.0,
         source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
         _check(distance)
 
@@ -107,16 +106,9 @@ class SightFollowing(Following):
                 await self._run(action, quarry, look, side, distance)
 
         goal = (person, side, distance)
-        return start_on_base(self._robot, "follow", run, goal=goal, source=source, on_busy=on_busy)
+        return start_on_base(self._robot, "follow", run, goal=goal, source=source)
 
-    def follow_tag(
-        self,
-        *,
-        side: FollowSide = FollowSide.BEHIND,
-        distance: float = 1.0,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def follow_tag(self, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = "") -> Action:
         _check(distance)
         radio = self._robot[UltraWideband]
 
@@ -129,16 +121,10 @@ class SightFollowing(Following):
 
             await self._run(action, quarry, range_it, side, distance)
 
-        return start_on_base(self._robot, "follow tag", run, goal=(side, distance), source=source, on_busy=on_busy)
+        return start_on_base(self._robot, "follow tag", run, goal=(side, distance), source=source)
 
     def follow_thing(
-        self,
-        place: Point,
-        *,
-        side: FollowSide = FollowSide.BEHIND,
-        distance: float = 1.0,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
+        self, place: Point, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = ""
     ) -> Action:
         _check(distance)
         lidar = self._robot[Lidar]
@@ -153,7 +139,7 @@ class SightFollowing(Following):
             await self._run(action, quarry, lambda: self._see(quarry, lidar.scan), side, distance)
 
         goal = (place, side, distance)
-        return start_on_base(self._robot, "follow thing", run, goal=goal, source=source, on_busy=on_busy)
+        return start_on_base(self._robot, "follow thing", run, goal=goal, source=source)
 
     def _see(self, quarry: _Quarry, scan: LaserScan | None) -> None:
         """Update the place of the followed thing by a new scan."""

@@ -9,11 +9,11 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
-from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.legs import Legs, Posture
-from roboglot.model.errors import Busy, EmergencyStopped, Refused, Unconnected
+from roboglot.model.errors import EmergencyStopped, Refused, Unconnected
 from roboglot.model.geometry import STILL
 from roboglot.model.robot import Robot
 
@@ -24,22 +24,14 @@ STANDSTILL_YAW_RATE = 0.03  # rad/s
 
 
 def start_on_base(
-    robot: Robot,
-    name: str,
-    run: Callable[[Action], Awaitable[None]],
-    *,
-    goal: object,
-    source: str,
-    on_busy: OnBusy = OnBusy.REPLACE,
+    robot: Robot, name: str, run: Callable[[Action], Awaitable[None]], *, goal: object, source: str
 ) -> Action:
-    """Start ``run(action)`` holding the base; a lying robot stands up first. Raises Busy if ``on_busy`` refuses.
+    """Start ``run(action)`` holding the base; a lying robot stands up first.
 
     Raises EmergencyStopped while the legs are limp.
     """
     if Legs in robot and robot[Legs].posture is Posture.LIMP:
         raise EmergencyStopped("the robot is limp after an emergency stop: it has to stand up first")
-    if on_busy is OnBusy.REFUSE and (holders := robot.actions.running(BASE)):
-        raise Busy(f"{holders[0].name} is under way")
     rising = None
     if Legs in robot and robot[Legs].posture is not Posture.STANDING:
         rising = robot[Legs].stand(source=source)
@@ -50,9 +42,7 @@ def start_on_base(
         async with braking_at_the_end(robot, action):
             await run(action)
 
-    return robot.actions.start(
-        name, stand_then_run, resources={BASE}, goal=goal, source=source, on_busy=on_busy, after=rising
-    )
+    return robot.actions.start(name, stand_then_run, resources={BASE}, goal=goal, source=source, after=rising)
 
 
 @asynccontextmanager

@@ -16,7 +16,7 @@ from roboglot.autonomy.navigation.speed_profile import (
     cruise_speed,
     trapezoid_time,
 )
-from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.odometry import Odometry
@@ -120,13 +120,7 @@ class OdometryDriving(Driving):
         return self._action
 
     def move_by(
-        self,
-        offset: Pose,
-        *,
-        speed: float | None = None,
-        yaw_speed: float | None = None,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
+        self, offset: Pose, *, speed: float | None = None, yaw_speed: float | None = None, source: str = ""
     ) -> Action:
         limits = self._robot[Base].limits.twist
         top = _top_speed(speed, limits.x, "speed")
@@ -146,7 +140,7 @@ class OdometryDriving(Driving):
             moving.begun = True
             await self.move(action, offset, top, top_yaw, moving)
 
-        moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source, on_busy=on_busy)
+        moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source)
         if before is not None:  # it was cancelled just now and stops nothing
             before.action.hands_over = True
             moving.minding = asyncio.get_running_loop().create_task(self._mind(moving), name="taking over a move")

@@ -15,7 +15,7 @@ from roboglot.autonomy.navigation.base_actions import start_on_base
 from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.pilot import Pilot
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
@@ -37,16 +37,14 @@ class GridNavigation(Navigation):
         self._robot = robot
         self._course = course
 
-    def navigate_to(
-        self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
-    ) -> Action:
+    def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
         goal = _checked(goals, options)
         self._course.check_available()
 
         async def run(action: Action) -> None:
             await self.drive(action, goal, action.report)
 
-        return start_on_base(self._robot, "navigate to", run, goal=goal, source=source, on_busy=on_busy)
+        return start_on_base(self._robot, "navigate to", run, goal=goal, source=source)
 
     async def drive(
         self,

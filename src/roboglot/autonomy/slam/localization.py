@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.slam.belief import Belief
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal, NotLocalized, NotReady
 from roboglot.model.events import LostReason, PoseJumped
@@ -62,14 +62,7 @@ class LidarLocalization(Localization):
         self._belief.take_pose(given)
         self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=given, given=True))
 
-    def relocalize(
-        self,
-        region: Region | None = None,
-        *,
-        may_move: bool = False,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def relocalize(self, region: Region | None = None, *, may_move: bool = False, source: str = "") -> Action:
         if region is not None and not (
             -POSITION_MAX <= region.min_x < region.max_x <= POSITION_MAX
             and -POSITION_MAX <= region.min_y < region.max_y <= POSITION_MAX
@@ -79,9 +72,7 @@ class LidarLocalization(Localization):
         async def search(_action: Action) -> None:
             await (self._search_driving(region, source) if may_move else self._search_standing(region))
 
-        return self._robot.actions.start(
-            "relocalize", search, resources={LOCALIZATION}, goal=region, source=source, on_busy=on_busy
-        )
+        return self._robot.actions.start("relocalize", search, resources={LOCALIZATION}, goal=region, source=source)
 
     async def _search_standing(self, region: Region | None) -> None:
         deadline = self._robot.clock.time() + SEARCH_SECONDS

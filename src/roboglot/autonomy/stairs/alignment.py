@@ -10,7 +10,7 @@ import math
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.stairs.finder import StepEdge
 from roboglot.autonomy.stairs.ground_view import StairSight
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.motion.stair_alignment import (
@@ -43,7 +43,7 @@ class SeenStairAlignment(StairAlignment):
         self._robot = robot
         self._sight = StairSight(robot)
 
-    def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def align(self, direction: StairDirection, *, source: str = "") -> Action:
         robot = self._robot
         if (refusal := robot[Base].refusal) is not None:
             raise refusal
@@ -53,7 +53,7 @@ class SeenStairAlignment(StairAlignment):
         async def run(action: Action) -> None:
             await _Approach(robot, self._sight, direction, action).run()
 
-        return start_on_base(robot, ALIGN_WITH_STAIRS, run, goal=direction, source=source, on_busy=on_busy)
+        return start_on_base(robot, ALIGN_WITH_STAIRS, run, goal=direction, source=source)
 
 
 class _Approach:

@@ -19,7 +19,7 @@ from roboglot.autonomy.navigation.sweeping.lanes import (
     zigzag,
 )
 from roboglot.autonomy.navigation.sweeping.swept import Swept
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.mapping.annotations import Area, AreaKind
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
@@ -42,20 +42,13 @@ class LaneSweeping(Sweeping):
     def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
         self._robot, self._course, self._navigation = robot, course, navigation
 
-    def sweep(
-        self,
-        areas: Sequence[Area] = (),
-        *,
-        width: float | None = None,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def sweep(self, areas: Sequence[Area] = (), *, width: float | None = None, source: str = "") -> Action:
         wanted, apart = self._checked(areas, width)
 
         async def run(action: Action) -> None:
             await self._run(action, await self._ways(wanted, apart))
 
-        return start_on_base(self._robot, "sweep", run, goal=wanted, source=source, on_busy=on_busy)
+        return start_on_base(self._robot, "sweep", run, goal=wanted, source=source)
 
     async def lanes(self, areas: Sequence[Area] = (), *, width: float | None = None) -> Sequence[Sequence[Point]]:
         return await self._ways(*self._checked(areas, width))

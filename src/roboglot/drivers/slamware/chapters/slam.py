@@ -13,7 +13,7 @@ from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.telemetry import TelemetryPoller
 from roboglot.drivers.slamware.vocabulary import explored_of, pose3d
 from roboglot.drivers.supervisor import Supervisor
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import POSITION_MAX, Point, Pose
@@ -73,14 +73,7 @@ class SlamwareLocalization(Localization):
             raise InvalidGoal(f"not a place on this map: {pose}")
         self._supervisor.send("setting the pose", self._client.set_pose(pose3d(pose)))
 
-    def relocalize(
-        self,
-        region: Region | None = None,
-        *,
-        may_move: bool = False,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def relocalize(self, region: Region | None = None, *, may_move: bool = False, source: str = "") -> Action:
         area = None
         if region is not None:
             width, height = region.max_x - region.min_x, region.max_y - region.min_y
@@ -94,7 +87,6 @@ class SlamwareLocalization(Localization):
             VendorAction("RecoverLocalizationAction", RecoverLocalizationOptions(area, options), _nothing),
             goal=region,
             source=source,
-            on_busy=on_busy,
             resources=(LOCALIZATION,),
         )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from enum import StrEnum
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Pose
 
@@ -38,7 +38,7 @@ class Floors(Component):
         """Set the poses to wait at and to stand at in the car, on the current map. Raises InvalidGoal."""
 
     @abstractmethod
-    def ride(self, floor: int, *, redraw: bool = True, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def ride(self, floor: int, *, redraw: bool = True, source: str = "") -> Action:
         """Ride the lift to ``floor`` and leave it there; switch to its map, or to a new one if it has none.
 
         Without ``redraw``, the annotations stay, for the caller to replace.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.events import LostReason
 from roboglot.model.geometry import Pose
@@ -64,14 +64,7 @@ class Localization(Component):
         """Set the robot's pose in the map."""
 
     @abstractmethod
-    def relocalize(
-        self,
-        region: Region | None = None,
-        *,
-        may_move: bool = False,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def relocalize(self, region: Region | None = None, *, may_move: bool = False, source: str = "") -> Action:
         """Search for the robot by lidar, anywhere in the map or with its centre in ``region``.
 
         The robot stands still, unless ``may_move`` lets it drive to tell similar places apart. Aborts with NotLocalized

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Pose
 
@@ -24,7 +24,7 @@ class Docking(Component):
         """Set the docked pose of base_link in map; None deletes it."""
 
     @abstractmethod
-    def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def dock(self, *, source: str = "") -> Action:
         """Drive to the dock and onto its contacts; aborts with DockNotFound and navigation's errors.
 
         A dock at an unknown place is searched nearby. Feedback: "searching" in that case, "approaching", "docking",
@@ -32,7 +32,7 @@ class Docking(Component):
         """
 
     @abstractmethod
-    def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def undock(self, *, source: str = "") -> Action:
         """Leave the dock straight ahead until there is room to turn; succeeds at once off the dock.
 
         Aborts with Blocked when something holds the robot. Feedback: "leaving".

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.components.motion.base import WheelSpeeds
 from roboglot.model.geometry import Pose, Twist
@@ -24,13 +24,7 @@ class Driving(Component):
 
     @abstractmethod
     def move_by(
-        self,
-        offset: Pose,
-        *,
-        speed: float | None = None,
-        yaw_speed: float | None = None,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
+        self, offset: Pose, *, speed: float | None = None, yaw_speed: float | None = None, source: str = ""
     ) -> Action:
         """Move by ``offset`` (base_link at the start; its yaw may exceed a turn) at up to these speeds (m/s, rad/s).
 

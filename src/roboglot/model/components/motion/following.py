@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from enum import StrEnum
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Point
 
@@ -32,7 +32,6 @@ class Following(Component):
         side: FollowSide = FollowSide.BEHIND,
         distance: float = 1.0,
         source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
         """Follow the ``person`` of that number (None: the nearest one in sight) at ``distance`` m until cancelled.
 
@@ -40,14 +39,7 @@ class Following(Component):
         """
 
     @abstractmethod
-    def follow_tag(
-        self,
-        *,
-        side: FollowSide = FollowSide.BEHIND,
-        distance: float = 1.0,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def follow_tag(self, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = "") -> Action:
         """Follow the person who carries the ultra-wideband tag that the robot is connected to, as above.
 
         Needs no picture; raises ComponentMissing without UltraWideband.
@@ -55,13 +47,7 @@ class Following(Component):
 
     @abstractmethod
     def follow_thing(
-        self,
-        place: Point,
-        *,
-        side: FollowSide = FollowSide.BEHIND,
-        distance: float = 1.0,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
+        self, place: Point, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = ""
     ) -> Action:
         """Follow whatever stands at ``place`` (base_link, m) now, as above: the lidar alone keeps it in sight.
 

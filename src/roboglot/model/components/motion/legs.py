@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.components.motion.feet import (
     Foot,
@@ -158,22 +158,15 @@ class Legs(Component):
         """
 
     @abstractmethod
-    def perform(self, motion: Motion, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def perform(self, motion: Motion, *, source: str = "") -> Action:
         """Perform a motion of ``MOTIONS``; it displaces the robot as the table says, unless something is hit.
 
         Aborts with Refused in a wrong initial posture or with a low battery, with Blocked when something
-        was in the way. Raises Busy as ``on_busy`` says.
+        was in the way.
         """
 
     @abstractmethod
-    def dance(
-        self,
-        steps: Sequence[Step],
-        footfalls: Sequence[Footfall] = (),
-        *,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def dance(self, steps: Sequence[Step], footfalls: Sequence[Footfall] = (), *, source: str = "") -> Action:
         """Perform a custom choreography, then stand straight again.
 
         ``footfalls`` repeat as long as there are steps; none: those of walking. Standing feet hold the body back

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from enum import StrEnum
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Path, Point
 from roboglot.values import dataclass
@@ -49,9 +49,7 @@ class Navigation(Component):
     """Plans on the map and current scans; its actions' feedback is ``NavigationFeedback``."""
 
     @abstractmethod
-    def navigate_to(
-        self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
-    ) -> Action:
+    def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
         """Drive through ``goals`` (map frame) in turn. Aborts with Unreachable, Blocked or NotLocalized."""
 
     @abstractmethod

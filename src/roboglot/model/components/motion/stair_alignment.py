@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from enum import StrEnum
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 
 ALIGN_WITH_STAIRS = "align with stairs"  # the name of its actions
@@ -30,7 +30,7 @@ class StairAlignment(Component):
     """Alignment from Base, Odometry and sensors of the ground ahead; climbs nothing."""
 
     @abstractmethod
-    def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def align(self, direction: StairDirection, *, source: str = "") -> Action:
         """Turn and shift until the first step's edge is square ahead, 0.5 m from base_link.
 
         Feedback is an ``AlignmentStage``. Raises at once, with no effect: NotFound where a standing robot sees no

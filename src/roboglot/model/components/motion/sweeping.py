@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.components.mapping.annotations import Area
 from roboglot.model.geometry import Point
@@ -25,14 +25,7 @@ class Sweeping(Component):
     """Built on Navigation: covers the known free floor of an area, lane by lane. Feedback: ``SweepFeedback``."""
 
     @abstractmethod
-    def sweep(
-        self,
-        areas: Sequence[Area] = (),
-        *,
-        width: float | None = None,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def sweep(self, areas: Sequence[Area] = (), *, width: float | None = None, source: str = "") -> Action:
         """Sweep ``areas`` (by default the map's coverage areas) with lanes ``width`` m apart (by default the hull's).
 
         Aborts with Unreachable if no lane could be driven. InvalidGoal if there is nothing to sweep.

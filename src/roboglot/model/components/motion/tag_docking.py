@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from enum import StrEnum
 
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import ORIGIN, Point, Pose
 from roboglot.values import dataclass
@@ -52,7 +52,7 @@ class TagDocking(Component):
         """Marks that this robot can dock at."""
 
     @abstractmethod
-    def dock_at(self, goal: MarkGoal, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def dock_at(self, goal: MarkGoal, *, source: str = "") -> Action:
         """Dock at a mark. Raises InvalidGoal for impossible marks and places; aborts with NotFound when the mark is not
         seen, Blocked when the robot is held or misses it, and navigation's errors.
 
@@ -68,7 +68,6 @@ class TagDocking(Component):
         ahead: bool = False,
         watchful: bool = False,
         source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
         """Drive straight backwards (``ahead``: forwards) by ``distance`` m; None: until there is room to turn.
 

@@ -9,7 +9,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 
-from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.feet import Foot, Footfall, FootState
 from roboglot.model.components.motion.gaits import GAITS, Gait
@@ -199,25 +199,16 @@ class SimulatedLegs(Legs):
 
     # -- motions -----------------------------------------------------------------------------------------------------
 
-    def perform(self, motion: Motion, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def perform(self, motion: Motion, *, source: str = "") -> Action:
         spec = MOTIONS[motion]
 
         async def run(action: Action) -> None:
             self._check_ready(spec.before)
             await self._play(action, motion, lambda: motion_frames(spec, self._torso.body, self._stance), spec)
 
-        return self._robot.actions.start(
-            motion, run, resources=[LEGS, BASE], goal=motion, source=source, on_busy=on_busy
-        )
+        return self._robot.actions.start(motion, run, resources=[LEGS, BASE], goal=motion, source=source)
 
-    def dance(
-        self,
-        steps: Sequence[Step],
-        footfalls: Sequence[Footfall] = (),
-        *,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def dance(self, steps: Sequence[Step], footfalls: Sequence[Footfall] = (), *, source: str = "") -> Action:
         check_steps(steps, footfalls, self.limits, self._base.limits.twist)
         self.choreography = Choreography(tuple(steps), tuple(footfalls))
         falls = footfalls if self._steps.feet else ()  # there are no feet to lift while rolling
@@ -226,9 +217,7 @@ class SimulatedLegs(Legs):
             self._check_ready(frozenset({Posture.STANDING}))
             await self._play(action, None, lambda: dance_frames(steps, self._torso.body, self._stance, falls), None)
 
-        return self._robot.actions.start(
-            "dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source, on_busy=on_busy
-        )
+        return self._robot.actions.start("dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source)
 
     def _check_ready(self, before: frozenset[Posture]) -> None:
         check_posture(self._posture, before, self.off)

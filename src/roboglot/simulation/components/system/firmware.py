@@ -11,7 +11,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from roboglot.model.actions import Action, ActionStatus, OnBusy
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
@@ -28,7 +28,7 @@ from roboglot.model.components.system.firmware import (
     Module,
 )
 from roboglot.model.components.system.network import Network
-from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
+from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotFound, Refused
 from roboglot.model.events import FirmwareChanged, ModuleRestarted, Rebooted, Rebooting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
@@ -238,9 +238,9 @@ class SimulatedFirmware(Firmware):
                 self._base.locks.unlock(lock)
             robot.events.publish(ModuleRestarted(stamp=self._clock.time(), module=module))
 
-        return self._robot.actions.start(
-            f"restart {module}", run, resources=[FIRMWARE], source=source, on_busy=OnBusy.REFUSE
-        )
+        for holder in self._robot.actions.running(FIRMWARE):
+            raise Busy(f"{holder.name} is under way")
+        return self._robot.actions.start(f"restart {module}", run, resources=[FIRMWARE], source=source)
 
     def sense(self, stamp: float, _seconds: float) -> None:
         """Check periodically for an update, and begin it on a robot that updates itself, is docked and idle."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
 from roboglot.drivers.linked_base import OFF_DOCK
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Refused
@@ -24,11 +24,11 @@ class CyberDogDocking(Docking):
     def set_home(self, pose: Pose | None) -> None:
         raise Refused("this robot finds its dock by itself")
 
-    def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def dock(self, *, source: str = "") -> Action:
         charge = self._skills.client.charge
-        return self._skills.start_from_idle("dock", charge, goal=None, source=source, on_busy=on_busy)
+        return self._skills.start_from_idle("dock", charge, goal=None, source=source)
 
-    def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def undock(self, *, source: str = "") -> Action:
         if not self._skills.reported.docked:
             raise Refused("the robot is on no dock")
-        return self._skills.robot[Driving].move_by(Pose(OFF_DOCK), source=source, on_busy=on_busy)
+        return self._skills.robot[Driving].move_by(Pose(OFF_DOCK), source=source)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Begin, Skills
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.errors import InvalidGoal, Refused
@@ -22,9 +22,7 @@ class CyberDogNavigation(Navigation):
     def __init__(self, skills: Skills) -> None:
         self._skills = skills
 
-    def navigate_to(
-        self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
-    ) -> Action:
+    def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
         if not 1 <= len(goals) <= GOALS_MAX:
             raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
         if not all(math.hypot(goal.x, goal.y) <= POSITION_MAX for goal in goals):
@@ -35,7 +33,7 @@ class CyberDogNavigation(Navigation):
             return lambda: self._skills.client.navigate(goal.x, goal.y, yaw)
 
         begins = [begin(goal, yaw) for goal, yaw in zip(goals, yaws, strict=True)]
-        return self._skills.start("navigate", begins, goal=tuple(goals), source=source, on_busy=on_busy)
+        return self._skills.start("navigate", begins, goal=tuple(goals), source=source)
 
     async def plan(self, start: Point, goal: Point) -> Path:
         raise Refused("this robot does not report plans")
@@ -70,17 +68,8 @@ class CyberDogLocalization(Localization):
     def set_pose(self, pose: Pose) -> None:
         raise Refused("this robot finds its place by itself")
 
-    def relocalize(
-        self,
-        region: Region | None = None,
-        *,
-        may_move: bool = False,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def relocalize(self, region: Region | None = None, *, may_move: bool = False, source: str = "") -> Action:
         if region is not None:
             raise Refused("this robot searches the whole map")
         client = self._skills.client
-        return self._skills.start(
-            "relocalize", [client.relocalise], goal=None, source=source, on_busy=on_busy, resource=LOCALIZATION
-        )
+        return self._skills.start("relocalize", [client.relocalise], goal=None, source=source, resource=LOCALIZATION)

@@ -10,7 +10,7 @@ from roboglot.clients.cyberdog import CyberDogClient, CyberDogRefused, RunningTa
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.state import ReportedState
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.navigation import NavigationFeedback
 from roboglot.model.components.system.link import Link
@@ -32,9 +32,7 @@ class Skills:
         self.robot, self.client, self.link, self.reported = robot, client, link, reported
         self._orphan: TaskType | None = None  # still running since the link was lost
 
-    def start(
-        self, name: str, begins: Sequence[Begin], *, goal: object, source: str, on_busy: OnBusy, resource: str = BASE
-    ) -> Action:
+    def start(self, name: str, begins: Sequence[Begin], *, goal: object, source: str, resource: str = BASE) -> Action:
         """Start an action that runs one task after the other."""
         self.link.require_free()
 
@@ -43,10 +41,10 @@ class Skills:
                 with robot_errors():
                     await self._follow(action, await begin())
 
-        return self._begin(name, run, goal=goal, source=source, on_busy=on_busy, resource=resource)
+        return self.robot.actions.start(name, run, resources={resource}, goal=goal, source=source)
 
     def start_from_idle(
-        self, name: str, begin: Begin, *, goal: object, source: str, on_busy: OnBusy, then: Afterwards | None = None
+        self, name: str, begin: Begin, *, goal: object, source: str, then: Afterwards | None = None
     ) -> Action:
         """Start a task that the dog accepts only while not localized; relocalize afterwards."""
         self.link.require_free()
@@ -60,7 +58,7 @@ class Skills:
                     if localized:
                         await self._localize()
 
-        return self._begin(name, run, goal=goal, source=source, on_busy=on_busy, resource=BASE)
+        return self.robot.actions.start(name, run, resources={BASE}, goal=goal, source=source)
 
     async def stop_orphan(self) -> bool:
         """Stop the orphaned task after a reconnection; return True if there was one. Raises ClientError."""
@@ -84,18 +82,6 @@ class Skills:
             (await self.client.relocalise()).leave()  # pose pushes show when it ends
         except ClientError as error:
             log.info("%s is not localized: %s", self.link.address, error)
-
-    def _begin(
-        self,
-        name: str,
-        run: Callable[[Action], Awaitable[None]],
-        *,
-        goal: object,
-        source: str,
-        on_busy: OnBusy,
-        resource: str,
-    ) -> Action:
-        return self.robot.actions.start(name, run, resources={resource}, goal=goal, source=source, on_busy=on_busy)
 
     async def _follow(self, action: Action, task: RunningTask, then: Afterwards | None = None) -> None:
         try:

@@ -12,7 +12,7 @@ from roboglot.clients.cyberdog.chapters.motion import STEP
 from roboglot.drivers.cyberdog.chapters.motion.base import CyberDogBase
 from roboglot.drivers.cyberdog.vocabulary import FIGURES, WALKS, posture_of, robot_errors
 from roboglot.drivers.supervisor import Supervisor
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.feet import Foot, Footfall, FootState
 from roboglot.model.components.motion.gaits import (
@@ -134,21 +134,14 @@ class CyberDogLegs(Legs):
         self._supervisor.link.require()
         return self._robot.actions.start("hold the body", run, resources=[LEGS], goal=body, source=source)
 
-    def perform(self, motion: Figure, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def perform(self, motion: Figure, *, source: str = "") -> Action:
         number = next(number for number, figure in FIGURES.items() if figure is motion)
-        return self._start(motion, number, source=source, on_busy=on_busy)
+        return self._start(motion, number, source=source)
 
-    def dance(
-        self,
-        steps: Sequence[Step],
-        footfalls: Sequence[Footfall] = (),
-        *,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def dance(self, steps: Sequence[Step], footfalls: Sequence[Footfall] = (), *, source: str = "") -> Action:
         raise Refused("this robot's app protocol has no choreographies")
 
-    def _start(self, name: str, number: int, *, source: str, on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def _start(self, name: str, number: int, *, source: str) -> Action:
         self._supervisor.link.require()
 
         async def run(_: Action) -> None:
@@ -157,7 +150,7 @@ class CyberDogLegs(Legs):
             await self._perform(number)
 
         resources = [LEGS, BASE]
-        return self._robot.actions.start(name, run, resources=resources, goal=number, source=source, on_busy=on_busy)
+        return self._robot.actions.start(name, run, resources=resources, goal=number, source=source)
 
     async def _perform(self, number: int, **how: object) -> None:
         """Run a motion to its end; follow the heartbeats if it outlasts the reply time-out."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
 from roboglot.drivers.cyberdog.vocabulary import WALKS, robot_errors
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.stair_alignment import (
     ALIGN_WITH_STAIRS,
@@ -27,7 +27,7 @@ class CyberDogStairAlignment(StairAlignment):
     def __init__(self, skills: Skills) -> None:
         self._skills = skills
 
-    def align(self, direction: StairDirection, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def align(self, direction: StairDirection, *, source: str = "") -> Action:
         skills = self._skills
         skills.link.require_free()
 
@@ -44,9 +44,7 @@ class CyberDogStairAlignment(StairAlignment):
                 await self._call_off()
                 raise
 
-        return skills.robot.actions.start(
-            ALIGN_WITH_STAIRS, run, resources={BASE}, goal=direction, source=source, on_busy=on_busy
-        )
+        return skills.robot.actions.start(ALIGN_WITH_STAIRS, run, resources={BASE}, goal=direction, source=source)
 
     async def _until_it_stands(self) -> None:
         clock = self._skills.robot.clock

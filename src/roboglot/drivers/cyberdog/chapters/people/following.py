@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.clients.cyberdog import RunningTask, values
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.following import Following, FollowSide
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.feed import Viewer
@@ -28,7 +28,6 @@ class CyberDogFollowing(Following):
         side: FollowSide = FollowSide.BEHIND,
         distance: float = 1.0,
         source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
     ) -> Action:
         _check(distance)
         skills = self._skills
@@ -47,18 +46,10 @@ class CyberDogFollowing(Following):
             lambda: skills.client.follow(side=SIDES[side], distance=distance),
             goal=person,
             source=source,
-            on_busy=on_busy,
             then=choose,
         )
 
-    def follow_tag(
-        self,
-        *,
-        side: FollowSide = FollowSide.BEHIND,
-        distance: float = 1.0,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def follow_tag(self, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = "") -> Action:
         _check(distance)
         client = self._skills.client
         return self._skills.start_from_idle(
@@ -66,17 +57,10 @@ class CyberDogFollowing(Following):
             lambda: client.follow(bracelet=True, side=SIDES[side], distance=distance),
             goal=None,
             source=source,
-            on_busy=on_busy,
         )
 
     def follow_thing(
-        self,
-        place: Point,
-        *,
-        side: FollowSide = FollowSide.BEHIND,
-        distance: float = 1.0,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
+        self, place: Point, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = ""
     ) -> Action:
         raise Refused("a dog's app protocol takes regions of its picture, not places")
 

@@ -14,7 +14,7 @@ import msgspec
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
 from roboglot.drivers.slamware.vocabulary import failure, robot_errors
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Busy
@@ -84,16 +84,9 @@ class ActionRunner:
             return False
 
     def start(
-        self,
-        name: str,
-        wanted: VendorAction,
-        *,
-        goal: object,
-        source: str,
-        on_busy: OnBusy,
-        resources: Iterable[str] = (BASE,),
+        self, name: str, wanted: VendorAction, *, goal: object, source: str, resources: Iterable[str] = (BASE,)
     ) -> Action:
-        """Start an action. Raises Busy according to ``on_busy``, Unconnected without a link."""
+        """Start an action. Raises Unconnected without a link, Busy while another client moves the robot."""
         self._link.require_free()
 
         async def run(action: Action) -> None:
@@ -101,7 +94,7 @@ class ActionRunner:
                 while not await self._follow(action, await self.begin(wanted.name, wanted.options), wanted.feedback):
                     await action.hold(lambda: None)  # paused: start again on resume
 
-        return self._robot.actions.start(name, run, resources=resources, goal=goal, source=source, on_busy=on_busy)
+        return self._robot.actions.start(name, run, resources=resources, goal=goal, source=source)
 
     async def _follow(self, action: Action, running: RunningAction, feedback: Feedback) -> bool:
         """Follow the action; return True when it has ended, False when it is paused."""

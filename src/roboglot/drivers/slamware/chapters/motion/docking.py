@@ -8,7 +8,7 @@ from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner, Vend
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import pose3d
 from roboglot.drivers.supervisor import Supervisor
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Refused
@@ -40,14 +40,14 @@ class SlamwareDocking(Docking):
         else:
             self._supervisor.send("setting the dock", self._client.set_home_pose(pose3d(pose)))
 
-    def dock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def dock(self, *, source: str = "") -> Action:
         wanted = VendorAction("GoHomeAction", GoHomeOptions(), _stage)
-        return self._runner.start("dock", wanted, goal=self.home, source=source, on_busy=on_busy)
+        return self._runner.start("dock", wanted, goal=self.home, source=source)
 
-    def undock(self, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE) -> Action:
+    def undock(self, *, source: str = "") -> Action:
         if not self._reported.docked:
             raise Refused("the robot is on no dock")
-        return self._driving.move_by(Pose(OFF_DOCK), source=source, on_busy=on_busy)
+        return self._driving.move_by(Pose(OFF_DOCK), source=source)
 
 
 async def _stage(info: ActionInfo) -> str:

@@ -14,7 +14,7 @@ from msgspec.structs import astuple
 from roboglot.drivers.slamware.chapters.motion.base import SlamwareBase
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import robot_errors
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import WheelSpeeds
 from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.system.link import Link
@@ -78,13 +78,7 @@ class SlamwareDriving(Driving):
         return self._action
 
     def move_by(
-        self,
-        offset: Pose,
-        *,
-        speed: float | None = None,
-        yaw_speed: float | None = None,
-        source: str = "",
-        on_busy: OnBusy = OnBusy.REPLACE,
+        self, offset: Pose, *, speed: float | None = None, yaw_speed: float | None = None, source: str = ""
     ) -> Action:
         limits = self._base.limits.twist
         top, top_yaw = _top(speed, limits.x, "speed"), _top(yaw_speed, limits.yaw, "yaw speed")
@@ -104,23 +98,15 @@ class SlamwareDriving(Driving):
                 await self._straight(action, goal, top)
             await self._turn(action, offset.yaw - first, top_yaw)
 
-        return self._start("move by", run, goal=offset, source=source, on_busy=on_busy)
+        return self._start("move by", run, goal=offset, source=source)
 
-    def _start(
-        self,
-        name: str,
-        run: Callable[[Action], Awaitable[None]],
-        *,
-        goal: object,
-        source: str,
-        on_busy: OnBusy = OnBusy.REPLACE,
-    ) -> Action:
+    def _start(self, name: str, run: Callable[[Action], Awaitable[None]], *, goal: object, source: str) -> Action:
         async def braked(action: Action) -> None:
             async with self._braking():
                 with robot_errors():
                     await run(action)
 
-        return self._robot.actions.start(name, braked, resources={BASE}, goal=goal, source=source, on_busy=on_busy)
+        return self._robot.actions.start(name, braked, resources={BASE}, goal=goal, source=source)
 
     @asynccontextmanager
     async def _braking(self) -> AsyncIterator[None]:

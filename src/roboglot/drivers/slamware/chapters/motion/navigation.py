@@ -11,7 +11,7 @@ from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner, Vend
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import location, robot_errors
 from roboglot.extras import lazy
-from roboglot.model.actions import Action, OnBusy
+from roboglot.model.actions import Action
 from roboglot.model.components.motion.navigation import (
     Navigation,
     NavigationFeedback,
@@ -47,9 +47,7 @@ class SlamwareNavigation(Navigation):
     def __init__(self, client: SlamwareClient, runner: ActionRunner, reported: ReportedState) -> None:
         self._client, self._runner, self._reported = client, runner, reported
 
-    def navigate_to(
-        self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "", on_busy: OnBusy = OnBusy.REPLACE
-    ) -> Action:
+    def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
         if not 1 <= len(goals) <= GOALS_MAX:
             raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
         for goal in goals:
@@ -62,7 +60,7 @@ class SlamwareNavigation(Navigation):
         else:
             name, wanted = "SeriesMoveToAction", SeriesMoveToOptions([location(goal) for goal in goals], how)
         action = VendorAction(name, wanted, self._feedback)
-        return self._runner.start("navigate", action, goal=tuple(goals), source=source, on_busy=on_busy)
+        return self._runner.start("navigate", action, goal=tuple(goals), source=source)
 
     async def plan(self, start: Point, goal: Point) -> Path:
         if start.distance_to(self._reported.pose) > HERE:
