@@ -23,7 +23,8 @@ KINDS = {"RobotError", "ProgramError", "BadParameters", "BadCondition", "Problem
 # Pages show their ValueError and RuntimeError, too.
 OUTSIDE = ("config.py", "console/", "model/", "rehearsal.py", "runtime.py", "simulation/", *CONFIGS)
 NAMED = {"why", "reason", "words", "wrong"}  # variables and arguments that hold such a sentence
-LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1}  # position of the argument, where not the first
+# Position of the argument, where not the first.
+LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1, "state": 1, "_answer": 1}
 HOLE = "{}"
 
 

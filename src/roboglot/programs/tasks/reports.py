@@ -48,7 +48,10 @@ class Whereabouts:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Result of a function at a line of a task (of ``module``, or of its own text), as short text."""
+    """Result of a function at a line of a task (of ``module``, or of its own text), as short text.
+
+    ``refused``: why the robot could not do it; "" if it could.
+    """
 
     task: str
     line: int
@@ -56,6 +59,7 @@ class Reading:
     block: str
     function: str
     value: str
+    refused: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from roboglot.programs.engine.run import Run
 from roboglot.programs.engine.usage import usage_of
 from roboglot.programs.errors import NotAllowed
 from roboglot.programs.functions.interrupted import call_cut_off
-from roboglot.programs.functions.results import in_short
+from roboglot.programs.functions.results import SHORT_MAX, in_short, refusal
 from roboglot.programs.functions.session import Session, TaskEnded
 from roboglot.programs.functions.table import call as call_function
 from roboglot.programs.language.places import Step
@@ -302,8 +302,9 @@ class TaskRun:
             await self._pace.wait()
             self._halts |= self._block_stops.halts(self.block)
         elif value is not None and self._insights.listening:
+            place = self.line, self.module, self.block
             self._insights.publish(
-                Reading(self.task.id, self.line, self.module, self.block, request.name, in_short(value))
+                Reading(self.task.id, *place, request.name, in_short(value), refusal(value)[:SHORT_MAX])
             )
         if request.name == "time.monotonic" and isinstance(value, float):
             value += self._replay.ahead

@@ -1,5 +1,5 @@
 // Values in bubbles at their blocks: what a function answered there, what the variables of a block hold.
-import { t } from "../base.js";
+import { t, translated } from "../base.js";
 import * as editor from "./editor.js";
 
 const NS = "http://www.w3.org/2000/svg", LONG = 40, PAD = 6, HEIGHT = 22; // characters, workspace units
@@ -18,9 +18,9 @@ const DONE = /^(, response \((motion_id -?\d+, )?result True, code 0(, order_pro
 /** When and where it was measured: of that, pupils ask another block. */
 const HEADER = /header \(stamp \(sec \d+, nanosec \d+\), frame_id [^()]*\), /;
 
-/** An answer without what says only that it was done. @param {string} value */
+/** An answer without what says only that it was done; a refusal in the language of the page. @param {string} value */
 export function inWords(value) {
-  if (!value.startsWith(SUCCESS)) return value.replace(HEADER, "");
+  if (!value.startsWith(SUCCESS)) return translated(value.replace(HEADER, ""));
   const rest = value.slice(SUCCESS.length);
   return DONE.test(rest) ? t("studio.answer.done") : rest.replace(/^, (.*)\)$/s, "$1");
 }

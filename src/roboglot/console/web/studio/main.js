@@ -66,7 +66,7 @@ const undo = (/** @type {boolean} */ redo) => (program.value.kind === "text" ? t
 function Bar() {
   const others = runner.others.value.length;
   const phase = runner.phase.value, busy = phase === "running" || phase === "starting";
-  const word = runner.unknown.value ? t("studio.phase.unknown") : phase === "idle" ? (runner.failure.value ? t("studio.phase.failed") : t("studio.phase.idle")) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}${runner.older.value ? ` · ${t("studio.phase.older")}` : ""}`;
+  const word = runner.unknown.value ? t("studio.phase.unknown") : phase === "idle" ? t(`studio.phase.${runner.failure.value ? "failed" : runner.refused.value.length ? "undone" : "idle"}`) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}${runner.older.value ? ` · ${t("studio.phase.older")}` : ""}`;
   return html`<div class="controls" role="toolbar" aria-label=${t("studio.controls")}>
     <${Button} kind="main" icon="play" label=${t(phase === "paused" ? "studio.go" : "studio.run")} title="F5" disabled=${busy || online.value !== "open"} onClick=${() => runner.run()} />
     <${Button} icon="pause" label=${t("studio.pause")} title="F6" disabled=${phase !== "running"} onClick=${() => runner.pause()} />
@@ -74,7 +74,7 @@ function Bar() {
     <${Button} compact icon="over" label=${t("studio.over")} title=${`${t("studio.over")} (F10)`} disabled=${phase !== "paused"} onClick=${() => runner.step("over")} /><${Button} compact icon="out" label=${t("studio.out")} title=${`${t("studio.out")} (Shift+F8)`} disabled=${phase !== "paused"} onClick=${() => runner.step("out")} />
     <${Button} icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
     ${program.value.kind === "blocks" && html`<${Button} compact icon="dot" label=${t("studio.break.on")} title="F9" onClick=${() => editor.toggleBreak()} />`}
-    <span class=${`phase ${runner.unknown.value ? "unknown" : phase} ${runner.failure.value ? "failed" : ""}`} role="status" aria-live="polite" title=${`${word}${held()}${runner.older.value ? `. ${t("studio.older")}` : ""}`}>${word}${held()}</span>
+    <span class=${`phase ${runner.unknown.value ? "unknown" : phase} ${runner.failure.value || (phase === "idle" && runner.refused.value.length) ? "failed" : ""}`} role="status" aria-live="polite" title=${`${word}${held()}${runner.older.value ? `. ${t("studio.older")}` : ""}`}>${word}${held()}</span>
     <span class="unseen" role="status" aria-live="polite">${others > 0 && t("studio.others", { n: others })}</span>
     <span class="grow"></span>
     ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; hits.value = editor.search(e.target.value); }} onKeyDown=${(e) => { if (/^(Enter|ArrowDown)$/.test(e.key) && sought.value && hits.value) { e.preventDefault(); e.stopPropagation(); editor.toToolbox(true); } }} /></label>

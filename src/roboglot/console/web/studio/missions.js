@@ -109,7 +109,7 @@ function summary(found) {
 }
 
 /** Calls that the robot answered with a failure. */
-function Refused({ calls }) {
+export function Refused({ calls }) {
   return calls?.length ? html`<ul>${calls.map((c) => html`<li>${c.function.replace("cyberdog.", "")} (${c.module ? `${c.module}, ` : ""}${t("studio.line", { n: lineShown(c) })}): ${robotWord(c.words)}</li>`)}</ul>` : null;
 }
 

@@ -8,8 +8,8 @@ import { blocksOfLines } from "./blocks.js";
 import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
 import { body, continueAsText, program } from "./program.js";
-import { failure, line, lit, phase, printed, problems, readings, stop, textBreaks, variables } from "./runner.js";
-import { Simulate } from "./missions.js";
+import { failure, line, lit, phase, printed, problems, readings, refused, stop, textBreaks, variables } from "./runner.js";
+import { Refused, Simulate } from "./missions.js";
 import { makeText } from "./text.js";
 
 const WORD = /('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")|(#.*)|\b(def|while|for|in|if|elif|else|return|import|from|break|continue|pass|try|except|global|and|or|not|lambda|True|False|None)\b|\b(\d[\d.]*)\b/g;
@@ -78,7 +78,7 @@ export function TextEditor() {
 
 export function Failure() {
   const found = failure.value;
-  if (!found) return null;
+  if (!found) return refused.value.length ? html`<div class="failure" role="status"><b>${t("studio.undone")}</b><${Refused} calls=${refused.value} /></div>` : null;
   return html`<div class="failure" role="alert"><b>${found[language.value] || found.en || t("studio.failed")}</b><small>${found.text}</small>
     ${found.block && html`<${Button} label=${t("studio.failed.show")} onClick=${() => editor.focus(found.block)} />`}</div>`;
 }
@@ -95,7 +95,7 @@ export function Values() {
   return html`<h3>${t("studio.variables")}</h3>
     ${held.length ? html`<dl class="values">${held.map(([name, text]) => html`<div key=${name}><dt>${name}</dt><dd>${text}</dd></div>`)}</dl>` : html`<p class="muted">${t("studio.variables.none")}</p>`}
     <h3>${t("studio.readings")}</h3>
-    ${readings.value.length ? html`<ol class="readings">${readings.value.map((r) => html`<li key=${r.key}><button type="button" onClick=${() => r.block && editor.focus(r.block)}>${r.function.replace("cyberdog.", "")}</button><span title=${r.value}>${inWords(r.value)}</span></li>`)}</ol>` : html`<p class="muted">${t("studio.readings.none")}</p>`}`;
+    ${readings.value.length ? html`<ol class="readings">${readings.value.map((r) => html`<li key=${r.key}><button type="button" onClick=${() => r.block && editor.focus(r.block)}>${r.function.replace("cyberdog.", "")}</button><span title=${r.value}>${inWords(r.refused || r.value)}</span></li>`)}</ol>` : html`<p class="muted">${t("studio.readings.none")}</p>`}`;
 }
 
 const film = signal(false);

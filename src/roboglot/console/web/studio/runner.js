@@ -1,6 +1,6 @@
 // Running a program on the robot: run, pause, step, stop; which block is lit, what was printed, read, and went wrong.
 import { computed, effect, signal, untracked } from "@preact/signals";
-import { language, say, t, translated } from "../base.js";
+import { language, notice, say, t, translated } from "../base.js";
 import { blocksOfLines } from "./blocks.js";
 import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
@@ -8,7 +8,7 @@ import { ask, debug, frame, listen, online, opened } from "./link.js";
 import { learn, ownerOf } from "./modules.js";
 import { isStored, program, python, saveNow } from "./program.js";
 
-const LINES_MAX = 500, READINGS_MAX = 40;
+const LINES_MAX = 500, READINGS_MAX = 40, REFUSED_MAX = 20;
 export const phase = signal(/** @type {"idle" | "starting" | "running" | "paused"} */ ("idle"));
 export const lit = signal(""); // the block
 export const line = signal(0); // of a program that is text
@@ -18,6 +18,7 @@ export const variables = signal(/** @type {Record<string, string>} */ ({}));
 export const readings = signal(/** @type {any[]} */ ([]));
 export const problems = signal(/** @type {any[]} */ ([])); // of the checker
 export const failure = signal(/** @type {any} */ (null)); // of the last run
+export const refused = signal(/** @type {{function: string, line: number, module: string, block: string, words: string}[]} */ ([])); // its calls that the robot could not do
 export const unknown = computed(() => phase.value !== "idle" && (online.value !== "open" || !opened.value)); // of a run: what it does, now
 const under = signal(/** @type {string | null} */ (null)); // the text that runs, null where another page began it
 export const older = computed(() => phase.value !== "idle" && under.value !== null && under.value !== python()); // it was changed since
@@ -70,7 +71,8 @@ async function runNow(step) {
   learn(python());
   began = performance.now();
   runs += 1;
-  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; bubbles.clear();
+  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; refused.value = []; bubbles.clear();
+  if (notice.value.bad) say(""); // it was of what is run anew
   try {
     const [known, early] = await Promise.all([isStored(), debug(stops(step)).catch(() => null)]);
     const saved = known ? null : await saveNow();
@@ -134,6 +136,7 @@ export function show() {
   if (program.value.kind !== "blocks") return;
   const owners = blocksOfLines(editor.code.value), wrong = new Map();
   for (const found of problems.value) if (owners[found.line - 1]) wrong.set(owners[found.line - 1], words(found));
+  for (const one of refused.value) if (one.block && !one.module) wrong.set(one.block, t("studio.undone.why", { why: one.words }));
   if (failure.value?.block) wrong.set(failure.value.block, `${words(failure.value)}\n${failure.value.text}`);
   editor.blame(wrong);
 }
@@ -176,7 +179,7 @@ function ended(lines, text) {
 /** Another program was opened: what was shown is the other's. */
 export function forget() {
   settle("idle");
-  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; problems.value = []; textBreaks.value = []; bubbles.clear();
+  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; refused.value = []; problems.value = []; textBreaks.value = []; bubbles.clear();
 }
 
 function settle(now) {
@@ -237,9 +240,18 @@ listen((message) => {
     case "reading":
       if (!mine(message.task)) break;
       readings.value = [{ ...message, key: next++ }, ...readings.value].slice(0, READINGS_MAX);
-      if (!message.module) bubbles.answered(message.block, message.value);
+      if (!message.module) bubbles.answered(message.block, message.refused || message.value);
+      if (message.refused) noteRefused({ ...message, words: message.refused });
   }
 });
+
+/** A call that the robot could not do: said once for each place and reason. @param {typeof refused.value[0]} call */
+function noteRefused(call) {
+  if (refused.value.length >= REFUSED_MAX || refused.value.some(({ line, module, words }) => line === call.line && module === call.module && words === call.words)) return;
+  refused.value = [...refused.value, call];
+  say(t("studio.undone.why", { why: call.words }), true);
+  show();
+}
 
 function blameRun(found) {
   const owner = found.line && !found.module && program.value.kind === "blocks" ? blocksOfLines(editor.code.value)[found.line - 1] : "";
@@ -268,6 +280,6 @@ function report({ feedback, block }) {
   }
   if (/Task loop feedback/.test(feedback.describe)) {
     if (/is suspend/.test(feedback.describe)) { if (phase.value === "idle") rejoin().catch(() => undefined); else { phase.value = "paused"; look(); } } else if (/is run$/.test(feedback.describe)) phase.value = "running"; else settle("idle");
-  } else if (feedback.operate === "start") { if (phase.value === "idle") { runs += 1; under.value = null; } phase.value = feedback.state ? "idle" : "running"; }
+  } else if (feedback.operate === "start") { if (phase.value === "idle") { runs += 1; under.value = null; refused.value = []; } phase.value = feedback.state ? "idle" : "running"; }
   else if (feedback.operate === "stop") settle("idle");
 }

@@ -18,9 +18,6 @@ class Range:
     def __contains__(self, value: float) -> bool:
         return self.minimum <= value < self.maximum or (value == self.maximum and not self.open_end)
 
-    def __str__(self) -> str:
-        return f"{self.minimum:g} to {self.maximum:g} {self.unit}"
-
 
 WALK_DURATION_MAX = 3600.0  # s; the table states 6, yet the manual's examples walk for 10 and the firmware for an hour
 
@@ -61,6 +58,11 @@ def outside(**values: float) -> str:
     """Return the first violation of a range, in plain words; empty without one. NaN is outside of all ranges."""
     ranges = LIMITS | OTHERS | {"angle": TURN_ANGLE, "walk_duration": WALK_DURATION}
     for name, value in values.items():
-        if value not in ranges[name]:
-            return f"{name.removeprefix('walk_').removeprefix('relative_')} = {value:g} is outside of {ranges[name]}"
+        if value not in (limit := ranges[name]):
+            name = name.removeprefix("walk_").removeprefix("relative_")
+            given, least, most = f"{name} = {value:g}", f"{limit.minimum:g}", f"{limit.maximum:g} {limit.unit}"
+            why = f"{given} is outside of {least} to {most}"
+            if limit.open_end:
+                why = f"{given} is outside of {least} to less than {most}"
+            return why
     return ""

@@ -1,0 +1,55 @@
+"""Calls that the robot could not do, in Chromium: at their blocks, in the output, and at the end of the run."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.browser.served import shows, until
+from tests.browser.test_studio import Open, loaded, phase, prints, studio
+
+__all__ = ["studio"]  # the fixture
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+SPEED = {"shadow": {"type": "math_number", "fields": {"NUM": 5}}}
+SAID = {"shadow": {"type": "text", "fields": {"TEXT": "on"}}}
+TOO_FAST = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [
+            {
+                "type": "cyberdog.motion.go_straight", "id": "fast", "x": 30, "y": 30, "inputs": {"x_velocity": SPEED},
+                "next": {"block": {"type": "text_print", "id": "say", "inputs": {"TEXT": SAID}}},
+            }
+        ],
+    }
+}  # fmt: skip
+WORD, WHY = "document.querySelector('.phase').textContent", "x_velocity = 5 is outside of -1.6 to 1.6 m/s"
+
+
+async def test_run_ends_with_what_was_refused(studio: Open) -> None:
+    page = await loaded(await studio(), TOO_FAST)
+    await page.click("#tab-output")
+    await page.keyboard.press("F5")
+    await shows(page, WORD, "Ended: the robot could not do everything")
+    await prints(page, "on")
+    shown = "document.querySelector('.panel .failure')?.textContent ?? ''"
+    await shows(page, shown, f"The robot could not do this:motion.go_straight (line 1): {WHY}")
+    await until(page, "document.querySelector('.wrong')?.dataset.id === 'fast'")
+    await shows(page, "document.querySelector('.value-bubble[data-of=fast] text')?.textContent", WHY[:39] + "…")
+    await page.click("header >> text=中文")
+    zh = "x_velocity = 5 超出 -1.6 到 1.6 m/s"
+    await shows(page, "document.querySelector('.value-bubble[data-of=fast] text')?.textContent", zh)
+    assert page.errors == []
+
+
+async def test_refusal_is_gone_with_the_next_run(studio: Open) -> None:
+    page = await loaded(await studio(), TOO_FAST)
+    await page.keyboard.press("F5")
+    await until(page, "document.querySelector('.notice.bad')?.textContent.includes('outside')")
+    await phase(page, "idle")
+    await page.evaluate("studio.editor.workspace.getBlockById('fast').dispose(true)")
+    await until(page, "!studio.editor.code.value.includes('go_straight')")
+    await page.keyboard.press("F5")
+    await shows(page, WORD, "Ready")
+    await until(page, "!document.querySelector('.notice.bad') && !document.querySelector('.wrong')")
+    await prints(page, "on")
+    assert page.errors == []
