@@ -37,6 +37,17 @@ def test_defaults() -> None:
     }
 
 
+def test_speed_in_lockstep_is_refused() -> None:
+    with pytest.raises(ValueError, match="speed has no effect in lockstep"):
+        load_config(None, {"lockstep": True, "speed": 2.0}, sections())
+
+
+@pytest.mark.parametrize("broker", ["mqtt://a:1883", "mqtt://a:x", "//a"])
+def test_a_broker_as_a_url_is_refused(broker: str) -> None:
+    with pytest.raises(ValueError, match=r"vda5050\.broker must be HOST or HOST:PORT"):
+        load_config(None, {"vda5050": {"broker": broker}}, sections())
+
+
 def test_overrides_win_over_the_file(tmp_path: Path) -> None:
     file = tmp_path / "robots.toml"
     file.write_text(

@@ -28,6 +28,8 @@ def run() -> None:
     Loading leaves hardly any garbage: the collector, which would look at all of it many times, begins with a command.
     """
     gc.disable()
+    if os.getpid() == 1:  # in a container, where the kernel drops signals that have no handler yet
+        signal.signal(signal.SIGTERM, lambda *_: os._exit(128 + signal.SIGTERM))
     _look_elsewhere_last()
     _start_warm(sys.argv[1:])
     before = signal.getsignal(signal.SIGINT)

@@ -196,6 +196,10 @@ class Config:
     record: RecordConfig = field(default_factory=RecordConfig)
     insecure: bool = False
 
+    def __post_init__(self) -> None:
+        if self.lockstep and self.speed != 1.0:
+            raise ValueError("speed has no effect in lockstep, where input advances time: leave one of them out")
+
     @property
     def opened(self) -> tuple[RobotConfig, ...]:
         """The robots that other machines can reach."""

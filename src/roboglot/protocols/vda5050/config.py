@@ -45,6 +45,8 @@ class Vda5050Config:
     @property
     def address(self) -> tuple[str, int]:
         """Host and port of the broker. Raises ValueError."""
+        if "/" in self.broker:
+            raise ValueError(f"vda5050.broker must be HOST or HOST:PORT, not {self.broker!r}; tls = true encrypts")
         host, colon, port = self.broker.rpartition(":")
         if not colon or (host.count(":") and not host.startswith("[")):
             return self.broker.strip("[]"), self.port
