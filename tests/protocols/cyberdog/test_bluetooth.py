@@ -51,6 +51,7 @@ async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
     assert await client.ask(8006) == {"connected": False, "persentage": 0.0}
     assert [d["mac"] for d in (await client.ask(8001, {}))["device_info_list"]] == [BRACELET]
     assert await client.ask(8007, {"mac": HEADPHONES}) == {"success": False}
+    assert await client.ask(8007, {"mac": 7}) == {"error_code": 323}  # and nothing is forgotten
     assert await client.ask(8007, {"mac": BRACELET}) == {"success": True}
     assert await client.ask(8001, {}) == {"device_info_list": []}
 

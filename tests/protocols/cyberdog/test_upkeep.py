@@ -166,12 +166,19 @@ async def test_fetched_and_installed_update_survives_a_crash(client, robot, forw
     assert "firmware package" not in robot[Disk].uses
 
 
+async def test_update_as_in_the_manual_is_downloaded(client, robot, passing) -> None:
+    example = module(md5="b7e2a750b0", fileSize=0, description=None)
+    assert await client.ask(5003, {"modules": [example]}) == {"response": True, "code": 0}
+    await passing(lambda: robot[Firmware].progress.state is FirmwareState.DOWNLOADED)
+
+
 async def test_an_update_that_cannot_be(client, app, robot, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: app.connected)
     assert await client.ask(5003, {"modules": [{"module": "x"}]}) == {"error_code": 323}
     broken = module(md5="short")
     assert await client.ask(5003, {"modules": [broken]}) == {"response": False, "code": 5710}
+    assert await client.ask(5003, {"modules": [module(fileSize=-1)]}) == {"response": False, "code": 5710}
     robot[Disk].rubbish = robot[Disk].free - 1000
     assert await client.ask(5003, {"modules": MODULE}) == {"response": True, "code": 0}
     await passing(lambda: any(push["download_progress"] == -2 for push in app.of(5005)))

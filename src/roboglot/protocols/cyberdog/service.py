@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections.abc import Awaitable, Callable
+from typing import TypeVar
 from urllib.parse import unquote
 
 import grpc
@@ -28,6 +30,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import NotJson, read_params, write
 
 log = logging.getLogger(__name__)
+T = TypeVar("T")
 FRAME = 64  # bytes of a message besides its text, with a margin
 CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message, whatever their encoding
 CALLERS_MAX = 1024  # whose names are kept
@@ -37,11 +40,10 @@ HOST_CALLS_MAX = CALLS_MAX * 3 // 4  # of one host, so that others still reach t
 
 @dataclass(frozen=True, slots=True)
 class _Caller:
-    """Name of a client that did not prove another, its host, and its address and port."""
+    """Name of a client that did not prove another, and its host."""
 
     name: str
     host: str
-    address: str
 
 
 class Service:
@@ -54,17 +56,28 @@ class Service:
 
     async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:  # noqa: N802 - the service's name
         """Serve one request with any number of answers, and return the last; the status is OK but for too many."""
-        caller = self._enter(rpc.peer())
-        try:
-            if self._count_in(caller.host) > HOST_CALLS_MAX:
-                await _turn_away(rpc)
-            return await self._send(request, rpc, caller)
-        finally:
-            self._count_out(caller.host)
+        return await self._counted(self._send, request, rpc)
 
-    async def _send(
-        self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, caller: _Caller
-    ) -> pb.RecResponse | None:
+    async def _counted(
+        self,
+        serve: Callable[[pb.SendRequest | None, grpc.aio.ServicerContext], Awaitable[T]],
+        request: pb.SendRequest | None,
+        rpc: grpc.aio.ServicerContext,
+    ) -> T:
+        """Serve a call unless its host has too many open."""
+        host = self._enter(rpc.peer())
+        count = self._open[host] = self._open.get(host, 0) + 1
+        try:
+            if count > HOST_CALLS_MAX:
+                reason = f"a host has at most {HOST_CALLS_MAX} calls at the same time"
+                await rpc.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, reason)
+            return await serve(request, rpc)
+        finally:
+            self._open[host] -= 1
+            if not self._open[host]:
+                del self._open[host]
+
+    async def _send(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:
         robot, peer = self._context.robot, rpc.peer()
         if robot.admission.asks:
             await self._admit(rpc, peer)
@@ -75,7 +88,7 @@ class Service:
             await self._count(peer, len(request.params))
         if (fairness := robot.fairness) is None:
             return await self._serve(request, rpc, peer)
-        use = fairness.of(caller.address)
+        use = fairness.of(peer.partition(":")[2])
         if fairness.wait(use):
             await wait_for_turn(fairness, use, lambda: stops(request.nameCode, request.params))
         begun = fairness.now()
@@ -106,13 +119,7 @@ class Service:
 
     async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
         """Serve photos and recordings in chunks; errors are chunks, too."""
-        caller = self._enter(rpc.peer())
-        try:
-            if self._count_in(caller.host) > HOST_CALLS_MAX:
-                await _turn_away(rpc)
-            await self._fetch(request, rpc)
-        finally:
-            self._count_out(caller.host)
+        await self._counted(self._fetch, request, rpc)
 
     async def _fetch(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:
         peer, tap = rpc.peer(), self._context.robot.tap
@@ -134,15 +141,6 @@ class Service:
                 await self._say(rpc, chunk)
                 await self._count(peer, len(chunk.buffer))
 
-    def _count_in(self, host: str) -> int:
-        count = self._open[host] = self._open.get(host, 0) + 1
-        return count
-
-    def _count_out(self, host: str) -> None:
-        self._open[host] -= 1
-        if not self._open[host]:
-            del self._open[host]
-
     def _note_end(self, peer: str, code: int, asked: float | None) -> None:
         outside = self._context.robot.outside
         outside.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
@@ -158,19 +156,19 @@ class Service:
         if admission.asks:
             await pay(admission.spend(identity() or host_of(peer), size))
 
-    def _enter(self, peer: str) -> _Caller:
-        """Return the caller, and set it as the current client; where rights are asked for, ``_admit`` does that."""
+    def _enter(self, peer: str) -> str:
+        """Return the caller's host; set the caller as the current client: where rights count, ``_admit`` does that."""
         caller = self._callers.get(peer)
         if caller is None:
             self._handshakes.asked(peer)
             if len(self._callers) >= CALLERS_MAX:
                 self._callers.clear()
             host = host_of(peer)
-            caller = self._callers[peer] = _Caller(f"cyberdog {host}", host, peer.partition(":")[2])
+            caller = self._callers[peer] = _Caller(f"cyberdog {host}", host)
         if not self._context.robot.admission.asks:
             self._context.app.seen(peer)
             ask_for(caller.name, peer)
-        return caller
+        return caller.host
 
     async def _admit(self, rpc: grpc.aio.ServicerContext, peer: str) -> None:
         """Set the caller as the current client; only one with the right to see becomes the robot's app."""
@@ -189,10 +187,6 @@ class Service:
     async def heartbeat(self, _request: None, rpc: grpc.aio.ServicerContext) -> None:
         """Refuse: only apps serve heartbeats."""
         await rpc.abort(grpc.StatusCode.UNIMPLEMENTED, "the robot sends heartbeats, it takes none")
-
-
-async def _turn_away(rpc: grpc.aio.ServicerContext) -> None:
-    await rpc.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, f"a host has at most {HOST_CALLS_MAX} calls at the same time")
 
 
 def _note_unreadable(peer: str) -> None:

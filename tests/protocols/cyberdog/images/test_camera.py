@@ -49,6 +49,11 @@ async def test_photo_comes_whole_and_is_gone_from_robot(client: Client, robot, f
     assert not [use for use in robot[Disk].uses if use.startswith("camera")]
 
 
+async def test_photos_of_the_same_second_have_own_names(client: Client) -> None:
+    names = [(await client.file(4002, {"command": 1}))[0].file_name for _ in range(3)]
+    assert len(set(names)) == 3
+
+
 async def test_large_files_come_in_chunks(client, robot, folder, monkeypatch) -> None:
     monkeypatch.setattr(transfers, "CHUNK", 10_000)
     chunks = await client.file(4002, {"command": 1})
@@ -76,6 +81,7 @@ async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
         (4002, {"command": 3}, 5),  # nothing is recorded
         (4002, {"command": 9}, 1),
         (4002, {}, 1),
+        (4002, {"command": True}, 1),
         (4004, {"file_name": "20260101_000000.jpg"}, 9),
         (4004, {"file_name": "../../tls/client-key.pem"}, 9),
         (4004, {"file_name": 7}, 9),

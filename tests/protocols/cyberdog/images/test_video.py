@@ -50,9 +50,10 @@ class Watcher:
         assert await self.client.ask(4001, {"offer_sdp": sdp, "uid": self.uid, **more}) == ""
 
     async def connect(self, **more: object) -> None:
+        before = len(self.signals("answer_sdp"))
         await self.offer(**more)
-        await until(lambda: self.signals("answer_sdp"))
-        answer = self.signals("answer_sdp")[0]["answer_sdp"]
+        await until(lambda: len(self.signals("answer_sdp")) > before)
+        answer = self.signals("answer_sdp")[-1]["answer_sdp"]
         await self.peer.setRemoteDescription(RTCSessionDescription(answer["sdp"], answer["type"]))
         await until(lambda: self.peer.connectionState == "connected")
 
@@ -225,7 +226,21 @@ async def test_more_apps_than_there_is_room_for(watch, client, door, monkeypatch
         await watcher.offer()
     await until(lambda: watchers[0].signals("answer_sdp") and watchers[1].signals("answer_sdp"))
     assert door._context.video.viewers == 2
+    await until(lambda: watchers[2].signals("error"))
+    assert watchers[2].signals("error")[0]["error"]["code"] == 1002
     assert not watchers[2].signals("answer_sdp")
+
+
+async def test_new_offer_of_an_app_replaces_its_call(watch, client, door, robot, forward) -> None:
+    gone, back = watch(), watch()
+    await gone.connect()
+    async with time_passing(forward):
+        await until(lambda: gone.frames, 4 * PATIENCE)
+        await back.connect()
+        await until(lambda: back.frames, 4 * PATIENCE)
+        await until(lambda: robot[VideoStream]._feed.viewers == 1)
+    assert not back.signals("is_closed")
+    assert door._context.video.viewers == 1
 
 
 async def test_a_robot_without_a_camera(client: Client, robot) -> None:

@@ -152,6 +152,10 @@ async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passi
     assert await client.ask(6002, {"mapName": "away", "locationLabelInfo": [sofa]}) == {"success": 1}
     nonsense = {"mapName": "home", "locationLabelInfo": [{"labelName": 5}], "only_delete": True}
     assert await client.ask(6002, nonsense) == {"error_code": 323}  # and the map is still there:
+    for wrong in ({"only_delete": "true"}, {"only_delete": 1, "locationLabelInfo": [sofa]}, {}):
+        assert await client.ask(6002, {"mapName": "home", **wrong}) == {"error_code": 323}
+    assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": [{"labelName": "bed"}]}) == {"success": 1}
+    assert (await client.ask(6003, {"mapName": "home"}))["locationLabelInfo"] == [sofa, door]
     missing = {"mapName": "home", "locationLabelInfo": [{"labelName": "bed"}], "only_delete": True}
     assert await client.ask(6002, missing) == {"success": 1}
     assert await client.ask(6002, {**missing, "locationLabelInfo": [{"labelName": "sofa"}]}) == {"success": 0}

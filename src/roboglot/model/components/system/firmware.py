@@ -37,7 +37,7 @@ class FirmwareState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FirmwarePackage:
-    """An update: ``modules`` are the versions that it brings, ``size`` in bytes, ``digest`` its MD5 in hex.
+    """An update: ``modules`` are the versions that it brings, ``size`` in bytes, ``digest`` (the start of) its MD5.
 
     ``url``: its address; "" for one that was handed over and needs no download.
     """

@@ -122,8 +122,8 @@ class SimulatedFirmware(Firmware):
     def download(self, package: FirmwarePackage, *, source: str = "") -> Action:
         if not 0 < package.size <= PACKAGE_BYTES_MAX or len(package.modules) > MODULES_MAX or not package.version:
             raise InvalidGoal("a firmware package has a version, a size and not too many modules")
-        if not re.fullmatch("[0-9a-f]{32}", package.digest):
-            raise InvalidGoal("a firmware package has an MD5 of 32 hexadecimal digits")
+        if not re.fullmatch("[0-9a-f]{8,32}", package.digest):
+            raise InvalidGoal("a firmware package has an MD5 of 8 to 32 hexadecimal digits")
 
         self._wake()
 

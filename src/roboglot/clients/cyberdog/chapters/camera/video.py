@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused
 from roboglot.clients.errors import LinkLost, TimedOut
@@ -72,10 +73,11 @@ class Video(Calls):
         await self.signal(End(uid))
 
     @asynccontextmanager
-    async def video(self, uid: str = "roboglot", screen: Screen | None = None) -> AsyncIterator[Picture]:
-        """``async with client.video() as pictures: async for frame in pictures: …``"""
+    async def video(self, uid: str = "", screen: Screen | None = None) -> AsyncIterator[Picture]:
+        """``async with client.video() as pictures: async for frame in pictures: …``; ``uid``: this viewer's own."""
         from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
+        uid = uid or f"roboglot {uuid4()}"
         offer_loopback()
         peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         tracks: asyncio.Queue[object] = asyncio.Queue()

@@ -38,7 +38,8 @@ def get_file(
     if not _may_fetch(context, code):
         return _refused(FileError.CAMERA_SILENT)
     camera_files = context.files
-    match code, fields.get("command"):
+    command = fields.get("command")
+    match code, None if isinstance(command, bool) else command:
         case Code.SAVED_FILE, _:
             return context.transfers.send(lambda: _saved(camera_files, str(fields.get("file_name", ""))))
         case Code.CAMERA, 1:

@@ -27,6 +27,7 @@ class CameraFiles:
     def __init__(self, robot: Robot, folder: Path) -> None:
         self._robot, self._folder = robot, folder
         self._recording = ""  # name of the file being written
+        self._second, self._given = "", set[str]()  # names given in the newest second
         for name in self.names():
             self._take(name)
 
@@ -78,15 +79,18 @@ class CameraFiles:
             self._robot[Disk].release(_use(path.name))
 
     def _new(self, suffix: str) -> Path:
-        """Return a free name, numbered within the same second."""
+        """Return a name, numbered within the same second: never that of a file that was just fetched."""
         if len(self.names()) >= FILES_MAX or self._free() <= 0:
             raise Refused("the disk is full")
         self._folder.mkdir(parents=True, exist_ok=True)
         stem = time.strftime("%Y%m%d_%H%M%S", time.gmtime(self._robot.clock.epoch()))
+        if stem != self._second:
+            self._second, self._given = stem, set()
         path, number = self._folder / f"{stem}{suffix}", 0
-        while path.exists():
+        while path.name in self._given or path.exists():
             number += 1
             path = self._folder / f"{stem}_{number}{suffix}"
+        self._given.add(path.name)
         return path
 
     def _free(self) -> int:

@@ -38,6 +38,7 @@ log = logging.getLogger(__name__)
 SIGNAL = push(Code.VIDEO, depth=20)
 PATIENCE = 10.0  # s (machine clock) to find a way to the app
 PEERS_MAX = 16  # apps that watch or connect at the same time
+TASKS_MAX = 4 * PEERS_MAX  # calls that are answered, served or closed at the same time
 EARLY_MAX = 32  # candidates of one app that arrived before its offer
 SCREEN_WIDTH = 640  # width of pictures for a screen of unknown size
 PLACES = {Alignment.TOP: 0.0, Alignment.MIDDLE: 0.5, Alignment.BOTTOM: 1.0}
@@ -63,10 +64,8 @@ class Transmission:
             case End(uid):
                 if peer := self._peers.pop(uid, None):
                     self._begin(self._end(peer))
-            case Description(uid, "offer") if peer := self._peer(uid):
-                if not peer.offered:  # only the first counts
-                    peer.offered = True
-                    self._begin(self._connect(peer, signal))
+            case Description(uid, "offer"):
+                self._offered(uid, signal)
             case Candidate(uid, candidate, mid, index) if peer := self._peer(uid):
                 peer.put(candidate, mid, index)
             case _:
@@ -78,6 +77,18 @@ class Transmission:
         for task in self._running:
             task.cancel()
         await asyncio.gather(*self._running, *(peer.close() for peer in peers), return_exceptions=True)
+
+    def _offered(self, uid: str, offer: Description) -> None:
+        """Answer an offer; one under a known uid replaces the call: the app began anew."""
+        if (old := self._peers.get(uid)) and old.offered:
+            self._forget(old)
+            self._begin(old.close())
+        peer = self._peer(uid) if len(self._running) < TASKS_MAX else None
+        if peer is None:
+            self._push(Failure(uid, VideoError.NO_CONNECTION, f"{PEERS_MAX} apps receive pictures already"))
+            return
+        peer.offered = True
+        self._begin(self._connect(peer, offer))
 
     def _peer(self, uid: str) -> _Peer | None:
         """Return the app's peer, or a new one if there is room."""

@@ -31,8 +31,8 @@ class WireLabel(msgspec.Struct):
     """A label on the wire: name and place (map, m)."""
 
     labelName: str  # noqa: N815 - the wire's name
-    physicX: float = 0.0  # noqa: N815
-    physicY: float = 0.0  # noqa: N815
+    physicX: float = math.nan  # noqa: N815 - absent where a label is to be deleted
+    physicY: float = math.nan  # noqa: N815
 
     @property
     def valid(self) -> bool:
@@ -97,19 +97,24 @@ async def set_labels(
     mapName: str = "",  # noqa: N803
     map_id: int = 0,
     locationLabelInfo: object = None,  # noqa: N803
-    only_delete: bool = False,
+    only_delete: object = False,
 ) -> dict[str, int]:
     """Replace the labels of a stored map; or delete the given ones; or, with none given, the map itself.
+
+    A list or ``only_delete`` of the wrong type, taken as absent, would delete labels or the map: it is refused.
 
     With labels the map takes the number ``map_id`` on, if one is given; without a name it is the map of that number.
     """
     _check_number(map_id)
     context = call.context
     library = context.robot[MapLibrary]
+    if not isinstance(only_delete, bool):
+        raise BadParameters("only_delete is true or false")
+    if locationLabelInfo is None and not only_delete:
+        raise BadParameters("locationLabelInfo is missing")
     try:
         labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
     except msgspec.ValidationError as error:
-        # If taken as absent, a label list of the wrong type would delete the whole map.
         raise BadParameters(misfit(error, field="locationLabelInfo")) from None
     names = [label.labelName for label in labels]
     try:

@@ -109,8 +109,10 @@ async def battery_level(call: Call) -> dict[str, object]:
 
 
 @TABLE.on(Code.FORGET_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
-async def forget(call: Call, *, mac: str = "") -> dict[str, bool]:
+async def forget(call: Call, *, mac: object = "") -> dict[str, bool]:
     """Delete a device from the history; without ``mac``, all but the connected one."""
+    if not isinstance(mac, str):  # taken as absent, it would delete them all
+        raise BadParameters("mac must be a text")
     try:
         await call.context.robot[Bluetooth].forget(mac or None)
     except NotFound as error:

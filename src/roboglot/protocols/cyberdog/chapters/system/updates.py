@@ -194,9 +194,13 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
     except msgspec.ValidationError as error:
         raise BadParameters(misfit(error, "the modules")) from None
     files = [file for module in wanted for file in module.latest.packages]
-    if not files or len(wanted) > MODULES_MAX:
-        raise InvalidGoal(f"an update needs files and has at most {MODULES_MAX} modules")
+    if not files or len(wanted) > MODULES_MAX or any(file.fileSize < 0 for file in files):
+        raise InvalidGoal(f"an update needs files with their sizes and has at most {MODULES_MAX} modules")
     # The total size, and the first file's checksum for all: they are installed together.
-    size, versions = sum(file.fileSize for file in files), {module.module: module.latest.version for module in wanted}
+    # The manual's example gives no size (0) and ten digits of the checksum.
+    size, versions = (
+        max(1, sum(file.fileSize for file in files)),
+        {module.module: module.latest.version for module in wanted},
+    )
     package = FirmwarePackage(wanted[0].latest.version, size, files[0].md5.lower(), versions, url="app")
     return package, frozenset(file.md5.lower() for file in files)
