@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,26 +79,27 @@ class TextCaller:
 
 async def dog_answers(folder: Path, name: str, codes: list[int]) -> dict[int, list[dict[str, object]]]:
     """Return the answers to the codes for the app with the certificate of ``name``."""
-    files = [path.read_bytes() for path in export_app(folder, name, folder / f"app-{name}")]
-    ca, certificate, key = files
-    credentials = grpc.ssl_channel_credentials(ca, key, certificate)
-    options = [("grpc.ssl_target_name_override", ROBOT_NAME)]
     answers: dict[int, list[dict[str, object]]] = {}
-    async with grpc.aio.secure_channel(f"{ADDRESS}:50052", credentials, options=options) as channel:
-        stub = GrpcAppStub(channel)
+    async with app_of(folder, name) as stub:
         for code in codes:
             stream = stub.sendMsg(pb.SendRequest(nameCode=code, params="{}"), timeout=60.0)
             answers[code] = [json.loads(message.data) async for message in stream if message.data.startswith("{")]
     return answers
 
 
-async def dog_file_errors(folder: Path, name: str, asked: list[tuple[int, dict[str, object]]]) -> list[int]:
-    """The error that ends each ``getFile``, for the app with the certificate of ``name``."""
+@asynccontextmanager
+async def app_of(folder: Path, name: str) -> AsyncIterator[GrpcAppStub]:
+    """The calls of the app with the certificate of ``name``."""
     ca, certificate, key = (path.read_bytes() for path in export_app(folder, name, folder / f"app-{name}"))
     credentials = grpc.ssl_channel_credentials(ca, key, certificate)
     options = [("grpc.ssl_target_name_override", ROBOT_NAME)]
     async with grpc.aio.secure_channel(f"{ADDRESS}:50052", credentials, options=options) as channel:
-        stub = GrpcAppStub(channel)
+        yield GrpcAppStub(channel)
+
+
+async def dog_file_errors(folder: Path, name: str, asked: list[tuple[int, dict[str, object]]]) -> list[int]:
+    """The error that ends each ``getFile``, for the app with the certificate of ``name``."""
+    async with app_of(folder, name) as stub:
         errors = []
         for code, params in asked:
             stream = stub.getFile(pb.SendRequest(nameCode=code, params=json.dumps(params)), timeout=60.0)

@@ -25,9 +25,11 @@ from roboglot.access.rights import NOTHING
 from roboglot.access.store import AccessStore, Grant, IdentityKind, Snapshot, open_store
 from roboglot.access.trail import Entry, Trail, open_trail
 from roboglot.config import AccessConfig, is_loopback
+from roboglot.model.action import Action
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import connection, identity
-from roboglot.model.components.system.lease import Lease
+from roboglot.model.components.logistics.delivery import Delivery
+from roboglot.model.components.system.lease import Lease, moves
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.model.tap import DRIVER, Direction, Exchange
@@ -227,8 +229,10 @@ class RobotAdmission(Admission):
         self._listeners: list[Callable[[str], None]] = []
         self._gains: list[Callable[[str], None]] = []
         self._releasing: asyncio.Future[None] | None = None
+        self._disowning: asyncio.Future[None] | None = None
         self._offers: dict[int, tuple[asyncio.Server, Callable[[], asyncio.Protocol]]] = {}
         robot.admission = self
+        robot.actions.guard(self._check_mover)
         robot.tap.listen(self._note_reply)
 
     def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
@@ -340,6 +344,14 @@ class RobotAdmission(Admission):
             log.warning("%s, who has control of robot %s, may no longer drive it", client, self._name)
             self._releasing = asyncio.ensure_future(lease.release())
 
+    def _check_mover(self, action: Action) -> None:
+        """Raise Forbidden for a motion whose client has lost the right to drive since its request was checked."""
+        who = action.identity
+        if who and moves(action) and Right.DRIVE not in self._rights.get(who, NOTHING):
+            why = f"{who} may no longer drive"
+            self._note(who, action.connection, "", action.name, "refused", why)
+            raise Forbidden(why)
+
     def _stop(self, who: str, *, cut: bool) -> None:
         log.warning("%s lost rights on robot %s", who, self._name)
         self._note(who, "", "", "rights", "lost", "revoked, changed or at their end")
@@ -348,6 +360,8 @@ class RobotAdmission(Admission):
                 action.cancel(f"{who} may no longer drive", hard=True)
         if cut and Lease in self._robot and self._robot[Lease].is_of(who):
             self._releasing = asyncio.ensure_future(self._robot[Lease].release())
+        if cut and Delivery in self._robot:
+            self._disowning = asyncio.ensure_future(self._robot[Delivery].disown(who))
         for listener in tuple(self._listeners):
             listener(who)
 

@@ -23,7 +23,7 @@ from roboglot.console.thumbnails import thumbnail
 from roboglot.console.verbs.maps import map_archive
 from roboglot.console.wire_log import readable
 from roboglot.misfits import misfit
-from roboglot.model.admission import Right
+from roboglot.model.admission import Right, Unknown
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import (
@@ -67,10 +67,12 @@ class Api:
         self.calls = Calls()
 
     async def serve(self, scope: Scope, receive: Receive, send: Send, client: str) -> None:
-        """Answer one request. Raises Problem."""
+        """Answer one request. Raises Problem; Unknown if the client's proof was replaced meanwhile."""
         parts = [part for part in scope["path"].split("/") if part][1:]
         try:
             await self._route(scope["method"], parts, receive, send, client)
+        except Unknown:
+            raise
         except (RobotError, BadParameters, ProgramError, ValueError) as error:
             status = next(code for kind, code in STATUSES if isinstance(error, kind))
             raise Problem(status, str(error) or type(error).__name__) from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar, cast
 
@@ -13,7 +14,7 @@ from msgspec import MsgspecError
 from roboglot.console.api import Api
 from roboglot.console.assets import Assets
 from roboglot.console.desk import Desk
-from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json
+from roboglot.console.http import Message, Problem, Receive, Scope, Send, answer, answer_json
 from roboglot.console.live import Page
 from roboglot.console.people.classes import Classes
 from roboglot.console.people.entry import CHALLENGE, address_of, admission_of, enter
@@ -127,11 +128,18 @@ class Application:
             elif scope["path"] == "/api/me":
                 await answer_json(send, {"name": named, "asks": admission_of(self._desk) is not None})
             else:
-                await self._api.serve(scope, receive, send, client())
+                await self._api.serve(scope, partial(self._receive, scope, receive), send, client())
         except Unknown as unknown:
             await answer_json(send, {"error": str(unknown)}, 401, [CHALLENGE])
         except Problem as problem:
             await answer_json(send, {"error": problem.why}, problem.status)
+
+    async def _receive(self, scope: Scope, receive: Receive) -> Message:
+        """Return the next message of a client; raises Unknown if its proof was replaced while it sent a body."""
+        message = await receive()
+        if message["type"] == "http.request":
+            await enter(self._desk, self._login, scope)
+        return message
 
     async def _serve_metrics(self, scope: Scope, send: Send) -> None:
         if scope["method"] != "GET":

@@ -11,7 +11,8 @@ from roboglot.console.settings import BODY_MAX
 from roboglot.misfits import misfit
 
 Scope = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[MutableMapping[str, object]], Awaitable[None]]
 Rows = list[tuple[bytes, bytes]]
 

@@ -31,11 +31,11 @@ class Actions:
         self._ids = itertools.count(1)
         self._running: dict[int, Action] = {}
         self._history: deque[Action] = deque(maxlen=HISTORY_MAX)
-        self._admit: Callable[[Action], None] = lambda _: None
+        self._guards: list[Callable[[Action], None]] = []
 
     def guard(self, admit: Callable[[Action], None]) -> None:
-        """Call ``admit`` before each action is accepted; it raises RobotError to refuse one."""
-        self._admit = admit
+        """Call ``admit``, too, before each action is accepted; it raises RobotError to refuse one."""
+        self._guards.append(admit)
 
     def start(
         self,
@@ -54,7 +54,8 @@ class Actions:
         end before this one begins (standing up, then driving).
         """
         action = Action(self, next(self._ids), name, goal, frozenset(resources), source)
-        self._admit(action)
+        for admit in self._guards:
+            admit(action)
         rivals = [o for o in self._running.values() if o.resources & action.resources and o is not after]
         for rival in rivals:
             rival.cancel(f"{name} took over")

@@ -13,6 +13,8 @@ from roboglot.autonomy.delivery.handover import Ears
 from roboglot.autonomy.delivery.order_book import OrderBook
 from roboglot.autonomy.delivery.readiness import Readiness
 from roboglot.autonomy.delivery.rules import PARKING, place_of_type
+from roboglot.model.admission import Right
+from roboglot.model.client_context import ask_for, client
 from roboglot.model.components.logistics.delivery import Failure, Order, OrderKind, OrderStatus, Phase, Policy
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.errors import RobotError
@@ -73,6 +75,13 @@ class Courier:
         if running:
             self._stop_job()
 
+    async def disown(self, owner: str) -> None:
+        """Cancel the open orders of a client that may no longer drive, and stand still unless others have orders."""
+        async with self.changing:
+            for order in [order for order in self._book.open if order.owner == owner]:
+                await self.call_off(order, Failure.REFUSED)
+                self.readiness.rest_due = False
+
     def drop_current(self) -> None:
         """Stop the order under way, whose end is in the book already."""
         if self.current:
@@ -124,6 +133,10 @@ class Courier:
             return
 
     async def _carry_out(self, order: Order) -> None:
+        ask_for(order.client, identity=order.owner)
+        if order.owner and not self._robot.admission.may(Right.DRIVE):  # lost while the program was down
+            await self.call_off(order, Failure.REFUSED)
+            return
         began = order.began_at or self._robot.clock.epoch()
         order = await self._book.change(order.id, status=OrderStatus.RUNNING, began_at=began)
         self.current, self.phase, self.readiness.rest_due = order.id, Phase.WORKING, True
@@ -142,6 +155,8 @@ class Courier:
             status, failure = OrderStatus.FAILED, Failure.REFUSED
         self.phase, self.current = Phase.IDLE, None
         order = self._book.get(order.id)
+        if order.status is OrderStatus.CANCELING:
+            status, failure = OrderStatus.CANCELED, order.failure
         if not order.status.ended:
             order = await self._book.change(order.id, status=status, failure=failure or order.failure)
         if status is OrderStatus.FAILED:
@@ -162,6 +177,7 @@ class Courier:
 
     async def _rest(self) -> None:
         """Drive to the parking place, or onto the dock off work and with a low battery."""
+        ask_for(client())  # the robot's own decision, whatever became of the right of the last order's client
         robot, readiness = self._robot, self.readiness
         readiness.rest_due = False
         docked = readiness.docked

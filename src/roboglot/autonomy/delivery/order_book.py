@@ -10,6 +10,7 @@ from typing import TypedDict, Unpack
 
 import msgspec
 
+from roboglot.model.client_context import client, identity
 from roboglot.model.components.logistics.delivery import (
     Failure,
     Order,
@@ -81,6 +82,8 @@ class OrderBook:
                 request=request,
                 stage=OrderStage.DRIVING_TO_STOP if request.stops else OrderStage.DRIVING,
                 changed_at=now,
+                client=client(),
+                owner=identity(),
             )
             for request in requests
         ]

@@ -89,6 +89,9 @@ class QueueDelivery(Delivery):
             for order in doomed:
                 await self._courier.call_off(order)
 
+    async def disown(self, owner: str) -> None:
+        await self._courier.disown(owner)
+
     async def finish(self) -> None:
         async with self._courier.changing:
             await self._book.end_all(status=OrderStatus.SUCCEEDED)

@@ -148,6 +148,7 @@ class CyberDogDoor:
         app.on_found.append(_once(lambda: _greet(context)))
         self._cleanup.append(robot.events.listen(BatteryChanged, lambda _: self._rest_if_empty(context)))
         self._cleanup.append(robot.admission.on_lost(lambda who: app.forget() if who == context.owner else None))
+        self._cleanup.append(robot.admission.on_lost(context.video.end_all_of))
         listen, tasks = robot.events.listen, context.tasks
         self._cleanup += [
             listen(MapReplaced, lambda _: context.map_replaced()),

@@ -136,6 +136,9 @@ class Service:
             fields = {}
         async with contextlib.aclosing(get_file(self._context, request.nameCode, fields, request.params)) as chunks:
             async for chunk in chunks:
+                if not self._context.robot.admission.may(Right.SEE):  # lost while the file was sent
+                    await self._say(rpc, pb.FileChunk(error_code=FileError.CAMERA_SILENT))
+                    return
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
                 await self._say(rpc, chunk)

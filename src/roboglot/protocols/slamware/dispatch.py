@@ -119,7 +119,7 @@ class Application:
         try:
             shared = self._admit(scope)
             if self._admission.asks and scope["method"] != "OPTIONS":  # browsers send no credentials in a preflight
-                await self._enter(scope, peer)
+                await self._enter(scope)
             status, headers, body = await self._answer(scope, receive)
         except ClientGone:
             return
@@ -223,8 +223,9 @@ class Application:
             why,
         )
 
-    async def _enter(self, scope: Scope, peer: tuple[str, int]) -> None:
+    async def _enter(self, scope: Scope) -> None:
         """Act for the client's proven identity from here on. Raises HttpError 401: unknown client."""
+        peer = scope.get("client") or ("", 0)
         address = f"{peer[0]}:{peer[1]}"
         shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
         proof = Proof(ProofKind.HTTP, shown) if shown else NO_PROOF
@@ -269,7 +270,7 @@ class Application:
         values = await self._parameters.read(operation, match, scope, receive)
         if self._tap.watched:
             self._note_request(scope)
-        answer = await self._call(operation, row, values)
+        answer = await self._call(operation, row, values, scope)
         if answer is NO_CONTENT:
             return 204, [], b""
         if answer is None and type(None) in get_args(operation.answer):
@@ -284,9 +285,17 @@ class Application:
             except Forbidden as forbidden:
                 raise from_robot(forbidden) from None
 
-    async def _call(self, operation: Operation[str], row: Row, values: dict[str, object]) -> object:
+    async def _check_again(self, scope: Scope, key: str, right: Right | None) -> None:
+        """Raise HttpError if the client lost its right, or its proof, while it sent the body."""
+        await self._enter(scope)
+        if not self._admission.may(right or Right.ADMIN):
+            self._check_right(key, right)
+
+    async def _call(self, operation: Operation[str], row: Row, values: dict[str, object], scope: Scope) -> object:
         """The handler's answer. Raises HttpError only."""
         try:
+            if self._admission.asks and "body" in values:
+                await self._check_again(scope, row.key, operation.right)
             return await operation.call(self._context, values)
         except BadParameters as error:
             raise bad_request(row.key, str(error)) from None

@@ -139,7 +139,10 @@ class OrderRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """A request and what became of it; ``changed_at`` in seconds since 1970."""
+    """A request and what became of it; ``changed_at`` in seconds since 1970.
+
+    ``client`` and ``owner``: the one who ordered, and the identity that it proved; empty: the robot itself.
+    """
 
     id: str
     number: str
@@ -152,6 +155,8 @@ class Order:
     untaken: tuple[Untaken, ...] = ()  # for COLLECT: whose parcels these were
     began_at: float = 0.0  # s since 1970; 0 before it began
     changed_at: float = 0.0
+    client: str = ""
+    owner: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,6 +225,10 @@ class Delivery(Component):
     @abstractmethod
     async def cancel(self, id: str | None = None) -> None:
         """End the order of that id or number as CANCELED, or all; the robot brakes. NotFound for an unknown one."""
+
+    @abstractmethod
+    async def disown(self, owner: str) -> None:
+        """Cancel the orders of an identity that may no longer drive; the robot brakes, and does not go to rest."""
 
     @abstractmethod
     async def finish(self) -> None:

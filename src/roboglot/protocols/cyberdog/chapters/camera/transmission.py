@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from roboglot.media.fitting import FittedPictures
 from roboglot.media.video import VideoStream, beside
-from roboglot.model.client_context import connection
+from roboglot.model.client_context import connection, identity
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink
@@ -70,6 +70,11 @@ class Transmission:
                 peer.put(candidate, mid, index)
             case _:
                 log.info("ignored a signal of type %s", type(signal).__name__)
+
+    def end_all_of(self, who: str) -> None:
+        """End the calls of a client that lost rights."""
+        for peer in [peer for peer in self._peers.values() if peer.owner == who]:
+            self._fail(peer, VideoError.NO_CONNECTION, f"{who} lost rights on this robot")
 
     async def close(self) -> None:
         """End all calls."""
@@ -191,6 +196,7 @@ class _Peer:
 
     def __init__(self, uid: str) -> None:
         self.uid = uid
+        self.owner = identity()
         self.offered = False
         self.call: VideoCall | None = None
         self.give_up: asyncio.TimerHandle
