@@ -13,7 +13,7 @@ const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "../..");
 const TARGET = join(root, "src/roboglot/console/web/studio/vendor");
 const CONSOLE = join(root, "src/roboglot/console/web/vendor"); // its other files are as npm has them; its sums are kept by hand
-const APACHE_NOTICE = "Licensed under the Apache License, Version 2.0: ../../vendor/Apache-2.0.txt\n";
+const APACHE_NOTICE = "Licensed under the Apache License, Version 2.0: the text is in roboglot's own LICENSE\n";
 const AXE = join(root, "tests/browser/vendor");
 const MEDIA = ["delete-icon.svg", "dropdown-arrow.svg", "foldout-icon.svg",
   "handclosed.cur", "handdelete.cur", "handopen.cur", "resize-handle.svg", "sprites.svg", "1x1.gif", "quote0.png", "quote1.png", "pilcrow.png"];
@@ -49,7 +49,7 @@ async function packed(folder, name, code) {
 
 // Each text of terms once, below the notices of all packages that are under it.
 async function licences(packages) {
-  const apache = await readFile(join(CONSOLE, "Apache-2.0.txt"), "utf-8"); // shipped once
+  const apache = await readFile(join(root, "LICENSE"), "utf-8"); // shipped once
   const notices = new Map();
   for (const name of packages) {
     const folder = join(here, "node_modules", name);
