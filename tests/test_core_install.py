@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tomllib
 import venv
 import zipfile
 from collections import Counter
@@ -20,7 +21,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from roboglot.extras import EXTRA_OF, MODULES, own_version
+from roboglot.extras import EXTRA_OF, MODULES, UP, explained, own_version
 from roboglot.testing.addresses import free_addresses
 from roboglot.testing.process import served
 
@@ -112,13 +113,50 @@ def test_version_says_what_is_there(core: Path) -> None:
 
 
 def test_command_without_its_extra_names_the_remedy(core: Path, tmp_path: Path) -> None:
-    certs = "--export", str(tmp_path / "certs"), "--data", str(tmp_path / "data")
-    for command, extra in (("up", "up"), ("demo", "demo"), ("coverage", "up"), ("certs", "cyberdog")):
-        done = run(core, "-m", "roboglot", command, *(certs if command == "certs" else ()))
+    data = "--data", str(tmp_path / "data")
+    for extra, command, *arguments in (
+        ("up", "up"),
+        ("demo", "demo"),
+        ("up", "coverage"),
+        ("up", "capabilities"),
+        ("up", "fleet", "up", "--worlds", "1", *data),
+        ("up", "program", "run", __file__, "--own"),
+        ("recording", "record", "slamware://127.0.0.1", "--listen", "127.0.0.9"),
+        ("recording,logs", "export", "x.mcap", "--rosbag2", "bag"),
+        ("cyberdog", "certs", "--export", str(tmp_path / "certs"), *data),
+        ("cyberdog", "mirror", "cyberdog://127.0.0.1"),
+    ):
+        done = run(core, "-m", "roboglot", command, *arguments)
         assert done.returncode == 1
         (line,) = done.stderr.splitlines()
         assert f"roboglot {command} needs " in line
         assert line.endswith(f"pip install 'roboglot[{extra}]'")
+
+
+def test_remedy_brings_what_is_missing() -> None:
+    """A command's extra is named only for what it brings: with ``logs`` installed, its name would be no help."""
+    for module, extra, remedy in (
+        ("mcap", "logs", "recording"),
+        ("mcap", "recording,logs", "recording,logs"),
+        ("grpc", "recording", "cyberdog"),
+        ("grpc", "demo", "demo"),
+        ("llvmlite", "up", "up"),
+    ):
+        words = explained(ModuleNotFoundError(name=f"{module}.part"), "this", extra)
+        assert words == f"this needs {module}, which is not installed: pip install 'roboglot[{remedy}]'"
+    assert explained(ModuleNotFoundError(name="flask"), "this", "up") is None
+
+
+def test_extras_of_up_are_those_of_the_package() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert extras["up"] == [f"roboglot[{','.join(UP)}]"]
+
+
+def test_doctor_names_missing_extras(core: Path, tmp_path: Path) -> None:
+    for security in ((), ("--security",)):
+        done = run(core, "-m", "roboglot", "doctor", "--data", str(tmp_path), *security)
+        assert done.stderr == ""
+        assert ("roboglot[programs]" in done.stdout) == (not security)
 
 
 def test_library_without_its_extra_names_the_remedy(core: Path) -> None:

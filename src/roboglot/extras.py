@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
@@ -27,6 +27,7 @@ EXTRA_OF = {
     "grpc": "cyberdog",
     "hpack": "recording",
     "httpx": "demo",
+    "llvmlite": "simulation",
     "mcap": "recording",
     "mcp": "mcp",
     "mujoco": "simulation",
@@ -48,9 +49,9 @@ EXTRA_OF = {
     "zenoh": "ros2",
     "zstandard": "recording",
 }
-# The modules in each extra.
+# The modules in each extra that is made of no others.
 MODULES: dict[str, tuple[str, ...]] = {
-    "simulation": ("mujoco", "numba", "numpy", "PIL", "yaml"),
+    "simulation": ("mujoco", "numba", "llvmlite", "numpy", "PIL", "yaml"),
     "slamware": ("numpy", "uvicorn", "uvloop"),
     "cyberdog": ("cryptography", "grpc", "google", "numpy"),
     "video": ("aiortc", "av", "numpy", "PIL"),
@@ -67,9 +68,11 @@ MODULES: dict[str, tuple[str, ...]] = {
     "ros2": ("zenoh", "rosbags", "foxglove_schemas_protobuf", "google", "mcap", "numpy", "zstandard"),
     "demo": ("httpx", "robomasterpy", "cv2"),
 }
+# The extras that ``up`` is made of.
+UP = ("simulation", "slamware", "cyberdog", "video", "programs", "console", "recording")
 
 
-class MissingExtra(ImportError):
+class MissingExtra(ModuleNotFoundError):
     """The packages of a part of roboglot are not installed; the text says how to install them."""
 
 
@@ -85,13 +88,26 @@ def explaining(what: str, extra: str) -> Iterator[None]:
         raise MissingExtra(words, name=error.name) from None
 
 
-def explained(error: ImportError, what: str, extra: str = "") -> str | None:
-    """Return a sentence about a missing module; None if no extra (or ``extra``, if given) has it."""
-    if isinstance(error, MissingExtra):
+def explained(error: ModuleNotFoundError, what: str, extra: str = "") -> str | None:
+    """Return a sentence about a missing module, which names ``extra`` if that brings it; None if no extra does."""
+    if isinstance(error, MissingExtra) and not str(error).startswith("roboglot."):  # those are for other programs
         return str(error)
     name = (error.name or "").partition(".")[0]
-    brings = extra or EXTRA_OF.get(name, "")
-    return in_words(what, [name], brings) if name in EXTRA_OF else None
+    if name not in EXTRA_OF:
+        return None
+    return in_words(what, [name], extra if name in _brought(extra) else EXTRA_OF[name])
+
+
+def _brought(extra: str) -> set[str]:
+    """Return the modules that installing this extra, or several with commas, brings."""
+    parts = {"up": UP, "demo": (*UP, "demo"), "testing": ("simulation", "testing")}.get(extra, extra.split(","))
+    return {module for part in parts for module in MODULES.get(part, ())}
+
+
+def refuse_without(what: str, extra: str, modules: Iterable[str]) -> None:
+    """Raise MissingExtra if any of these modules is not installed."""
+    if missing := [module for module in modules if not is_there(module)]:
+        raise MissingExtra(in_words(what, missing, extra))
 
 
 def in_words(what: str, missing: list[str], extra: str) -> str:

@@ -246,8 +246,7 @@ class Runtime:
         """Return the one port of all robots for `roboglot connect`, with the certificate of the CyberDog doors."""
         from roboglot.access.tunnel.gateway import Gateway, Ports
         from roboglot.protocols.cyberdog.certificates import ensure_certificates
-        from roboglot.protocols.cyberdog.pem_files import SERVER_CERT, SERVER_KEY
-        from roboglot.protocols.cyberdog.server import FOLDER
+        from roboglot.protocols.cyberdog.pem_files import FOLDER, SERVER_CERT, SERVER_KEY
 
         config, (host, _, port) = self.config, self.config.access.gateway.rpartition(":")
 
@@ -269,7 +268,7 @@ class Runtime:
         if not (self.config.access.on and settings.on):
             return None
         from roboglot.protocols.cyberdog.certificates import ensure_site
-        from roboglot.protocols.cyberdog.server import FOLDER
+        from roboglot.protocols.cyberdog.pem_files import FOLDER
 
         pair = Path(settings.certificate), Path(settings.key)
         if not settings.certificate:

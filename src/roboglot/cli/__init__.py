@@ -54,9 +54,12 @@ FLUSH_FAILED = 120  # Python's own exit status for it
 FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings") | dict.fromkeys(
     ("lease", "stop", "reset"), "control"
 )
-# The extra to install for a command whose modules are missing, unless the module's name leads to one.
-EXTRAS = {"demo": "demo", "mcp": "mcp", "export": "logs"} | dict.fromkeys(
-    ("up", "coverage", "capabilities", "fidelity", "doctor", "cloud", "map", "test", "lesson", "campaign"), "up"
+# The extra to install for a command whose modules are missing, if that brings them.
+EXTRAS = (
+    {"demo": "demo", "mcp": "mcp", "export": "recording,logs"}
+    | dict.fromkeys(("record", "replay", "compare"), "recording")
+    | dict.fromkeys(("up", "fleet", "coverage", "capabilities", "fidelity", "rerun", "cloud", "map", "program"), "up")
+    | dict.fromkeys(("test", "lesson", "campaign"), "up")
 )
 
 
@@ -96,7 +99,7 @@ def main() -> None:
     name = arguments[0]
     try:
         _obey(name)
-    except ImportError as missing:
+    except ModuleNotFoundError as missing:
         from roboglot.extras import explained
 
         words = explained(missing, f"roboglot {name}", EXTRAS.get(name, ""))

@@ -59,7 +59,7 @@ def add(
             store.add_person(name, _password(), grants)
         elif cyberdog is not None:
             from roboglot.protocols.cyberdog.certificates import export_app
-            from roboglot.protocols.cyberdog.server import FOLDER
+            from roboglot.protocols.cyberdog.pem_files import FOLDER
 
             for path in export_app(_folder(data) / FOLDER, name, cyberdog):
                 print(path)

@@ -6,7 +6,6 @@ import asyncio
 import os
 import sys
 import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -14,11 +13,9 @@ import typer
 
 from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config
-from roboglot.extras import MissingExtra, in_words
+from roboglot.extras import MODULES, refuse_without
 from roboglot.protocols import DOORS
 from roboglot.testing.process import NotUp
-
-PACKAGES = ("httpx", "robomasterpy", "cv2")
 
 
 def command(
@@ -28,8 +25,7 @@ def command(
     speed: Annotated[float, typer.Option(help="Robot seconds per real second.")] = 1.0,
 ) -> None:
     """Let four independent clients drive the same robot, one after the other; all four print its pose."""
-    if missing := [package for package in PACKAGES if find_spec(package) is None]:
-        raise MissingExtra(in_words("roboglot demo", missing, "demo"))
+    refuse_without("roboglot demo", "demo", MODULES["demo"])
     if problem := _obstacle(address, out):
         sys.exit(f"roboglot demo: {problem}")
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # gRPC need not report that a robot hung up

@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Iterator
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +18,7 @@ import typer
 from roboglot.cli.checks.finding import Finding
 from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config, load_config
+from roboglot.extras import UP, installed
 from roboglot.protocols import DOORS, sections
 
 
@@ -55,11 +55,16 @@ def examine(config: Config) -> Iterator[Finding]:
     yield Finding("Linux", sys.platform == "linux", sys.platform, "programs need Linux (seccomp); the rest may work")
     yield _data_folder(config.data)
     yield from examine_ports(config)
-    yield examine_sandbox()
-    yield _kernels()
-    for package, use in (("robomasterpy", "roboglot demo"), ("cv2", "roboglot demo"), ("httpx", "roboglot demo")):
-        there = find_spec(package) is not None
-        yield Finding(package, there, f"for {use}", "pip install 'roboglot[demo]'")
+    there = installed()
+    for extra in UP:
+        seen = "installed" if there[extra] else "not installed"
+        yield Finding(
+            f"extra {extra}", there[extra], seen, f"pip install 'roboglot[{extra}]'; [up] brings all of these"
+        )
+    if there["programs"]:
+        yield examine_sandbox()
+    if there["simulation"]:
+        yield _kernels()
 
 
 def _data_folder(folder: Path) -> Finding:

@@ -20,7 +20,7 @@ import typer
 
 from roboglot.cli.control import running
 from roboglot.config import default_data_folder
-from roboglot.extras import MissingExtra
+from roboglot.extras import MissingExtra, refuse_without
 from roboglot.hosting.reasons import in_words
 from roboglot.hosting.visible import visible
 
@@ -67,7 +67,10 @@ def up(
 ) -> None:
     """Start a fleet and keep it up until Ctrl-C; its robots' data stays in its folder."""
     from roboglot.shards.forking import NotWarm, launched
+    from roboglot.shards.warmth import FOREIGN
 
+    if not on:
+        refuse_without("roboglot fleet", "up", dict.fromkeys(name.partition(".")[0] for name in ("numba", *FOREIGN)))
     began = time.monotonic()
     with launched(wanted=not on) as nursery:  # it loads while we import what a plan needs
         from roboglot.hosting.exclusive import FolderInUse

@@ -51,8 +51,7 @@ def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: 
     if page:
         _print(f"\n{_bold('console')}  {page}  {_dim('see and drive every robot in a browser')}")
     if config.access.on and config.access.gateway:
-        from roboglot.protocols.cyberdog.pem_files import SERVER_CERT
-        from roboglot.protocols.cyberdog.server import FOLDER
+        from roboglot.protocols.cyberdog.pem_files import FOLDER, SERVER_CERT
         from roboglot.protocols.cyberdog.signing import fingerprint
 
         shown = fingerprint(config.data / FOLDER / "tls" / SERVER_CERT)

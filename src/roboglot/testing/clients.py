@@ -55,7 +55,7 @@ class Clients:
         """Return the certificates of a dog's app; the files are in ``data/app``."""
         from roboglot.clients.cyberdog import Certificates
         from roboglot.protocols.cyberdog.certificates import export_client
-        from roboglot.protocols.cyberdog.server import FOLDER
+        from roboglot.protocols.cyberdog.pem_files import FOLDER
 
         folder = self._data / "app"
         if not folder.exists():

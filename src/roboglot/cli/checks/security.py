@@ -101,14 +101,14 @@ def _encryption(config: Config) -> str:
 
 def _fingerprints(config: Config) -> Iterator[Finding]:
     """Yield the fingerprints of the certificates that clients are shown, to be compared at their first use."""
-    from roboglot.protocols.cyberdog.pem_files import SERVER_CERT
-    from roboglot.protocols.cyberdog.server import FOLDER
-    from roboglot.protocols.cyberdog.signing import fingerprint
+    from roboglot.protocols.cyberdog.pem_files import FOLDER, SERVER_CERT
 
     folder = config.data / FOLDER
     own = Path(config.access.tls.certificate) if config.access.tls.certificate else folder / "site" / "site-cert.pem"
     for label, path in (("gateway certificate", folder / "tls" / SERVER_CERT), ("web certificate", own)):
         if path.exists():
+            from roboglot.protocols.cyberdog.signing import fingerprint
+
             try:
                 yield Finding(label, True, f"SHA-256 {fingerprint(path)}")
             except (OSError, ValueError) as error:

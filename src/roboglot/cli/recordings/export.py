@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from roboglot.extras import explaining
 from roboglot.hosting.reasons import in_words
 from roboglot.hosting.visible import visible
 
@@ -28,8 +27,8 @@ def command(
     robot: Annotated[str, typer.Option(help="Only this robot's topics.")] = "",
 ) -> None:
     """Write a recording as a bag of ROS 2."""
-    with explaining("roboglot export", "logs"):
-        from roboglot.recording.ros2.bag import export
+    from roboglot.recording.ros2.bag import export
+
     try:
         written = export(file, rosbag2, storage.value, robot)
     except (OSError, ValueError) as error:

@@ -23,7 +23,7 @@ from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.tap import Exchange
 from roboglot.protocols import sections
 from roboglot.protocols.cyberdog.certificates import export_client
-from roboglot.protocols.cyberdog.server import FOLDER
+from roboglot.protocols.cyberdog.pem_files import FOLDER
 from roboglot.recording.comparing.behaviour import compare_behaviour
 from roboglot.recording.comparing.reports import percent
 from roboglot.recording.comparing.trees import kind_of, leaves, tree

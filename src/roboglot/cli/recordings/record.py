@@ -130,7 +130,7 @@ def proxy(
 def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> DogRelay:
     """Return a relay that has our certificates of the data folder towards the app. Raises OSError, ValueError."""
     from roboglot.protocols.cyberdog.certificates import ensure_certificates
-    from roboglot.protocols.cyberdog.server import FOLDER
+    from roboglot.protocols.cyberdog.pem_files import FOLDER
     from roboglot.recording.proxy.dog import DogRelay, Proof
 
     if "certs" not in target.options:

@@ -187,7 +187,7 @@ def _line(runtime: Runtime, place: Place) -> Line | None:
 def _certificates(config: Config) -> Path:
     """Return the folder with an app's certificates."""
     from roboglot.protocols.cyberdog.certificates import export_client
-    from roboglot.protocols.cyberdog.server import FOLDER
+    from roboglot.protocols.cyberdog.pem_files import FOLDER
 
     folder = config.data / "app"
     if not folder.exists():

@@ -6,6 +6,7 @@ import os
 import tempfile
 from pathlib import Path
 
+FOLDER = "cyberdog"  # in the data folder
 CA_CERT, SERVER_CERT, SERVER_KEY = "ca-cert.pem", "server-cert.pem", "server-key.pem"
 
 

@@ -41,6 +41,7 @@ from roboglot.protocols.cyberdog.chapters.system.updates import Updates
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.handshakes import Handshakes
+from roboglot.protocols.cyberdog.pem_files import FOLDER
 from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.reflection import add_reflection
@@ -55,7 +56,6 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.visual.relay import FrameRelay
 
 log = logging.getLogger(__name__)
-FOLDER = "cyberdog"  # in the data folder
 
 
 class CyberDogDoor:

@@ -42,7 +42,7 @@ class Session:
             with self.context.robot.clock.holding():  # lockstep time does not count how long a library loads
                 topics = self.context.topics = await self._topics()
                 topics.join(self.context)
-        except ImportError as error:
+        except ModuleNotFoundError as error:
             self.context.status(Level.ERROR, explained(error, "the robot's topics") or str(error))
         except (OSError, ValueError) as error:
             self.context.status(Level.ERROR, f"the recording cannot be read: {error}")
