@@ -315,8 +315,13 @@ class Runtime:
         if self.guard is not None:
             self.guard.start()
         self._begin_recording()
-        for doors in self.doors.values():
-            await doors.open()
+        try:
+            for doors in self.doors.values():
+                await doors.open()
+        except OSError:  # another try may record to the same file
+            if self._recorder is not None:
+                await self._recorder.discard()
+            raise
         await self.leases.open()
         await self._record_desk.open()
         if self.guard is not None and self.config.access.gateway:

@@ -56,6 +56,15 @@ async def advance(started: Runtime, seconds: float) -> None:
     await started.clock.advance(seconds)
 
 
+async def test_failed_start_leaves_no_recording(tmp_path: Path) -> None:
+    async with await asyncio.start_server(lambda *_: None, ADDRESS, 1448):
+        started = Runtime(config(tmp_path / "data", RecordConfig(to=str(tmp_path / "r.mcap"))))
+        with pytest.raises(OSError, match="in use"):
+            await started.start()
+        await started.close()
+    assert not (tmp_path / "r.mcap").exists()
+
+
 async def test_mcap_reads_everything_that_was_recorded(tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
     started = Runtime(config(tmp_path / "data", RecordConfig(to=str(path))))

@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import field
+from errno import EEXIST
 from pathlib import Path
 from struct import Struct, pack
 from typing import IO, Any
@@ -160,15 +162,24 @@ class PartWriter:
         os.fchmod(self._file.fileno(), 0o600)
         self._writer: Any = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._chunk = OpenChunk(self._writer, self._file)
-        self._writer.start(profile="", library=LIBRARY)
-        self._writer.add_metadata("roboglot", {**origin.facts, "part": str(part)})
-        for attachment in origin.attachments:
-            self._writer.add_attachment(at, at, attachment.name, attachment.media_type, attachment.data)
         self._channels: dict[tuple[str, str], Channel] = {}
         self._schemas: dict[str, int] = {}
         self._sequence = 0
         self.first = at
         self.size = 0  # bytes so far, without the open chunk
+        try:
+            self._begin(origin, at, part)
+        except OSError:  # another try may have the same name
+            path.unlink()
+            with suppress(OSError):
+                self._file.close()
+            raise
+
+    def _begin(self, origin: Origin, at: int, part: int) -> None:
+        self._writer.start(profile="", library=LIBRARY)
+        self._writer.add_metadata("roboglot", {**origin.facts, "part": str(part)})
+        for attachment in origin.attachments:
+            self._writer.add_attachment(at, at, attachment.name, attachment.media_type, attachment.data)
         self.flush()
 
     def write(self, entry: Entry) -> None:
@@ -231,7 +242,10 @@ class Files:
     @property
     def path(self) -> Path:
         """Path of the current part, or of the first one before ``open``."""
-        suffix = f"-{self._number:03}" if self._number > 1 else ""
+        return self._path(self._number)
+
+    def _path(self, number: int) -> Path:
+        suffix = f"-{number:03}" if number > 1 else ""
         return self._base.with_name(f"{self._base.name}{suffix}{SUFFIX}")
 
     @property
@@ -241,6 +255,8 @@ class Files:
 
     def open(self, at: int) -> None:
         """Create the first part, so that an unwritable path fails at once. Raises OSError."""
+        if (second := self._path(2)).exists():  # of another recording; readers would take it for one of this
+            raise FileExistsError(EEXIST, os.strerror(EEXIST), str(second))
         self._next(at)
 
     def write(self, entry: Entry) -> None:

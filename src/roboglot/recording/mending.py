@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Message, Metadata
 from mcap.writer import CompressionType, Writer
 
 from roboglot.recording.files import LIBRARY
@@ -15,12 +15,12 @@ from roboglot.recording.reader import records
 def mend(source: Path, target: Path) -> int:
     """Copy the messages of ``source`` to ``target``; return their number. Raises BadRecording, OSError."""
     count = 0
-    schemas: dict[int, int] = {}
+    schemas: dict[int, int] = {0: 0}
     channels: dict[int, int] = {}
     with target.open("xb") as file:
         writer: Any = Writer(file, compression=CompressionType.ZSTD)
         writer.start(library=LIBRARY)
-        for record, _, _ in records(source):
+        for record, channel, schema in records(source):
             match record:
                 case Metadata():
                     writer.add_metadata(record.name, record.metadata)
@@ -28,16 +28,16 @@ def mend(source: Path, target: Path) -> int:
                     writer.add_attachment(
                         record.create_time, record.log_time, record.name, record.media_type, record.data
                     )
-                case Schema() if record.id not in schemas:
-                    schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
-                case Channel() if record.id not in channels:
-                    channels[record.id] = writer.register_channel(
-                        record.topic, record.message_encoding, schemas.get(record.schema_id, 0), record.metadata
-                    )
-                case Message():
+                case Message() if channel is not None:
+                    if schema is not None and schema.id not in schemas:
+                        schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
+                    if channel.id not in channels:
+                        channels[channel.id] = writer.register_channel(
+                            channel.topic, channel.message_encoding, schemas.get(channel.schema_id, 0), channel.metadata
+                        )
                     count += 1
                     writer.add_message(
-                        channels[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence
+                        channels[channel.id], record.log_time, record.data, record.publish_time, record.sequence
                     )
         writer.finish()
     return count

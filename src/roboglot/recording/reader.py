@@ -11,8 +11,11 @@ from pathlib import Path
 from typing import IO, Any
 
 from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.reader import SeekingReader
+from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.summary import Summary
+from msgspec import DecodeError
 
 from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import DRIVER, Direction, Exchange
@@ -23,6 +26,7 @@ from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
 
 log = logging.getLogger(__name__)
 EXCHANGES_MAX = 2_000_000
+UNPACKED_MAX = 256 << 20  # bytes of a chunk
 
 
 class BadRecording(ValueError):
@@ -137,9 +141,11 @@ def records(path: Path) -> Iterator[tuple[object, Channel | None, Schema | None]
 
     Raises BadRecording, OSError.
     """
-    channels: dict[int, Channel] = {}
-    schemas: dict[int, Schema] = {}
     with path.open("rb") as file:
+        summary = summary_of(file)
+        channels = {} if summary is None else summary.channels
+        schemas = {} if summary is None else summary.schemas
+        file.seek(0)
         for record in stream(path, file):
             if isinstance(record, Schema):
                 schemas[record.id] = record
@@ -152,14 +158,43 @@ def records(path: Path) -> Iterator[tuple[object, Channel | None, Schema | None]
 def stream(path: Path, file: IO[bytes], *, chunks: bool = False) -> Iterator[McapRecord]:
     """Yield the records of an open file, with ``chunks`` undivided chunks; ends where the file is cut off.
 
-    Raises BadRecording, OSError.
+    Damaged chunks are left out, with a warning, and so is then the footer. Raises BadRecording, OSError.
     """
+    is_damaged = False
     try:
-        yield from StreamReader(file, emit_chunks=chunks, record_size_limit=RECORD_MAX).records
+        for record in StreamReader(file, emit_chunks=True, record_size_limit=RECORD_MAX).records:
+            if isinstance(record, Chunk) and not chunks:
+                try:
+                    yield from unpacked(path, record)
+                except BadRecording as error:
+                    is_damaged = True
+                    seconds = (record.message_end_time - record.message_start_time) / 1e9
+                    log.warning("%s; %.1f s are left out", error, seconds)
+            elif not (is_damaged and isinstance(record, Footer)):
+                yield record
     except DAMAGE as error:
         if isinstance(error, McapError) and file.tell() <= 16:
             raise BadRecording(f"{path} is not an MCAP file") from None
         log.info("%s: cut off or damaged: %s", path, error)
+
+
+def unpacked(path: Path, chunk: Chunk) -> Sequence[McapRecord]:
+    """Return the records of a chunk. Raises BadRecording."""
+    if chunk.uncompressed_size > UNPACKED_MAX:
+        raise BadRecording(f"{path}: a chunk of more than {UNPACKED_MAX} bytes")
+    try:
+        return breakup_chunk(chunk, validate_crc=True)
+    except DAMAGE as error:
+        raise BadRecording(f"{path} is damaged: {error}") from None
+
+
+def summary_of(file: IO[bytes]) -> Summary | None:
+    """Return the index of a whole file."""
+    try:
+        summary = SeekingReader(file, record_size_limit=RECORD_MAX).get_summary()
+    except (OSError, *DAMAGE):
+        return None
+    return summary if summary is not None and summary.chunk_indexes else None
 
 
 def read_recording(path: Path) -> Recording:
@@ -190,6 +225,13 @@ def _part_of(path: Path) -> str:
 
 
 def _read_part(path: Path, recording: Recording, *, first: bool) -> None:
+    try:
+        _read_records(path, recording, first=first)
+    except (DecodeError, ValueError, TypeError) as error:
+        raise BadRecording(f"{path} has a message that cannot be read: {error}") from None
+
+
+def _read_records(path: Path, recording: Recording, *, first: bool) -> None:
     recording.whole = False
     for record, channel, schema in records(path):
         match record:
@@ -210,8 +252,8 @@ def _read_part(path: Path, recording: Recording, *, first: bool) -> None:
                     exchange = decode_exchange(record.data)
                     recording.exchanges.append(exchange)
                     recording.epoch = recording.epoch or record.log_time / 1e9 - exchange.stamp
-            case _:
-                recording.whole = recording.whole or type(record).__name__ == "Footer"
+            case Footer():
+                recording.whole = True
 
 
 def read_messages(path: Path, *topics: str) -> Iterator[Record]:

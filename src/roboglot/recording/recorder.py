@@ -115,7 +115,7 @@ class Recorder:
             target.parent.mkdir(parents=True, exist_ok=True)
             files.open(self._stamp()[0])
         except OSError as error:
-            raise NotRecording(f"{target} cannot be written: {error.strerror}") from None
+            raise NotRecording(f"{error.filename or target} cannot be written: {error.strerror}") from None
         self._files = files
         self._thread = WriterThread(files, patient=isinstance(self._clock, LockstepClock))
         self._began = self._clock.time()
@@ -145,6 +145,11 @@ class Recorder:
         early = f", until it ended early: {thread.failure}" if thread.failure else ""
         log.info("recorded %d values in %d bytes to %s%s", files.written, files.size, files.path, early)
         return status
+
+    async def discard(self) -> None:
+        """End the recording, if there is one, and delete it."""
+        if self._files is not None:
+            await asyncio.to_thread(Path((await self.stop()).path).unlink, missing_ok=True)
 
     def mark(self, text: str) -> None:
         """Record a person's remark at the current time. Raises NotRecording."""

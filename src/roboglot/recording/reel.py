@@ -13,16 +13,13 @@ from pathlib import Path
 from typing import IO, NamedTuple
 
 from mcap.data_stream import ReadDataStream
-from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Message, Schema
-from mcap.stream_reader import breakup_chunk
 from mcap.summary import Summary
 
-from roboglot.recording.reader import BadRecording, parts, stream
+from roboglot.recording.reader import BadRecording, parts, stream, summary_of, unpacked
 from roboglot.values import dataclass
-from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
+from roboglot.wire.mcap_damage import DAMAGE
 
-UNPACKED_MAX = 256 << 20  # bytes per chunk
 TOPICS_MAX = 4096
 RECORD_HEAD = 9  # bytes: opcode and length
 
@@ -113,7 +110,7 @@ class Reel:
 
     def _part(self, path: Path) -> Iterator[_Chunk]:
         with path.open("rb") as file:
-            summary = _summary(file)
+            summary = summary_of(file)
             if summary is not None:
                 yield from self._by_index(path, summary)
             else:
@@ -134,7 +131,7 @@ class Reel:
         for record in stream(path, file, chunks=True):
             if isinstance(record, Chunk):
                 with suppress(BadRecording):  # what cannot be read here is skipped there, too
-                    inside = _unpacked(path, record)
+                    inside = unpacked(path, record)
                     schemas |= {schema.id: schema for schema in inside if isinstance(schema, Schema)}
                     channels = [channel for channel in inside if isinstance(channel, Channel)]
                     places |= self._places([new for new in channels if new.id not in places], schemas)
@@ -163,7 +160,7 @@ class Reel:
         try:
             with path.open("rb") as file:
                 file.seek(chunk.offset + RECORD_HEAD)
-                inside = _unpacked(path, Chunk.read(ReadDataStream(file)))
+                inside = unpacked(path, Chunk.read(ReadDataStream(file)))
         except DAMAGE as error:
             raise BadRecording(f"{path} is damaged: {error}") from None
         return [
@@ -180,22 +177,3 @@ def _time(shot: Shot) -> int:
 def _before(shots: Sequence[Shot], until: int) -> int:
     """Return the number of ``shots``, which are in order, before ``until`` (ns since 1970)."""
     return bisect_right(shots, until - 1, key=_time)
-
-
-def _summary(file: IO[bytes]) -> Summary | None:
-    """Return the index of a whole file."""
-    try:
-        summary = SeekingReader(file, record_size_limit=RECORD_MAX).get_summary()
-    except (OSError, *DAMAGE):
-        return None
-    return summary if summary is not None and summary.chunk_indexes else None
-
-
-def _unpacked(path: Path, chunk: Chunk) -> Sequence[object]:
-    """Return the records of a chunk. Raises BadRecording."""
-    if chunk.uncompressed_size > UNPACKED_MAX:
-        raise BadRecording(f"{path}: a chunk of more than {UNPACKED_MAX} bytes")
-    try:
-        return breakup_chunk(chunk, validate_crc=True)
-    except DAMAGE as error:
-        raise BadRecording(f"{path} is damaged: {error}") from None

@@ -246,7 +246,7 @@ async def test_what_is_not_understood_passes_all_the_same(tmp_path: Path) -> Non
     await robot.wait_closed()
 
 
-async def test_robot_that_hangs_up_at_once_hangs_up_on_the_client(tmp_path: Path) -> None:
+async def test_client_learns_that_robot_hung_up_at_once(tmp_path: Path) -> None:
     """The robot is gone before the two connections are joined."""
 
     async def refuse(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

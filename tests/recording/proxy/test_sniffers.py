@@ -64,7 +64,7 @@ def test_announcement_of_an_answer_is_none() -> None:
 
 
 @pytest.mark.parametrize(("size", "found"), [("", [("", b"all of it", "200")]), ("\ncontent-length: 100", [])])
-def test_end_of_the_connection_ends_an_answer_without_a_size(size: str, found: list[object]) -> None:
+def test_connection_s_end_ends_answers_without_size(size: str, found: list[object]) -> None:
     noted = Noted()
     rest = RestSniffer(noted)
     rest.from_client(http("GET /a HTTP/1.0"))
@@ -75,7 +75,7 @@ def test_end_of_the_connection_ends_an_answer_without_a_size(size: str, found: l
 
 
 def test_packed_answer_is_noted_unpacked() -> None:
-    """What is packed could not be redacted."""
+    """No redaction looks into packed bytes."""
     noted = Noted()
     rest = RestSniffer(noted)
     body = gzip.compress(b'{"ssid":"home"}')

@@ -26,10 +26,10 @@ from roboglot.recording.reader import parts, read_messages, records
 from roboglot.recording.redaction import Redaction
 from roboglot.recording.ring import Ring
 from roboglot.recording.thread import WriterThread
-from tests.recording.doctor import Doctor
+from tests.recording.files.doctor import Doctor
 
 CHILD = [sys.executable, "-m", "tests.recording.writing_child"]  # warm, so it ends with this process
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 KILLS = 10
 ORIGIN = Origin({"version": "1"}, [Attachment("world.toml", "text/plain", b"x = 1")])
 
