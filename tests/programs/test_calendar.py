@@ -97,6 +97,22 @@ def test_when_the_clocks_change() -> None:
     assert shown(due_next(twice, first, BERLIN), BERLIN) == "2026-10-26 02:30"  # once, although 02:30 came twice
 
 
+@pytest.mark.parametrize(
+    ("now", "condition", "expected"),  # UTC; Berlin's 02:00 to 03:00 is skipped on 29 March, repeated on 25 October
+    [
+        ("2026-03-29 00:30", "now + 2hours", "2026-03-29 02:30"),
+        ("2026-03-29 00:30", "now + 1days", "2026-03-29 23:30"),
+        ("2026-03-29 01:10", "02:30", "2026-03-29 01:30"),  # it is 03:10: what was skipped counts as the hour after
+        ("2026-10-25 00:30", "now + 1hours", "2026-10-25 01:30"),
+        ("2026-10-25 01:30", "now + 10minutes", "2026-10-25 01:40"),  # in the second 02:30
+        ("2026-10-25 01:30", "02:50", "2026-10-26 01:50"),  # the first 02:50 is past
+        ("2026-10-25 00:30", "02:50 + 30minutes", "2026-10-25 01:20"),
+    ],
+)
+def test_moments_while_the_clocks_change(now: str, condition: str, expected: str) -> None:
+    assert shown(due_of("single", condition, at(now), BERLIN)) == expected
+
+
 LIMITS = ((3, 40), (2, 19), (5, 28), (2, 11), (1, 6))
 FORMS = ("*", "{0}", "{1}", "{0}-{1}", "*/{1}", "{0},{1}")
 FIELDS = st.tuples(*(st.sampled_from([form.format(*pair) for form in FORMS]) for pair in LIMITS))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import calendar
-from datetime import date, datetime, time, timedelta, tzinfo
+from datetime import UTC, date, datetime, time, timedelta, tzinfo
 
 from roboglot.conditions import Cycle, Moment, parse_cycle, parse_moment
 
 DAYS_AHEAD = 9 * 366
 """Every possible day of month and week recurs within this many days (worst: 29 February around the year 2100)."""
-_PLAIN = {"minutes", "hours", "days", "weeks"}
 
 
 def due_of(mode: str, condition: str, now: float, zone: tzinfo) -> float | None:
@@ -24,19 +23,22 @@ def due_once(moment: Moment, now: float, zone: tzinfo) -> float | None:
 
     A clock time without a date is today's, or tomorrow's if today's is past; an amount is added to that time.
     """
-    here = datetime.fromtimestamp(now, zone)
-    base = here.replace(tzinfo=None)
-    try:
-        if moment.clock is not None:
-            base = datetime.combine(moment.day or base.date(), moment.clock)
-            if moment.day is None and base < here.replace(tzinfo=None):
-                base += timedelta(days=1)
-        due = _later(base, moment.amount, moment.unit).replace(tzinfo=zone).timestamp()
-    except (OverflowError, ValueError):  # beyond the year 9999
-        return None
     if moment.immediate:
         return now
+    try:
+        due = _later(_base(moment, now, zone), moment.amount, moment.unit).timestamp()
+    except (OverflowError, ValueError):  # beyond the year 9999
+        return None
     return due if due >= now else None
+
+
+def _base(moment: Moment, now: float, zone: tzinfo) -> datetime:
+    """Return the time to which a moment's amount is added."""
+    here = datetime.fromtimestamp(now, zone)
+    if moment.clock is None:
+        return here
+    base = datetime.combine(moment.day or here.date(), moment.clock, zone)
+    return base + timedelta(days=1) if moment.day is None and base.timestamp() < now else base
 
 
 def due_next(cycle: Cycle, after: float, zone: tzinfo) -> float | None:
@@ -70,11 +72,18 @@ def _day_matches(cycle: Cycle, day: date) -> bool:
 
 
 def _later(base: datetime, amount: int, unit: str) -> datetime:
-    """Return ``base`` plus ``amount`` units; in months too short for the day, their last day."""
-    if unit in _PLAIN:
+    """Return ``base`` plus ``amount`` units; in months too short for the day, their last day.
+
+    Minutes and hours pass also while clocks change; longer units keep the time of day.
+    """
+    if amount == 0:
+        return base
+    if unit in ("minutes", "hours"):
+        return (base.astimezone(UTC) + timedelta(**{unit: amount})).astimezone(base.tzinfo)
+    if unit in ("days", "weeks"):
         return base + timedelta(**{unit: amount})
     months = base.month - 1 + amount * (12 if unit == "years" else 1)
     year, month = base.year + months // 12, months % 12 + 1
     if year > date.max.year:
         raise OverflowError(f"the year {year}")
-    return base.replace(year=year, month=month, day=min(base.day, calendar.monthrange(year, month)[1]))
+    return base.replace(year=year, month=month, day=min(base.day, calendar.monthrange(year, month)[1]), fold=0)
