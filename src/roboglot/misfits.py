@@ -45,6 +45,8 @@ def misfit(error: Exception, whole: str = "the value", *, field: str = "", kinds
     ``field``: the field with the value, if it is not the whole; ``whole``: its name if no field is wrong.
     ``kinds``: the words for types.
     """
+    if isinstance(error, RecursionError):
+        return "JSON is nested too deeply"
     if not isinstance(error, msgspec.ValidationError):
         return str(error)
     found = _PLACE.fullmatch(str(error))
@@ -66,4 +68,4 @@ def _in_words(value: str, kinds: Mapping[str, str]) -> str:
     """Return one or several types in words, or a limit without trailing zeros."""
     if set(value.split(" | ")) <= {*kinds, "null"}:
         return " or ".join(kinds.get(kind, kind) for kind in value.split(" | "))
-    return value.removesuffix(".0")
+    return value.removesuffix(".0").replace("\\\\", "\\")  # a pattern comes as Python writes it
