@@ -55,6 +55,8 @@ OK, FAIL = "ok;", "fail;"
         ("chassis move x 1 wait_for_complete maybe;", FAIL),
         ("chassis move x one;", FAIL),
         ("chassis move;", PARSE_ERROR),
+        ("chassis move vxy 1 vz 30;", PARSE_ERROR),
+        ("chassis move wait_for_complete true;", PARSE_ERROR),
         ("chassis push position on;", OK),
         ("chassis push position on pfreq 1 attitude on;", OK),
         ("chassis push attitude on afreq 1 status on sfreq 5;", OK),

@@ -101,6 +101,7 @@ async def test_a_part_that_the_robot_lacks_answers_fail(client, robot) -> None:
         ("servo angel id 1 ?;", "did you mean `servo angle id 1 ?`?"),
         ("servo angle id 4 ?;", "did you mean `servo angle id 3 ?`?"),
         ("chassis speed;", "it takes at least one of x, y, z; did you mean `chassis speed x 1`?"),
+        ("gimbal move vp 30;", "it takes at least one of p, y; did you mean `gimbal move vp 30 p 1`?"),
         ("led control r 1;", "comp, effect missing; did you mean `led control r 1 comp all effect solid`?"),
         ("sound event bark on;", "did you mean `sound event applause on`?"),
         ("robotic_arm moveto x 500 y 0;", "did you mean `robotic_arm moveto x 12.9 y 0`?"),

@@ -48,6 +48,7 @@ log = logging.getLogger(__name__)
 
 DOOR = "robomaster"
 KEPT_MAX = 128  # command lines whose meaning is kept
+MANNERS = ("vxy", "vz", "vp", "vy", "wait_for_complete")  # they say how to move, not where: alone they do nothing
 
 
 @dataclass(slots=True)
@@ -248,9 +249,10 @@ def _values(key: str, shape: Shape, words: Sequence[str]) -> dict[str, Value]:
         )
     if missing := [name for name in shape.required if name not in values]:
         raise _Refusal(Reply.PARSE_ERROR, lambda: f"{', '.join(missing)} missing; {completed(key, shape, values)}")
-    if not values and len(shape.kinds) > 1:
+    effective = [name for name in shape.kinds if name not in MANNERS]
+    if len(shape.kinds) > 1 and values.keys().isdisjoint(effective):
         raise _Refusal(
             Reply.PARSE_ERROR,
-            lambda: f"it takes at least one of {', '.join(shape.kinds)}; {completed(key, shape, {})}",
+            lambda: f"it takes at least one of {', '.join(effective)}; {completed(key, shape, values)}",
         )
     return values
