@@ -67,6 +67,12 @@ async def test_found_switched_off_and_set(
     assert [mark["id"] for mark in await marks()] == [mark["id"] for mark in found]
 
 
+async def test_a_landmark_without_a_pose_is_refused(bare_client: httpx.AsyncClient) -> None:
+    reply = await bare_client.put(LANDMARKS, json=[{"id": "a", "pose": {"x": 1, "y": 2}}, {"id": "b"}])
+    assert (reply.status_code, reply.text) == (400, "Bad Request: the landmark b needs a pose")
+    assert (await bare_client.get(LANDMARKS)).json() == []
+
+
 @pytest.fixture
 async def clients(fleet: Fleet, forward: Forward) -> AsyncIterator[dict[str, httpx.AsyncClient]]:
     """A door and a client for each robot."""

@@ -48,6 +48,27 @@ async def test_half_a_curve_is_refused(bare: Robot, bare_client: httpx.AsyncClie
     assert not bare[MapAnnotations].current.lines
 
 
+@pytest.mark.parametrize(
+    ("usage", "metadata", "why"),
+    [
+        ("elevator_area", {"elevator_door_type": "3"}, "elevator_door_type is one of 0, 1, 2, not 3"),
+        ("elevator_area", {"elevator_sill_width": "wide"}, "elevator_sill_width is a number up to 10, not wide"),
+        ("elevator_area", {"elevator_scheduling_point_dist": "-1"}, "elevator_scheduling_point_dist is a number"),
+        ("dangerous_area", {"dangerous_area_type": "01"}, "dangerous_area_type is one of 0, 1, not 01"),
+    ],
+)
+async def test_settings_no_robot_can_follow_are_refused(
+    bare: Robot, bare_client: httpx.AsyncClient, usage: str, metadata: dict[str, str], why: str
+) -> None:
+    reply = await bare_client.post(f"{AREAS}/{usage}", json={"area": RECTANGLE, "metadata": metadata})
+    assert (reply.status_code, why in reply.text) == (400, True)
+    assert not bare[MapAnnotations].current.areas
+    assert (await bare_client.post(f"{AREAS}/{usage}", json={"area": RECTANGLE, "metadata": {}})).json() is True
+    (area,) = (await bare_client.get(f"{AREAS}/{usage}")).json()
+    changed = await bare_client.put(f"{AREAS}/{usage}/{area['id']}", json={"metadata": metadata})
+    assert (changed.status_code, why in changed.text) == (400, True)
+
+
 async def test_areas_of_all_kinds_with_their_metadata(bare: Robot, bare_client: httpx.AsyncClient) -> None:
     metadata = {
         "forbidden_area": {"escape_distance": "0.4"},

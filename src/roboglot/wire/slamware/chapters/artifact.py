@@ -146,6 +146,20 @@ def number(metadata: dict[str, str], key: str, most: float) -> float | None:
     return value
 
 
+WORDS = {"dangerous_area_type": ("0", "1"), "elevator_door_type": ("0", "1", "2")}
+LENGTHS = ("elevator_sill_width", "elevator_scheduling_point_dist")
+LENGTH_MAX = 10.0  # m
+
+
+def check_settings(metadata: dict[str, str]) -> None:
+    """Raise MetadataError for words and lengths of an area that a robot would replace by its defaults."""
+    for key, words in WORDS.items():
+        if (word := metadata.get(key)) and word not in words:
+            raise MetadataError(f"{key} is one of {', '.join(words)}, not {word[:40]}")
+    for key in LENGTHS:
+        number(metadata, key, LENGTH_MAX)
+
+
 SENSOR_TYPES = ("bumper", "cliff", "sonar", "depth camera")
 
 

@@ -9,8 +9,7 @@ import msgspec
 
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.laser_landmarks import LaserLandmarks
-from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.errors import NotFound
+from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
@@ -28,13 +27,18 @@ def get_laser_landmarks(context: Context) -> list[PoseEntry]:
     return [entry_of(mark) for mark in context.robot[MapAnnotations].current.landmarks]
 
 
-@TABLE.on(f"PUT {API}", right=Right.EDIT, needs=(Localization, MapAnnotations))
+def _landmark(entry: PoseEntry) -> PointOfInterest:
+    if entry.pose is None:
+        raise InvalidGoal(f"the landmark {entry.id} needs a pose")
+    return PointOfInterest(entry.id, pose_of(entry.pose), metadata_text(entry.metadata))
+
+
+@TABLE.on(f"PUT {API}", right=Right.EDIT, needs=(MapAnnotations,))
 async def put_laser_landmarks(
     context: Context, body: Annotated[list[PoseEntry], msgspec.Meta(max_length=2000)]
 ) -> bool:
     """Replace all landmarks."""
-    here = context.robot[Localization].pose
-    marks = {e.id: PointOfInterest(e.id, pose_of(e.pose) if e.pose else here, metadata_text(e.metadata)) for e in body}
+    marks = {entry.id: _landmark(entry) for entry in body}
     await context.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks.values())))
     return True
 

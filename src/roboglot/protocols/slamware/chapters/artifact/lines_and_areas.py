@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
-from roboglot.model.errors import NotFound
+from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.artifact.drawing import (
     AREA_KINDS,
@@ -22,6 +22,16 @@ from roboglot.wire.slamware.chapters.artifact import AreaChange, AreaRequest, Ar
 
 API = "/api/core/artifact/v1"
 LINES, AREAS = f"{API}/lines/{{usage}}", f"{API}/rectangle-areas/{{usage}}"
+
+
+def _settings(metadata: wire.Metadata) -> dict[str, str]:
+    """Return an area's new metadata as text. Raises InvalidGoal for values that no robot can follow."""
+    text = wire.metadata_text(metadata)
+    try:
+        wire.check_settings(text)
+    except wire.MetadataError as error:
+        raise InvalidGoal(str(error)) from None
+    return text
 
 
 @TABLE.on(f"GET {LINES}", right=Right.SEE, needs=(MapAnnotations,))
@@ -87,7 +97,7 @@ def get_rectangle_areas(context: Context, usage: AreaUsage) -> list[RectangleAre
 @TABLE.on(f"POST {AREAS}", right=Right.EDIT, needs=(MapAnnotations,))
 async def add_rectangle_area(context: Context, usage: AreaUsage, body: AreaRequest) -> bool:
     """Add an area; the settings in its metadata must be valid."""
-    area = area_of(usage, body.area, wire.metadata_text(body.metadata))
+    area = area_of(usage, body.area, _settings(body.metadata))
     await context.robot[MapAnnotations].change(lambda now: now.with_new(area))
     return True
 
@@ -111,7 +121,7 @@ async def edit_rectangle_area(context: Context, usage: AreaUsage, id: int, body:
         if old is None:
             raise NotFound(f"there is no {usage} {id}")
         rectangle = body.area or wire_area(old).area
-        metadata = dict(old.metadata) if body.metadata is None else wire.metadata_text(body.metadata)
+        metadata = dict(old.metadata) if body.metadata is None else _settings(body.metadata)
         new = area_of(usage, rectangle, metadata, id)
         return replace(now, areas=tuple(new if area is old else area for area in now.areas))
 

@@ -26,13 +26,12 @@ from roboglot.protocols.slamware.errors import HttpError
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import pose3d
 from roboglot.values import dataclass
-from roboglot.wire.slamware.chapters.artifact import Identifier, MetadataError, number
+from roboglot.wire.slamware.chapters.artifact import LENGTH_MAX, Identifier, MetadataError, number
 from roboglot.wire.slamware.chapters.multi_floor import PoseRelation
 from roboglot.wire.slamware.geometry import Pose3D
 
 API = "/api/multi-floor/map/v1/elevators"
 SILL, WAITING = 0.4, 1.0  # m, unless the metadata give them
-DISTANCE_MAX = 10.0  # m
 
 
 class DoorType(StrEnum):
@@ -117,7 +116,7 @@ def _elevator(area: Area) -> Elevator:
 
 def _metres(words: dict[str, str], key: str, default: float) -> float:
     try:
-        value = number(words, key, DISTANCE_MAX)
+        value = number(words, key, LENGTH_MAX)
     except MetadataError:
         value = None
     return default if value is None else value
