@@ -300,7 +300,7 @@ class Application:
         except BadParameters as error:
             raise bad_request(row.key, str(error)) from None
         except RobotError as error:
-            raise from_robot(error) from None
+            raise from_robot(error, row.key) from None
         except HttpError:
             raise
         except Exception:

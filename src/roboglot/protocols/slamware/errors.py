@@ -56,17 +56,24 @@ STATUSES: dict[type[RobotError], tuple[int, str]] = {
 
 # The manual's reasons for 400, by operation; all others are "Bad Request".
 BAD_REQUESTS = {
-    "POST /api/core/motion/v1/actions": "Can not create action",
-    "PUT /api/core/slam/v1/localization/pose": "Invalid Argument",
+    "DELETE /api/core/system/v1/robot/health/{error_code}": "Invalid Error Code",
     "GET /api/core/system/v1/parameter": "Parameter is required",
+    "GET /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}": "Invalid BoxId",
+    "GET /api/multi-floor/map/v1/pois": "Invalid floor or building",
+    "POST /api/core/motion/v1/actions": "Can not create action",
+    "POST /api/core/system/v1/aeb/control": "Invalid JSON data",
+    "POST /api/core/system/v1/jack/status": "Invalid JSON data",
+    "POST /api/core/system/v1/light/control": "Invalid JSON data",
+    "PUT /api/core/slam/v1/localization/pose": "Invalid Argument",
+    "PUT /api/core/system/v1/network/route": "Invalid JSON data",
     "PUT /api/delivery/v1/cargos/{cargo_id}/boxes/{box_id}/{op}": "Invalid Operation",
 }
 
 
-def from_robot(error: RobotError) -> HttpError:
-    """``error`` of the model as HTTP."""
+def from_robot(error: RobotError, key: str = "") -> HttpError:
+    """``error`` of the model as HTTP, for the operation ``key``."""
     status, text = next(entry for kind, entry in STATUSES.items() if isinstance(error, kind))
-    return HttpError(status, text, str(error))
+    return bad_request(key, str(error)) if status == 400 else HttpError(status, text, str(error))
 
 
 def bad_request(key: str, detail: str) -> HttpError:

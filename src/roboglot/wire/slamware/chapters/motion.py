@@ -102,7 +102,7 @@ class MoveOptions(msgspec.Struct):
     mode: int = 0
     flags: list[str | None] | int | None = None
     yaw: Radians | None = None
-    acceptable_precision: float | None = None
+    acceptable_precision: Annotated[float, msgspec.Meta(ge=0)] | None = None
     fail_retry_count: Annotated[int, msgspec.Meta(ge=0, le=RETRIES_MAX)] | None = None
     speed_ratio: Annotated[float, msgspec.Meta(ge=0, le=10)] | None = None
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from typing import Final
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
@@ -29,7 +30,7 @@ PULSE = 0.4  # s for which the robot continues without a new pulse
 RENEWAL = 0.1  # s between two pulses
 SPEED, YAW_SPEED = 0.5, 1.0  # m/s, rad/s: assumed before the robot reports its limits
 ACCELERATION, YAW_ACCELERATION = 0.5, 1.5  # m/s2, rad/s2: not reported; only used to plan
-YAW_PARAMETER = "base.max_angular_speed"
+YAW_PARAMETER: Final = "base.max_angular_speed"
 SPEED_MIN = 0.02  # m/s; robots refuse a lower limit
 CATCH_UP = 2.5  # for the speeds of an arc, each of which gets less than half of the time
 SPEED_STEP = 0.02  # m/s: a smaller change of speed is not sent

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from typing import Final
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.model.components.system.link import Link
@@ -10,7 +11,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.chapters.system.devices import Parameter
 
-PARAMETER = "base.max_moving_speed"
+PARAMETER: Final = "base.max_moving_speed"
 SETTING = "slamware_driver.owed_speed"  # the setting: the robot's URL and its limit, m/s
 
 

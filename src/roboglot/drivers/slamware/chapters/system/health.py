@@ -11,7 +11,7 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.events import BrakeChanged, EmergencyStopChanged
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.chapters.system.devices import Parameter
+from roboglot.wire.slamware.chapters.system.devices import Parameter, Settable
 from roboglot.wire.slamware.chapters.system.system import BaseError, HealthPart, Level
 
 LEVELS = {Level.WARN: FaultLevel.WARNING, Level.ERROR: FaultLevel.ERROR, Level.FATAL: FaultLevel.FATAL}
@@ -87,7 +87,7 @@ class SlamwareEmergencyStop(EmergencyStop):
     def release_brake(self, released: bool) -> None:
         self._set("base.brake_release", "on" if released else "off")
 
-    def _set(self, parameter: str, value: str) -> None:
+    def _set(self, parameter: Settable, value: str) -> None:
         async def change() -> None:
             await self._client.set_system_parameter(Parameter(parameter, value))
             await self._health.refresh()

@@ -135,7 +135,7 @@ def _asked(context: Context, floor: str, building: str) -> list[FloorMap]:
         if (not building or f.name.building == building) and (not floor or f.name.floor == floor)
     ]
     if not loaded and (floor or building):
-        raise InvalidGoal("Invalid floor or building")
+        raise InvalidGoal("the loaded map has no such floor")
     return loaded
 
 

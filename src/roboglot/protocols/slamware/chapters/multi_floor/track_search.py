@@ -27,7 +27,7 @@ def search_path_points_in_graph(context: Context, body: TrackQuery) -> PathPoint
     else:
         loaded = {(floor.name.building, floor.name.floor): floor.annotations for floor in context.maps.floors}
         if wanted not in loaded:
-            raise InvalidGoal("Invalid floor or building")
+            raise InvalidGoal("the loaded map has no such floor")
         if body.start_point is None:
             raise InvalidGoal("the robot is on another floor: give a start_point")
         drawn = loaded[wanted]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -31,10 +31,15 @@ class Restart(msgspec.Struct):
     mode: RestartMode = RestartMode.SOFT
 
 
+Speed = Literal["base.max_moving_speed", "base.max_angular_speed"]
+Readable = Speed | Literal["docking.docked_register_strategy"]
+Settable = Speed | Literal["base.emergency_stop", "base.brake_release"]
+
+
 class Parameter(msgspec.Struct):
     """A parameter and its new value, as text."""
 
-    param: Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
+    param: Settable
     value: Annotated[str, msgspec.Meta(max_length=64)] | float
 
 
