@@ -107,3 +107,23 @@ async def test_files_without_a_program_are_refused(studio: Open) -> None:
         await page.keyboard.press("Escape")
         await until(page, "!document.querySelector('dialog')")
     assert page.errors == []
+
+
+async def test_opened_program_is_no_change(studio: Open) -> None:
+    page = await loaded(await studio(), COUNTING)
+    await shows(page, "document.querySelector('.stored').textContent", "Kept on the robot")
+    changes = await page.evaluate("studio.editor.changes.value")
+    id = await page.evaluate("studio.program.value.id")
+    saved = f"JSON.parse(localStorage['studio.program.{id}']).saved"
+    before = await page.evaluate(saved)
+    await page.evaluate("import('/studio/program.js').then(p => p.fresh())")
+    await page.evaluate(f"import('/studio/program.js').then(p => p.openStored('{id}'))")
+    await until(page, "studio.editor.workspace.getBlockById('say')")
+    await page.evaluate("new Promise(done => requestAnimationFrame(() => setTimeout(() => setTimeout(done))))")
+    assert await page.evaluate("studio.editor.changes.value") == changes
+    await page.evaluate("studio.editor.workspace.getBlockById('more').dispose(true)")
+    await until(page, f"studio.editor.changes.value === {changes + 1}")
+    await page.click("[aria-label=Undo]")
+    await until(page, f"studio.editor.changes.value === {changes + 2}")
+    assert await page.evaluate(saved) > before
+    assert page.errors == []

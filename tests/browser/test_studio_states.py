@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.browser.served import shows, until
-from tests.browser.test_studio import FOREVER, READY, Open, Page, loaded, phase, prints, studio
+from tests.browser.test_studio import COUNTING, FOREVER, READY, Open, Page, loaded, phase, prints, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -91,3 +91,22 @@ async def test_reload_after_the_end_shows_output_and_error(studio: Open) -> None
     await shows(page, WORD, "Ready")
     await prints(page)
     assert page.errors == []
+
+
+async def test_two_tabs_show_one_program(studio: Open) -> None:
+    page = await studio()
+    await opens_text(page, "print(1)\n")
+    other = await studio(page.context)
+    written = "document.querySelector('.cm-content')?.innerText.trim()"
+    await shows(other, written, "print(1)")
+    await other.click(".cm-content")
+    await other.keyboard.press("Control+End")
+    await other.keyboard.type("print(2)")
+    await shows(page, written, "print(1)\nprint(2)")
+    await page.evaluate("import('/studio/program.js').then(p => p.fresh())")
+    await loaded(page, COUNTING)
+    await other.reload()
+    await until(other, "window.studio?.editor.workspace?.getBlockById('say')")
+    await other.evaluate("studio.editor.toggleBreak('say')")
+    await shows(page, "studio.editor.breaks.value.join()", "say")
+    assert page.errors == other.errors == []

@@ -19,7 +19,7 @@ Blockly.Scrollbar.scrollbarThickness = 14;
 /** @type {any} */
 export let workspace = null;
 let allowed = /** @type {Set<string> | null} */ (null);
-let lit = "", place = /** @type {HTMLElement | null} */ (null), quiet = false, unarranged = false; // blocks came while nothing is shown
+let lit = "", place = /** @type {HTMLElement | null} */ (null), unarranged = false; // blocks came while nothing is shown
 
 /** Make the workspace in `element`; again after a change of language or looks, with the same blocks. @param {HTMLElement} element */
 export function mount(element) {
@@ -65,9 +65,9 @@ effect(() => { void language.value; void look.value; void shade.value; if (works
 /** @param {any} event */
 function noticed(event) {
   if (event.type === Blockly.Events.SELECTED) selected.value = event.newElementId && workspace.getBlockById(event.newElementId) ? event.newElementId : "";
-  if (event.type === Blockly.Events.BLOCK_CREATE && event.recordUndo && !quiet) noteUse(workspace.getBlockById(event.blockId)?.type ?? "");
+  if (event.type === Blockly.Events.BLOCK_CREATE && event.recordUndo) noteUse(workspace.getBlockById(event.blockId)?.type ?? "");
   if (event.isUiEvent) return;
-  if (!quiet && event.type !== Blockly.Events.FINISHED_LOADING) touched = true;
+  if (event.recordUndo) touched = true; // else it was loaded, not made
   soon();
 }
 
@@ -97,7 +97,6 @@ export function save() { return Blockly.serialization.workspaces.save(workspace)
 
 /** @param {any} state @param {boolean} [fresh] forget what could be undone */
 export function load(state, fresh = true) {
-  quiet = true;
   const group = Blockly.Events.getGroup();
   try {
     Blockly.Events.setRecordUndo(false);
@@ -108,7 +107,6 @@ export function load(state, fresh = true) {
   }
   if (fresh) { workspace.clearUndo(); arrange(); }
   refresh();
-  setTimeout(() => { quiet = false; });
 }
 
 /** Show the middle of what fits, the beginning of what does not. */
@@ -127,10 +125,17 @@ function tidied(state) {
   return JSON.parse(JSON.stringify(state), (key, value) => (key === "id" && typeof value === "string" ? fine(value) : value));
 }
 
-export function clear() { quiet = true; workspace.clear(); workspace.clearUndo(); refresh(); setTimeout(() => { quiet = false; }); }
+export function clear() {
+  Blockly.Events.setRecordUndo(false);
+  workspace.clear();
+  Blockly.Events.setRecordUndo(true);
+  workspace.clearUndo();
+  refresh();
+}
+
 /** Undo, once what was just done has been noted: Blockly notes it a frame later. */
 export const undo = (/** @type {boolean} */ redo) => noted(() => workspace.undo(redo));
-function noted(/** @type {() => void} */ act) { requestAnimationFrame(() => setTimeout(act)); }
+function noted(/** @type {() => void} */ act) { requestAnimationFrame(() => setTimeout(() => { act(); touched = true; soon(); })); }
 export const isEmpty = () => !workspace || workspace.getAllBlocks(false).length === 0;
 
 /** Show only what a mission allows, or everything. @param {string[] | null} types */

@@ -145,7 +145,7 @@ render(html`<${App} />`, document.getElementById("app"));
 connectRobot();
 connect();
 let timer = 0;
-effect(() => { void editor.changes.value; if (editor.changes.peek()) changed(); });
+effect(() => { if (editor.changes.value) untracked(changed); }); // not when another program is shown
 effect(() => { void editor.code.value; void body.value; clearTimeout(timer); timer = window.setTimeout(runner.check, 350); });
 effect(() => { void editor.breaks.value; void runner.textBreaks.value; runner.tellStops(); });
 effect(() => { if (current.value && online.value === "open") open(program.peek().id); });

@@ -6,7 +6,7 @@ import { palette } from "../chart.js";
 import { stateOf, table } from "./blocks.js";
 import * as editor from "./editor.js";
 import { ask, listen, send } from "./link.js";
-import { fresh, program, python, rename } from "./program.js";
+import { changed, fresh, program, python, rename } from "./program.js";
 
 const PATH_MAX = 4000;
 export const missions = signal(/** @type {any[]} */ ([]));
@@ -36,6 +36,7 @@ function begin(m) {
   let top = null;
   for (const { kind, ...state } of states.reverse()) top = { ...state, ...(top ? { next: { block: top } } : {}) };
   if (top) editor.load({ blocks: { languageVersion: 0, blocks: [{ ...top, x: 40, y: 40 }] } });
+  changed();
 }
 
 let calledOff = false; // the trial under way, in this page

@@ -36,6 +36,12 @@ export function restore() {
   if (found.kind === "text") body.value = found.body; else if (found.style) editor.load(found.style);
 }
 
+addEventListener("storage", ({ key, newValue }) => { // another tab of this browser changed it
+  if (key !== PREFIX + program.value.id || !newValue) return;
+  program.value = pick(JSON.parse(newValue));
+  restore();
+});
+
 let timer = 0;
 const versionAt = /** @type {Map<string, number>} */ (new Map()); // by program: when its newest version was kept
 /** Something was changed: keep it in the browser at once, on the robot soon. */
