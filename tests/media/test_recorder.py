@@ -86,6 +86,18 @@ async def test_an_end_at_once_takes_no_robot_time(recorder, lockstep, tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["some.mp4"]
 
 
+async def test_stop_of_a_caller_that_leaves_ends_it(recorder, lockstep, tmp_path, caplog):
+    caplog.set_level("INFO", logger=module.__name__)
+    recorder.start(tmp_path / "a.mp4")
+    writing = recorder._writing
+    stopping = asyncio.ensure_future(recorder.stop())
+    await asyncio.sleep(0)
+    stopping.cancel()
+    await lockstep.advance(1.0)
+    assert writing.done()
+    assert "a recording failed: the camera sent no picture" in caplog.text
+
+
 @pytest.mark.parametrize("where", ["nowhere/a.mp4", "a.mp4"])
 async def test_a_failure_is_reported_and_leaves_nothing(recorder, lockstep, tmp_path, where):
     recorder.start(tmp_path / where)

@@ -101,6 +101,23 @@ async def test_client_that_leaves_ends_the_handler() -> None:
         assert [word async for word in ask(b"still there")] == [b"still", b"there"]
 
 
+async def test_client_gone_before_the_status_is_no_error(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    ended = asyncio.Event()
+
+    async def gone(*_: object) -> None:
+        ended.set()
+        raise cygrpc.ExecuteBatchError("SendStatusFromServerOperation")
+
+    monkeypatch.setattr(last_messages, "_end_call", gone)
+    async with _served() as ask:
+        call = ask(b"one")
+        await ended.wait()
+        call.cancel()
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
 def test_this_grpc_sends_both_together() -> None:
     ending_with_last(_answers, bytes, nullcontext)
     assert getattr(cygrpc, last_messages._STREAM) is last_messages._end

@@ -62,6 +62,7 @@ class Recorder(Component):
         self._begun = asyncio.Event()
         self._viewer = self._video.subscribe()
         self._writing = asyncio.get_running_loop().create_task(self._write(path, self._viewer), name="recorder")
+        self._writing.add_done_callback(_ended)
 
     async def stop(self, *, at_once: bool = False) -> Recording:
         """End the recording and complete its file, with one picture at least, unless ``at_once``.
@@ -73,10 +74,12 @@ class Recorder(Component):
         if writing is None or viewer is None:
             raise Refused("nothing is being recorded")
         self._writing = None
-        if not (writing.done() or at_once):
-            with contextlib.suppress(TimeoutError):
-                await self._clock.wait_for(self._begun.wait(), FIRST_PICTURE_MAX)
-        viewer.close()
+        try:
+            if not (writing.done() or at_once):
+                with contextlib.suppress(TimeoutError):
+                    await self._clock.wait_for(self._begun.wait(), FIRST_PICTURE_MAX)
+        finally:
+            viewer.close()  # also for a caller that does not wait for the end
         try:
             return await asyncio.shield(writing)
         except OSError as error:
@@ -96,6 +99,12 @@ class Recorder(Component):
         finally:
             self._begun.set()  # or there will be none
             file.discard()
+
+
+def _ended(writing: asyncio.Task[Recording]) -> None:
+    """Note a failure, which not everyone who stopped a recording waits to hear."""
+    if not writing.cancelled() and (error := writing.exception()):
+        log.info("a recording failed: %s", error)
 
 
 def _bound(add: Callable[[VideoPacket], None], packet: VideoPacket) -> Callable[[], None]:

@@ -8,6 +8,7 @@ on the wire are the same.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import AbstractContextManager
 from inspect import signature
@@ -18,6 +19,7 @@ from grpc._cython import cygrpc
 
 from roboglot.values import dataclass
 
+log = logging.getLogger(__name__)
 # gRPC's own ends of a call; another version may lack them, or take other parameters.
 _STREAM, _UNARY = "_finish_handler_with_stream_responses", "_finish_handler_with_unary_response"
 _TAKES = {
@@ -77,6 +79,15 @@ async def _end(
     if ended is None:
         await _end_stream(state, handler, request, rpc, loop)
         return
+    try:
+        await _end_together(state, ended, request, rpc, loop)
+    except cygrpc.ExecuteBatchError:
+        log.debug("%s left before its answer was sent", rpc.peer())
+
+
+async def _end_together(
+    state: object, ended: _Ended, request: object, rpc: grpc.aio.ServicerContext, loop: object
+) -> None:
     last = await ended.answers(request, rpc)
     if last is None:
         await _end_stream(state, _nothing, request, rpc, loop)
