@@ -6,7 +6,7 @@ import logging
 from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING
 
-from roboglot.clients.errors import BadAnswer
+from roboglot.clients.errors import BadAnswer, LinkLost
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.linked_base import LATENCY_SMOOTHING
 from roboglot.drivers.slamware.state import ReportedState
@@ -29,6 +29,7 @@ else:
 log = logging.getLogger(__name__)
 JUMP = 0.5  # m or rad between localization and odometry from which the pose counts as set by hand
 ABSENT = (404, 500, 501)  # statuses for features that the robot lacks
+ESSENTIAL, REFUSED_MAX = "odometry", 1.0  # a topic, and s for which a robot that has it may refuse it as if it had not
 NO_ARRAYS = in_words("that", ["numpy"], "slamware")
 ARRAYS = frozenset({"scan", "map"})  # topics whose values are numpy arrays
 
@@ -47,6 +48,7 @@ class TelemetryPoller:
         self._robot, self._client, self._link, self._reported = robot, client, link, reported
         self._clock: Clock = robot.clock
         self._absent: set[str] = set()
+        self._met: set[str] = set()  # topics that were reported once
         self._optional = frozenset(what for what, _, _ in parts)  # bad answers about these do not break the link
         self._has_pack = True
         self._parts: tuple[tuple[str, float, Callable[[], Awaitable[None]]], ...] = (  # period in s
@@ -69,7 +71,7 @@ class TelemetryPoller:
         return what not in self._absent
 
     async def once(self) -> None:
-        """Poll everything once. Topics that the robot lacks are not polled again."""
+        """Poll everything once. Topics that the robot lacks, and never had, are not polled again."""
         self._absent.clear()
         if not is_there("numpy"):
             log.warning("reading %s without scan and map: %s", self._link.address, NO_ARRAYS)
@@ -79,11 +81,12 @@ class TelemetryPoller:
                 continue
             try:
                 await ask()
-                self._link.heard(what)
+                self._hear(what)
             except SlamwareRefused as refused:
                 if refused.code not in ABSENT:
                     raise
-                self._absent.add(what)
+                if what not in self._met:  # else its part of the robot is still starting
+                    self._absent.add(what)
             except BadAnswer as error:
                 if what not in self._optional:
                     raise
@@ -96,15 +99,23 @@ class TelemetryPoller:
         await together(*(self._keep_polling(*part) for part in parts))
 
     async def _keep_polling(self, what: str, period: float, ask: Callable[[], Awaitable[None]]) -> None:
+        heard = self._clock.time()
         async for _ in self._clock.every(period):
             try:
                 await ask()
-                self._link.heard(what)
+                self._hear(what)
+                heard = self._clock.time()
             except BadAnswer:
                 if what not in self._optional:
                     raise
-            except SlamwareRefused:
-                continue  # the robot sleeps or loads a map; the age of the data shows that
+            except SlamwareRefused as refused:  # the robot sleeps or loads a map; the age of the data shows that
+                is_broken = refused.code in (*ABSENT, 502, 503, 504)
+                if what == ESSENTIAL and is_broken and self._clock.time() - heard > REFUSED_MAX:
+                    raise LinkLost(f"the robot no longer reports its {what}: {refused}") from None
+
+    def _hear(self, what: str) -> None:
+        self._link.heard(what)
+        self._met.add(what)
 
     async def _odometry(self) -> None:
         asked = self._clock.time()
