@@ -31,9 +31,10 @@ COVERED_OR_CUT = """() => {
         const top = document.elementFromPoint(x, y);
         let pane = e.parentElement;
         while (pane && !/auto|scroll/.test(getComputedStyle(pane).overflowY)) pane = pane.parentElement;
-        if (!e.checkVisibility() || b.width < 2 || !top) continue;
+        if (!e.checkVisibility() || b.width < 2) continue;
         const shown = pane?.getBoundingClientRect();
         if (shown && (y < shown.top || y > shown.bottom)) continue; // scrolled away
+        if (!top) { if (!e.closest('.unseen')) blame('beyond', e); continue; }
         if (!e.contains(top) && !top.contains(e) && !top.closest('label')) blame('covered', e);
         const room = e.clientWidth - parseFloat(getComputedStyle(e).paddingLeft);
         if (e.matches('select') && width(e, e.selectedOptions[0]?.text ?? '') > room) blame('cut', e);
@@ -41,6 +42,16 @@ COVERED_OR_CUT = """() => {
     }
     return bad;
 }"""
+
+
+@pytest.mark.parametrize("size", [(844, 390), (640, 400)], ids=["phone on its side", "twice as large"])
+async def test_low_screens_show_everything(size: tuple[int, int], served: Served, open_console: OpenConsole) -> None:
+    page = await open_console(viewport={"width": size[0], "height": size[1]})
+    for view in ("live", "wire", "world", "robots", "class"):
+        await page.evaluate(f"location.hash = '#/{view}'")
+        await page.wait_for_selector(f"nav a[href='#/{view}'][aria-current=page]")
+        await page.wait_for_selector("main > :not(.empty)")
+        assert await page.evaluate(COVERED_OR_CUT) == [], view
 
 
 async def test_phone_shows_and_can_touch_everything(served: Served, open_console: OpenConsole) -> None:
