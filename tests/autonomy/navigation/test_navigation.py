@@ -17,7 +17,7 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, InvalidGoal, NotLocalized, Unreachable
 from roboglot.model.events import ActionChanged, LocalizationLost, LocalizationRecovered
-from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.model.maps import OccupancyGrid
 from roboglot.testing import assert_pose
 from tests.narrowing import of_kind
@@ -225,6 +225,21 @@ async def test_lost_robot_stops_and_goes_on_when_found(tour: Tour) -> None:
     assert isinstance(news[0], LocalizationLost)
     assert isinstance(news[-1], LocalizationRecovered)
     assert tour.error[0] < 0.05
+
+
+@pytest.mark.world("office")
+@pytest.mark.parametrize(("x", "y", "deg"), [(13.0, 6.6, -60.0), (12.0, 6.5, -60.0)])
+async def test_robot_carried_while_it_turns_at_the_goal_does_not_succeed_there(
+    tour: Tour, x: float, y: float, deg: float
+) -> None:
+    await tour.go((12.0, 9.8))
+    drive = tour.head_for((12.0, 6.5), deg=90)
+    goal = Pose(12.0, 6.5, math.radians(90.0))
+    await tour.until(lambda: tour.truth.distance_to(goal) < 0.03 and abs(tour.truth.yaw - goal.yaw) < 0.2)
+    tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
+    await tour.end_of(drive)
+    turned = abs(math.degrees(wrap_angle(tour.truth.yaw - goal.yaw)))
+    assert drive.status is ActionStatus.ABORTED or (tour.truth.distance_to(goal) < 0.05 and turned < 2.0)
 
 
 @pytest.mark.slow  # long; in short: test_it_gives_up_after_half_a_minute

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from roboglot.autonomy.slam.belief import SURE
 from roboglot.autonomy.slam.localization import LidarLocalization
+from roboglot.autonomy.slam.matcher import Match
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.mapping.localization import Localization, Region
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.errors import InvalidGoal, NotLocalized
-from roboglot.model.events import LocalizationLost, LocalizationRecovered, PoseJumped
+from roboglot.model.events import LocalizationLost, LocalizationRecovered, LostReason, PoseJumped, RecoveryMeans
 from roboglot.model.geometry import Pose
 from tests.narrowing import known, of_kind
 
@@ -95,6 +97,33 @@ async def test_a_kidnapped_robot_says_so_and_recovers(tour: Tour) -> None:
         assert tour.error[0] < 0.05
         assert int((tour.robot[Mapping].grid.log_odds > 0).sum()) < walls + 150  # a scan at a wrong place scores 250
         news.clear()
+
+
+@pytest.mark.world("empty")
+async def test_place_found_everywhere_replaces_a_half_fitting_one(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
+    await tour.go((2.0, 5.0))  # its dock would tell it the place
+    estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
+    found = Match(Pose(3.0, 2.0, 1.0), np.diag(SURE), 0.0, 100, 100, 100)
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [found])
+    estimator.whereabouts.lose(LostReason.NO_FIT, tour.clock.time())  # the believed place still fits
+    news: list[LocalizationRecovered] = []
+    tour.robot.events.listen(LocalizationRecovered, news.append)
+    for _ in range(20):
+        await tour.clock.advance(0.02)
+        if news:
+            break
+    assert news[0].means is RecoveryMeans.WHOLE_MAP
+    assert tour.robot[Localization].pose.distance_to(found.pose) < 0.01
+
+
+@pytest.mark.world("empty")
+async def test_a_lost_robot_keeps_saying_that_several_places_look_alike(tour: Tour) -> None:
+    await tour.go((8.5, 5.0))
+    tour.world.hands.place("a", Pose(5.6, 5.0))
+    await tour.clock.advance(4.0)
+    for _ in range(15):
+        assert tour.robot[Localization].lost is LostReason.AMBIGUOUS
+        await tour.clock.advance(0.1)
 
 
 @pytest.mark.world("office")

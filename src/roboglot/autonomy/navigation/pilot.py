@@ -222,16 +222,17 @@ class Pilot:
         return Twist(speed * math.cos(bearing), speed * math.sin(bearing), follower.turn(error))
 
     async def _arrive(self, follower: Follower) -> State:
-        """Check the final place once the pose is certain: accept it, try again, or raise Blocked."""
+        """Check the final pose once it is certain: accept it, try again, or raise Blocked."""
         await self._patience.be_certain()
-        pose, goal, tolerance = self._belief.pose, self._goal.points[-1], self._goal.options.tolerance
-        good = self._tuning.good
-        if pose.distance_to(follower.end) <= good or pose.distance_to(goal) <= max(good, tolerance / 2):
+        pose, goal, options = self._belief.pose, self._goal.points[-1], self._goal.options
+        good, tolerance = self._tuning.good, options.tolerance
+        faces = options.yaw is None or abs(wrap_angle(options.yaw - pose.yaw)) <= self._tuning.good_yaw
+        if faces and (pose.distance_to(follower.end) <= good or pose.distance_to(goal) <= max(good, tolerance / 2)):
             return State.DONE
         self._tries_left -= 1
         if self._tries_left > 0:
             return State.FOLLOWING
-        if pose.distance_to(goal) > tolerance:
+        if not faces or pose.distance_to(goal) > tolerance:
             raise Blocked("cannot settle on the goal")
         return State.DONE
 

@@ -38,7 +38,7 @@ class Belief:
     closing_loops: bool = True
     lost: LostReason | None = None  # why the pose in the map is unknown
     confirmed: bool = True  # whether scans have confirmed a pose that was set, or found after a displacement
-    contradicted: bool = False  # whether odometry contradicts the newest scan, and is believed
+    contradicted: bool = False  # whether the map, or odometry that is believed, contradicts the newest scan
     search: bool = False  # match the next scan in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map

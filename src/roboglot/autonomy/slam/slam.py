@@ -190,8 +190,9 @@ class Slam:
         self._matched_odometry, self._matched_at = odometry, event.stamp
         self._way += way
         belief.covariance = self.odometry.spread(belief.covariance, way, turn, moved, seconds)
+        searches = False
         if belief.map.scans:
-            self._correct(scan, odometry, event.stamp, moved, seconds)
+            searches = self._correct(scan, odometry, event.stamp, moved, seconds)
         else:
             belief.quality = self._agreement = self._known = 1.0  # the first scan defines the map
             self.whereabouts.begin()
@@ -202,6 +203,8 @@ class Slam:
         sure = self._may_add and self._agreement >= TRUSTED and self._known > NEW_GROUND
         self._excursions.take(scan, odometry, self._step, turn, sure=sure)
         self._trajectory.follow(event.stamp, odometry, self._loops.anchor, drives=way >= STILL or turn >= STILL_YAW)
+        if searches:  # last, as in lockstep the result is there at once, and nothing above may replace it
+            self._look_everywhere(scan, odometry, event.stamp)
 
     @property
     def _is_unsure(self) -> bool:
@@ -216,8 +219,10 @@ class Slam:
             belief.move_to(stayed or before, odometry)
         return self._slip.slips and belief.localizing
 
-    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, moved: Pose | None, seconds: float) -> None:
+    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, moved: Pose | None, seconds: float) -> bool:
         """Match the scan, judge the fit, and move the belief if localization is enabled.
+
+        Return whether to search the whole map.
 
         ``moved``: odometry's step (in the last base_link) in the ``seconds`` since the last match; None if unusable.
         """
@@ -242,10 +247,10 @@ class Slam:
         belief.search = False
         if not belief.localizing:
             self._witness.forget()
-            return
-        self._judge(best, scan, odometry, stamp, usual)
+            return False
+        searches = self._judge(best, scan, stamp, usual)
         if best.fit < POINTS_MIN or best.agreement < AGREEMENT_MIN:
-            return
+            return searches
         shoved = self._check_displaced(before, best, prior, stamp)
         if shoved is None and driven is None and _is_sure(best):
             moved = moved if belief.lost is None else None
@@ -257,6 +262,7 @@ class Slam:
             self._doubt(shoved, stamp)
         if best.pose.distance_to(before) > JUMP or abs(wrap_angle(best.pose.yaw - before.yaw)) > JUMP_YAW:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
+        return searches
 
     def _contested(self, best: Match, scan: ScanPoints, before: Pose, prior: NDArray[np.float64]) -> Match | None:
         """Return the pose by odometry while moving things mislead the match, else None."""
@@ -282,24 +288,25 @@ class Slam:
         self.whereabouts.be_displaced(stamp)
         self._robot.events.publish(RobotDisplaced(stamp=stamp, distance=shoved))
 
-    def _judge(self, best: Match, scan: ScanPoints, odometry: Pose, stamp: float, usual: float) -> None:
-        """Judge the pose by the map's support; search everywhere if the scan fits worse than ``usual``."""
+    def _judge(self, best: Match, scan: ScanPoints, stamp: float, usual: float) -> bool:
+        """Judge the pose by the map's support; return whether to search everywhere: lost, or worse than ``usual``."""
         belief = self._belief
         if best.agreement < SURE_QUALITY or best.known < KNOWN_SURE * best.points or self._is_unsure:
             self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
         else:
             self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
         fell = best.agreement < DOUBT_SHARE * usual and best.known >= KNOWN_SURE * best.points
-        if (belief.lost is not None or fell) and not self._looking and stamp - self._looked_at >= LOST_PERIOD:
-            self._look_everywhere(scan, odometry, stamp, best.agreement)
+        return (belief.lost is not None or fell) and not self._looking and stamp - self._looked_at >= LOST_PERIOD
 
-    def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float, agreement: float) -> None:
+    def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
         """Search the whole map for the place of ``scan``; a known place is given up only for a much better one."""
-        belief, grid = self._belief, self._belief.map
+        belief, grid, agreement = self._belief, self._belief.map, self._agreement
         self._looked_at, self._looking = stamp, True
 
         def then(found: list[Match]) -> None:
             self._looking = False
+            if belief.lost is LostReason.AMBIGUOUS:
+                belief.lost = LostReason.NO_FIT
             if not found or belief.map is not grid or not belief.localizing or self._given_at > stamp:
                 return
             near = found[0].pose.distance_to(belief.map_to_odom.compose(odometry)) < NEAR

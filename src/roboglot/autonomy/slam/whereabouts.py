@@ -66,9 +66,10 @@ class Whereabouts:
         if denied:
             self._doubted_at = min(self._doubted_at, stamp)
             self._doubts += 1
-            self.sure = False
+            self.sure, self._belief.contradicted = False, True
             if self._doubts >= DOUBTS_MAX and stamp - self._doubted_at >= DOUBT_SECONDS:
-                self.lose(LostReason.NO_FIT, stamp)
+                ambiguous = self._belief.lost is LostReason.AMBIGUOUS
+                self.lose(LostReason.AMBIGUOUS if ambiguous else LostReason.NO_FIT, stamp)
             return
         self._doubts, self._doubted_at = 0, math.inf
         new_ground = judged < DENIED_SHARE * support.points
