@@ -2,9 +2,11 @@
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 import venv
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +16,7 @@ from urllib.parse import unquote, urlsplit
 import bootstrap
 import locks
 import pytest
+import setuptools_scm
 
 ROOT = Path(__file__).resolve().parent.parent
 WHEEL = b"not really a wheel"
@@ -212,3 +215,23 @@ def test_a_pin_without_a_hash_is_reported(locked: Path) -> None:
 def test_the_mark_is_written_once() -> None:
     once = locks.marked("a==1\n", "00")
     assert locks.marked(once, "11") == once.replace("00", "11")
+
+
+# --- the version
+
+
+@pytest.mark.parametrize(
+    ("described", "version"),
+    [("", "0.3.dev0"), ("v1.2.3", "1.2.3"), ("v1.2.3-4-g6b36cc8", "1.2.4.dev4")],
+)
+def test_archive_has_a_version_of_its_tag_or_the_fallback(tmp_path: Path, described: str, version: str) -> None:
+    """``git archive`` and *Download ZIP* fill in .git_archival.txt, without a tag with an empty description."""
+    (tmp_path / "pyproject.toml").write_bytes((ROOT / "pyproject.toml").read_bytes())
+    text = (ROOT / ".git_archival.txt").read_text()
+    node, date = "6b36cc855c1ff38b571e639def122cd3589fa27a", "2026-11-27T23:36:10+00:00"
+    text = text.replace("$Format:%H$", node).replace("$Format:%cI$", date)
+    (tmp_path / ".git_archival.txt").write_text(re.sub(r"\$Format:%\(describe.*\$", described, text))
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools_scm"]
+    fallback, local = settings["fallback_version"], settings["local_scheme"]
+    found = setuptools_scm.get_version(str(tmp_path), fallback_version=fallback, local_scheme=local)
+    assert found == version
