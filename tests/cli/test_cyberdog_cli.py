@@ -58,6 +58,13 @@ def test_a_photo_is_left_here(run: Run, tmp_path: Path) -> None:
     assert (tmp_path / "door.jpg").read_bytes()[:2] == b"\xff\xd8"
 
 
+def test_photo_that_cannot_be_written_is_not_taken(run: Run, tmp_path: Path) -> None:
+    for name in (str(tmp_path), str(tmp_path / "absent" / "a.jpg")):
+        failed = run("photo", name)
+        assert failed.returncode == 1
+        assert failed.stderr.startswith("roboglot cyberdog: cannot write ")
+
+
 def test_go_tells_the_way_and_map_saves(run: Run) -> None:
     went = run("go", "0.6", "0.0")
     assert "308 arrived" in went.stdout
@@ -67,7 +74,16 @@ def test_go_tells_the_way_and_map_saves(run: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [["fly"], ["go", "1"], ["drive"], ["drive", "nan", "0", "0", "1"], ["status", "--certs", "/nowhere"]]
+    "words",
+    [
+        ["fly"],
+        ["go", "1"],
+        ["drive"],
+        ["drive", "nan", "0", "0", "1"],
+        ["drive", "0.1", "0", "0", "-1"],
+        ["record", "0"],
+        ["status", "--certs", "/nowhere"],
+    ],
 )
 def test_mistakes_are_reported_in_a_line(run: Run, words: list[str]) -> None:
     failed = run(*words)

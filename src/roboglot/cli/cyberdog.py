@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import os
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -130,6 +131,7 @@ async def _stop(client: CyberDogClient, _: list[str]) -> None:
 
 async def _drive(client: CyberDogClient, words: list[str]) -> None:
     x, y, yaw, seconds = _numbers(words, 4, 4)
+    _check_seconds(seconds)
     async with client.servo(Motion.TROT_MEDIUM) as joystick:
         joystick.set(x, y, yaw)
         await client.clock.sleep(seconds)
@@ -184,17 +186,33 @@ async def _charge(client: CyberDogClient, _: list[str]) -> None:
 
 
 async def _photo(client: CyberDogClient, words: list[str]) -> None:
+    name = _writable(words[:1])
     photo = await client.photo()
-    _keep(photo.data, words[0] if words else photo.name)
+    _keep(photo.data, name or photo.name)
 
 
 async def _record(client: CyberDogClient, words: list[str]) -> None:
     (seconds,) = _numbers(words[:1], 1, 1)
+    _check_seconds(seconds)
+    name = _writable(words[1:2])
     await client.found()  # a dog still looking for its previous app would end the recording
     await client.record()
     await client.clock.sleep(seconds)
     film = await client.stop_recording()
-    _keep(film.data, words[1] if len(words) > 1 else film.name)
+    _keep(film.data, name or film.name)
+
+
+def _check_seconds(seconds: float) -> None:
+    if seconds <= 0.0:
+        raise ValueError(f"SECONDS is above 0, not {seconds:g}")
+
+
+def _writable(words: list[str]) -> str:
+    """Return the file's name, if one is given. Raises OSError: the robot deletes what it has sent."""
+    for name in words:
+        if Path(name).is_dir() or not os.access(Path(name).parent, os.W_OK):
+            raise OSError(f"cannot write {name}")
+    return "".join(words)
 
 
 def _keep(data: bytes, name: str) -> None:
