@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from unittest.mock import MagicMock
@@ -55,8 +55,9 @@ def trial(seed: int, fingerprint: str = "f") -> Trial:
 def begin(folder: Path, *options: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-u", "-m", "roboglot", "campaign", "scenarios", "--workers", "2", *options]
     pipe = subprocess.PIPE
+    environment = os.environ | {"TMPDIR": str(folder / "tmp")}
     return subprocess.Popen(
-        command, cwd=folder, stdout=pipe, stderr=subprocess.STDOUT, text=True, start_new_session=True
+        command, cwd=folder, stdout=pipe, stderr=subprocess.STDOUT, text=True, start_new_session=True, env=environment
     )
 
 
@@ -75,9 +76,12 @@ def rows(folder: Path) -> Sequence[dict[str, str]]:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """A folder with scenarios and temporary files, of which none may be left."""
     (tmp_path / "scenarios").mkdir()
-    return tmp_path
+    (tmp_path / "tmp").mkdir()
+    yield tmp_path
+    assert list((tmp_path / "tmp").glob("roboglot-*")) == []
 
 
 def test_trials_are_all_tabulated_and_never_played_twice(folder: Path) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import shutil
 import signal
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -35,6 +37,7 @@ class _Running:
     process: BaseProcess
     ear: Connection
     deadline: float
+    scratch: str  # its folder for temporary files, which it cannot delete itself if it dies
 
 
 def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: Leave, ended: Ended) -> None:
@@ -50,10 +53,11 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
 
     def start(trial: Trial, attempt: int) -> None:
         ear, mouth = context.Pipe(duplex=False)
-        process = context.Process(target=_play, args=(trial, leave(trial), mouth), daemon=False)
+        scratch = tempfile.mkdtemp(prefix="roboglot-trial-")
+        process = context.Process(target=_play, args=(trial, leave(trial), scratch, mouth), daemon=False)
         process.start()
         mouth.close()
-        running.append(_Running(trial, attempt, process, ear, _now() + seconds_max))
+        running.append(_Running(trial, attempt, process, ear, _now() + seconds_max, scratch))
 
     with interruptions() as interrupted:
         try:
@@ -75,7 +79,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
             for one in running:
                 one.process.terminate()  # all at once
             for one in running:
-                _end(one.process)
+                _end(one)
     raise KeyboardInterrupt
 
 
@@ -119,11 +123,12 @@ def _result(one: _Running, seconds_max: float) -> Result:
         return Result(Outcome.CRASHED, f"its process ended with {one.process.exitcode}")
     finally:
         one.ear.close()
-        _end(one.process)
+        _end(one)
 
 
-def _end(process: BaseProcess) -> None:
-    """Terminate the process, so that it can end its children; then kill its whole group."""
+def _end(one: _Running) -> None:
+    """Terminate the process, so that it can end its children; then kill its group, and delete its temporary files."""
+    process = one.process
     process.terminate()
     process.join(END_SECONDS_MAX)
     if process.pid is not None:
@@ -131,17 +136,22 @@ def _end(process: BaseProcess) -> None:
             os.killpg(process.pid, signal.SIGKILL)
     process.kill()
     process.join()
+    shutil.rmtree(one.scratch, ignore_errors=True)
 
 
-def _play(trial: Trial, leave: Path | None, mouth: Connection) -> None:
+def _play(trial: Trial, leave: Path | None, scratch: str, mouth: Connection) -> None:
     """Play in the forked process, in its own group, so that Ctrl-C reaches the campaign alone; it ends with that."""
     os.setpgid(0, 0)
+    tempfile.tempdir = os.environ["TMPDIR"] = scratch
     signal.signal(signal.SIGINT, signal.default_int_handler)  # for the commands of its scenario
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_campaign, daemon=True).start()
-    mouth.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
-    mouth.close()
+    try:
+        mouth.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
+        mouth.close()
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)  # the campaign may have been killed
 
 
 def _end_with_campaign() -> None:
