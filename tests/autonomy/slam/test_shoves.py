@@ -10,7 +10,7 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
-from roboglot.model.errors import Blocked
+from roboglot.model.errors import Blocked, NotLocalized
 from roboglot.model.events import PoseConfirmed, RobotDisplaced
 from roboglot.model.geometry import Pose, Vector3
 
@@ -69,6 +69,18 @@ async def test_move_with_a_shove_does_not_succeed(tour: Tour) -> None:
     await tour.end_of(action)
     assert isinstance(action.error, Blocked)
     assert "displaced" in action.reason
+
+
+@pytest.mark.world("office")
+@pytest.mark.parametrize("carried", [Pose(0.0, 0.0, 0.6), Pose(0.0, -2.0, 1.5)], ids=["turned", "far"])
+async def test_move_of_a_carried_robot_does_not_succeed(tour: Tour, carried: Pose) -> None:
+    await tour.clock.advance(3.0)
+    action = tour.robot[Driving].move_by(Pose(2.0), speed=0.4)
+    await tour.clock.advance(1.5)
+    pose = tour.truth
+    tour.world.hands.place("a", Pose(pose.x + carried.x, pose.y + carried.y, pose.yaw + carried.yaw))
+    await tour.end_of(action)
+    assert isinstance(action.error, NotLocalized), action.reason
 
 
 @pytest.mark.world("office")

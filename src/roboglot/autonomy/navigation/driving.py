@@ -20,8 +20,8 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.errors import Blocked, InvalidGoal
-from roboglot.model.events import RobotDisplaced
+from roboglot.model.errors import Blocked, InvalidGoal, NotLocalized
+from roboglot.model.events import LocalizationLost, LostReason, RobotDisplaced
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
@@ -138,7 +138,14 @@ class OdometryDriving(Driving):
 
         async def run(action: Action) -> None:
             moving.begun = True
-            await self.move(action, offset, top, top_yaw, moving)
+            lost: list[LocalizationLost] = []
+            stop = self._robot.events.listen(LocalizationLost, lost.append)
+            try:
+                await self.move(action, offset, top, top_yaw, moving)
+            finally:
+                stop()
+            if any(event.reason is LostReason.NO_FIT for event in lost):
+                raise NotLocalized("the scans no longer fit the map: something may have moved the robot")
 
         moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source)
         if before is not None:  # it was cancelled just now and stops nothing
