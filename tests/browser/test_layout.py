@@ -69,6 +69,9 @@ async def test_phone_shows_and_can_touch_everything(served: Served, open_console
         stop = await page.locator(".stop").bounding_box()
         assert stop["x"] + stop["width"] <= 360
         assert await page.evaluate(SMALL_TARGETS) == [], view
+        if view == "robots":
+            await page.evaluate("document.querySelector('.tile h2').firstChild.data = 'robot_of_a_class_'.repeat(5)")
+            assert await page.evaluate(COVERED_OR_CUT) == []
 
 
 @pytest.mark.parametrize("theme", ["dark", pytest.param("light", marks=pytest.mark.slow)])

@@ -13,6 +13,9 @@ from pathlib import Path
 import pytest
 
 from roboglot.console.assets import FOLDER, Assets
+from roboglot.model.components.system.lease import OUTSIDE, TAKEN
+from roboglot.model.components.system.link import FAULT as LINK_LOST
+from roboglot.simulation.components.system.health_monitor import WATCHES
 from roboglot.simulation.faults.fault_kinds import KINDS
 
 OWN = [path for path in FOLDER.rglob("*") if path.suffix in (".js", ".css", ".html") and "vendor" not in path.parts]
@@ -42,6 +45,11 @@ def test_every_key_of_the_pages_has_words() -> None:
     assert sorted(set(_KEY.findall(code)) - set(WORDS["en"])) == []
     for prefix in set(_COMPUTED.findall(code)):
         assert any(key.startswith(prefix) for key in WORDS["en"]), prefix
+
+
+def test_names_of_present_faults_have_words_in_both_languages() -> None:
+    wanted = {f"robot.{name}" for name in (LINK_LOST, TAKEN, OUTSIDE, *(watch.name for watch in WATCHES))}
+    assert [sorted(wanted - set(WORDS[language])) for language in ("en", "zh")] == [[], []]
 
 
 def test_faults_and_options_have_words_in_both_languages() -> None:

@@ -79,7 +79,7 @@ async function runNow(step) {
     if (saved?.feedback.state) {
       phase.value = "idle";
       await check();
-      say(t("studio.wrong", { why: problems.value.length ? words(problems.value[0]) : saved.feedback.describe }), true);
+      say(problems.value.length ? t("studio.wrong", { why: words(problems.value[0]) }) : t("refused", { why: saved.feedback.describe }), true);
       return undefined;
     }
     const held = known && early ? early : await debug(stops(step)); // of a program that was not there nothing is known
