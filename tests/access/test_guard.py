@@ -24,7 +24,7 @@ from roboglot.access.secrets import password_fits
 from roboglot.access.store import AccessStore, Grant, open_store
 from roboglot.access.trail import FILE, BrokenChain, Entry, open_trail
 from roboglot.config import AccessConfig
-from roboglot.model.admission import Proof, ProofKind, Unknown
+from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Unknown
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.lease import Lease
 from roboglot.operations import Right
@@ -75,6 +75,16 @@ async def test_only_known_tokens_and_passwords_let_in(runtime: Runtime, store: A
     store.rotate("anna", "better horse")
     guard_of(runtime).reload()
     assert await status(("anna", "correct horse")) == 401
+
+
+async def test_address_is_allowed_in_each_of_its_forms(runtime: Runtime, store: AccessStore) -> None:
+    for given, peers in (
+        ("::ffff:127.0.95.77", ["127.0.95.77:4242", "[::ffff:127.0.95.77]:4242", "ipv6:%5B::ffff:127.0.95.77%5D:4242"]),
+        ("2001:DB8:0::7", ["[2001:db8::7]:4242"]),
+    ):
+        name = store.allow(given, [Grant("a", SEE)])
+        guard_of(runtime).reload()
+        assert [guard_of(runtime).known(peer, NO_PROOF) for peer in peers] == [name] * len(peers)
 
 
 async def test_guessing_is_stopped_and_costs_nothing(

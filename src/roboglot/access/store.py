@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from enum import StrEnum
-from ipaddress import ip_address
+from ipaddress import IPv6Address, ip_address
 from pathlib import Path
 
 from roboglot.access.rights import ALL_ROBOTS, parse_rights, write_rights
@@ -123,7 +123,9 @@ class AccessStore:
 
     def allow(self, address: str, grants: Iterable[Grant]) -> str:
         """Allow all clients from an address; return the address as stored."""
-        name = str(ip_address(address))
+        given = ip_address(address)
+        mapped = given.ipv4_mapped if isinstance(given, IPv6Address) else None
+        name = str(mapped or given)  # as ``host_of`` has it
         self.put(Identity(name, IdentityKind.ADDRESS, "", None, tuple(grants)))
         return name
 
