@@ -126,6 +126,27 @@ async def test_stops_in_time_reports_truthfully_and_comes_back(
         await succeeds(driven)
 
 
+@pytest.mark.parametrize("back", ["slamware", "cyberdog"])
+async def test_another_robot_is_not_taken_for_this_one(
+    back: str, way: Rig, robot: Robot, connect: Connect, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Places of this one would be deleted as if it had, and its commands were for elsewhere."""
+    async with connect() as driven:
+        clock, link, own = driven.clock, driven[Link], robot.description
+        await way.stop()
+        await until(clock, lambda: link.state is LinkState.LOST, 5)
+        robot.description = replace(own, serial="f" * 32)
+        await way.start()
+        await until(clock, lambda: "another robot answers" in link.reason, 20)
+        assert link.state is LinkState.LOST
+        assert f"cannot reach {link.address} yet: another robot answers now, " in caplog.text
+        await refused(driven)
+        await way.stop()
+        robot.description = own
+        await way.start()
+        await until(clock, lambda: link.state is LinkState.UP)
+
+
 @pytest.mark.parametrize("back", ["cyberdog"])
 async def test_new_certificates_are_used_at_once(back: str, way: Rig, connect: Connect, world: World) -> None:
     async with connect() as driven:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+from roboglot.clients.errors import LinkLost
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link
@@ -23,6 +24,13 @@ class Driver(ABC):
         self.link = robot.add(Link, Link(address, robot.clock, robot.events, health))
         self.supervisor = Supervisor(self.link, robot.clock, self.begin, self.serve)
         self.supervisor.touches = touches
+        self._serial = ""
+
+    def recognise(self, serial: str) -> None:
+        """Remember the robot that answers. Raises LinkLost for another one, whose map and places are not this one's."""
+        if serial and self._serial not in ("", serial):
+            raise LinkLost(f"another robot answers now, {serial} instead of {self._serial}: restart to drive that one")
+        self._serial = serial or self._serial
 
     async def start(self, *, wait: bool) -> None:
         """Connect, and keep trying. ``wait``: return after the first attempt. Never raises for an unreachable robot."""

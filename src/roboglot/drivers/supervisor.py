@@ -123,11 +123,11 @@ class Supervisor:
                 reason = "internal error of the driver"
             if self.link.state is LinkState.UP:
                 log.warning("lost %s: %s", self.link.address, reason)
+            elif reason != self.link.reason:
+                log.warning("cannot reach %s yet: %s", self.link.address, reason)
             if self._clock.time() - up_since >= STEADY:
                 pause = PAUSE_MIN
             first = self.link.state is LinkState.CONNECTING
-            if first and not self._first.is_set():
-                log.warning("cannot reach %s yet: %s", self.link.address, reason)
             self.link.move_to(LinkState.CONNECTING if first else LinkState.LOST, reason)
             self._first.set()
             await self._clock.sleep(pause)

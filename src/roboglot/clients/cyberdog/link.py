@@ -118,6 +118,7 @@ class DogLink:
         name = f"[{self._host}]" if ":" in self._host else self._host
         options = [*client_options(ROBOT_NAME), ("grpc.max_reconnect_backoff_ms", REDIAL_MAX)]
         where, proof = f"{name}:{self._port}", self._certificates
+        self.heartbeat = None  # one from before the link was lost may be another robot's
         with prompt_wakes():
             if proof:
                 credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)

@@ -134,6 +134,7 @@ class CyberDogDriver(Driver):
             self._open = True
         try:
             beat = await self._client.found(FOUND_SECONDS)
+            self.recognise(beat.serial)
         except ClientError:
             await self._client.link.close()
             self._open = False

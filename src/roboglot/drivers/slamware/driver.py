@@ -82,6 +82,7 @@ class SlamwareDriver(Driver):
 
     async def begin(self) -> None:
         plate = await self._client.get_robot_info()
+        self.recognise(plate.device_id)
         self.robot.description = replace(
             self.robot.description,
             maker=plate.manufacturer_name,
