@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 
 import pytest
 
@@ -206,3 +207,31 @@ async def test_the_electronic_skin_shows_what_the_app_tells(client, robot) -> No
 async def test_a_robot_without_electronic_skin(client) -> None:
     assert await client.ask(11001, {"data": True}) == {"error_code": 322}
     assert await client.ask(11002, {"mode": 1, "wave_cycle_time": 0}) == {"error_code": 322}
+
+
+NOES: tuple[tuple[int, dict[str, object]], ...] = (
+    (1020, {"member": ""}),
+    (1021, {"account": "nobody"}),
+    (1022, {"member": "nobody"}),
+    (1024, {"pre_name": "nobody", "new_name": "a"}),
+    (5004, {"md5": "00"}),
+    (6010, {"type": 5}),
+    (7001, {"command": 1}),
+    (7001, {"command": 2, "username": "a"}),
+    (7001, {"command": 4, "username": "nobody"}),
+    (7001, {"command": 9}),
+    (7002, {"command": 9}),
+    (8002, {}),
+    (8009, {}),
+    (9030, {"httplink": ""}),
+    (10004, {"data": "production"}),
+)
+
+
+async def test_each_refusal_has_its_reason_in_the_log(client, caplog) -> None:
+    caplog.set_level(logging.INFO)
+    for code, params in NOES:
+        caplog.clear()
+        await client.ask(code, params)
+        lines = [record.message for record in caplog.records if record.message.startswith(f"{code}: ")]
+        assert [line for line in lines if line != f"{code}: "], (code, params)

@@ -134,7 +134,9 @@ async def _answered(call: Call) -> object | None:
 
 
 def _logged(call: Call, last: object) -> object:
-    """Log the reason if the answer is a refusal; return the answer."""
+    """Log the reason if the answer is a refusal, which may carry it; return the answer."""
+    if not call.why and isinstance(last, dict) and last.get("success") is False:
+        call.why = str(last.get("message", ""))
     if call.why:
         log.info("%d: %s", call.code, call.why)
     return last

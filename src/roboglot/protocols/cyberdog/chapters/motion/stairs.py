@@ -44,7 +44,9 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
     except TimeoutError:
         action.cancel("its start could not be reported")
         return {"error_code": int(InBandError.TIMEOUT)}
-    return {"success": action.feedback in BEGUN}
+    if action.feedback not in BEGUN:
+        return call.refused({"success": False}, action.reason or "no step is seen")
+    return {"success": True}
 
 
 @TABLE.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE, needs=(StairAlignment,))

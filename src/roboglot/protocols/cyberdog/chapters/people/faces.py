@@ -17,6 +17,7 @@ from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.text import Int32
 
 SECONDS_MAX = 300
+BUSY = "a face is being entered, or faces are recognised"
 Seconds = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 
 
@@ -25,34 +26,48 @@ async def enter_face(
     call: Call, *, command: Int32, username: str = "", oriname: str = "", ishost: bool = False
 ) -> dict[str, object]:
     """Enrol (0), cancel (1), confirm (2: no effect), rename (3) or delete (4) a face, or list members with one (5)."""
-    robot, faces = call.context.robot, call.context.faces
+    robot = call.context.robot
     robot[Vision], robot[Members]
     try:
         match command:
-            case 0:
-                return {"result": int(await _begin_entry(call, username, ishost))}
-            case 1:
-                result = FaceResult.DONE if faces.entering else FaceResult.STATE
-                if faces.entering:
-                    faces.stop()
-            case 2:
-                result = FaceResult.DONE if faces.entered and faces.entered == username else FaceResult.STATE
+            case 0 | 1 | 2:
+                return await _enter(call, command, username, ishost)
             case 3:
                 _check_face(robot[Members], oriname)
                 await robot[Members].rename(oriname, username)
-                result = FaceResult.DONE
             case 4:
                 _check_face(robot[Members], username)
                 await robot[Members].set_face(username, None)
-                result = FaceResult.DONE
             case 5:
                 names = [member.name for member in robot[Members].all() if member.face]
                 return {"result": int(FaceResult.DONE), "allfaces": ",".join(names)}
             case _:
-                result = FaceResult.ARGUMENTS
+                return _refused(call, FaceResult.ARGUMENTS, f"there is no command {command}")
     except (NotFound, InvalidGoal) as error:
-        return call.refused({"result": int(FaceResult.ARGUMENTS)}, str(error))
-    return {"result": int(result)}
+        return _refused(call, FaceResult.ARGUMENTS, str(error))
+    return {"result": int(FaceResult.DONE)}
+
+
+async def _enter(call: Call, command: int, name: str, host: bool) -> dict[str, object]:
+    """Begin (0), cancel (1) or confirm (2) the entry of a face."""
+    faces, members = call.context.faces, call.context.robot[Members]
+    if command == 0:
+        if faces.busy:
+            return _refused(call, FaceResult.BUSY, BUSY)
+        if name not in {member.name for member in members.all()}:
+            await members.add(name, host=host)
+        faces.enter(name)
+    elif command == 1:
+        if not faces.entering:
+            return _refused(call, FaceResult.STATE, "no face is being entered")
+        faces.stop()
+    elif not faces.entered or faces.entered != name:
+        return _refused(call, FaceResult.STATE, f"{name!r} is not the face that was entered last")
+    return {"result": int(FaceResult.DONE)}
+
+
+def _refused(call: Call, result: FaceResult, why: str) -> dict[str, object]:
+    return call.refused({"result": int(result)}, why)
 
 
 def _check_face(members: Members, name: str) -> None:
@@ -61,20 +76,10 @@ def _check_face(members: Members, name: str) -> None:
         raise NotFound(f"no face of {name!r} is known")
 
 
-async def _begin_entry(call: Call, name: str, host: bool) -> FaceResult:
-    faces, members = call.context.faces, call.context.robot[Members]
-    if faces.busy:
-        return FaceResult.BUSY
-    if name not in {member.name for member in members.all()}:
-        await members.add(name, host=host)
-    faces.enter(name)
-    return FaceResult.DONE
-
-
 @TABLE.on(Code.RECOGNISE_FACES, right=Right.DRIVE, needs=(Vision,))
 async def recognise_faces(
     call: Call, *, command: Int32, username: str = "", id: Int32 = 0, timeout: Seconds = 60
-) -> dict[str, int]:
+) -> dict[str, object]:
     """Recognise all faces (0) or ``username`` (1) for ``timeout`` s (1 to 300), or stop (2). Reports: push 7004."""
     faces = call.context.faces
     call.context.robot[Vision]
@@ -82,7 +87,9 @@ async def recognise_faces(
         if not faces.entering:
             faces.stop()
         return {"result": int(FaceResult.DONE)}
-    if command not in (0, 1) or faces.busy or (command == 1 and not username):
-        return {"result": int(FaceResult.UNDEFINED)}
+    if command not in (0, 1) or (command == 1 and not username):
+        return _refused(call, FaceResult.UNDEFINED, f"command {command} is none of 0, 1 (which has a username) and 2")
+    if faces.busy:
+        return _refused(call, FaceResult.UNDEFINED, BUSY)
     faces.recognise(username if command == 1 else "", id, max(1, min(SECONDS_MAX, timeout)))
     return {"result": int(FaceResult.DONE)}

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
+
 from roboglot.model.components.interaction.members import Member, Members
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.operations import Right
@@ -18,12 +20,7 @@ from roboglot.wire.cyberdog.codes import AccountCode, Code, PrintState
 @TABLE.on(Code.ADD_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def add_member(call: Call, *, member: str) -> dict[str, int | bool]:
     """Add a member without face and voice; 122 if the name is taken or invalid."""
-    members = call.context.robot[Members]
-    try:
-        await members.add(member)
-    except RobotError:
-        return _done(call.context, AccountCode.DATABASE)
-    return _done(call.context, AccountCode.DONE)
+    return await _changed(call, call.context.robot[Members].add(member))
 
 
 @TABLE.on(Code.FIND_MEMBERS, right=Right.SEE, needs=(Members,))
@@ -34,33 +31,21 @@ async def find_members(call: Call, *, account: str = "") -> dict[str, object]:
         return {"code": int(AccountCode.DONE), "accounts": [_account(call.context, member) for member in members.all()]}
     try:
         found = members.get(account)
-    except NotFound:
-        return {"code": int(AccountCode.UNKNOWN)}
+    except NotFound as error:
+        return call.refused({"code": int(AccountCode.UNKNOWN)}, str(error))
     return {"code": int(AccountCode.DONE), "accounts": [_account(call.context, found)]}
 
 
 @TABLE.on(Code.DELETE_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def delete_member(call: Call, *, member: str) -> dict[str, int | bool]:
     """Delete a member with face and voice."""
-    members = call.context.robot[Members]
-    try:
-        await members.remove(member)
-    except NotFound:
-        return _done(call.context, AccountCode.DATABASE)
-    return _done(call.context, AccountCode.DONE)
+    return await _changed(call, call.context.robot[Members].remove(member))
 
 
 @TABLE.on(Code.RENAME_MEMBER, right=Right.ADMIN, needs=(Members,))
 async def rename_member(call: Call, *, pre_name: str, new_name: str) -> dict[str, int | bool]:
     """Rename a member, who keeps face and voice."""
-    members = call.context.robot[Members]
-    try:
-        await members.rename(pre_name, new_name)
-    except NotFound:
-        return _done(call.context, AccountCode.UNKNOWN)
-    except RobotError:
-        return _done(call.context, AccountCode.DATABASE)
-    return _done(call.context, AccountCode.DONE)
+    return await _changed(call, call.context.robot[Members].rename(pre_name, new_name), AccountCode.UNKNOWN)
 
 
 @TABLE.on(Code.SYNCHRONISE_MEMBERS, right=Right.SEE, needs=(Members,))
@@ -70,9 +55,17 @@ async def synchronise_members(call: Call) -> dict[str, object]:
     return {"code": int(AccountCode.DONE), "accounts": accounts}
 
 
-def _done(context: Context, code: AccountCode) -> dict[str, int | bool]:
-    """Return success or failure in the profile's form."""
-    return {"success": int(code) if context.profile is Profile.ROBOT else code is AccountCode.DONE}
+async def _changed(
+    call: Call, change: Awaitable[object], unknown: AccountCode = AccountCode.DATABASE
+) -> dict[str, int | bool]:
+    """Return whether ``change`` succeeds, in the profile's form; ``unknown``: the code if there is no such member."""
+    numbers = call.context.profile is Profile.ROBOT
+    try:
+        await change
+    except RobotError as error:
+        code = unknown if isinstance(error, NotFound) else AccountCode.DATABASE
+        return call.refused({"success": int(code) if numbers else False}, str(error))
+    return {"success": int(AccountCode.DONE) if numbers else True}
 
 
 def _account(context: Context, member: Member) -> dict[str, object]:

@@ -19,6 +19,7 @@ from roboglot.protocols.cyberdog.chapters.system.updates import (
     BUSY,
     FAILED,
     GOOD,
+    STATE,
     UNDER_WAY,
     WORDS,
     package_of,
@@ -30,6 +31,11 @@ STREAM_MAX = 10_800.0  # s for which one stream stays open for its result
 ID_MAX = 128  # characters of a goal's id
 Id = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)] | Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 NO_TIME = -2  # s
+OBSTACLES = {
+    BUSY: "an update is under way",
+    STATE: "no update is downloaded",
+    ARGUMENTS: "no file of the download has this md5",
+}
 
 
 @TABLE.on(Code.UPDATE_STATUS, right=Right.SEE, needs=(Firmware,))
@@ -52,7 +58,7 @@ async def download_update(call: Call, *, modules: object) -> dict[str, object]:
     try:
         package, digests = package_of(modules)
         if firmware.progress.state in UNDER_WAY:
-            return call.refused({"response": False, "code": BUSY}, "an update is under way")
+            return call.refused({"response": False, "code": BUSY}, OBSTACLES[BUSY])
         call.context.updates.download(package, digests)
     except InvalidGoal as error:
         return call.refused({"response": False, "code": ARGUMENTS}, str(error))
@@ -66,6 +72,8 @@ async def install_update(call: Call, *, md5: str) -> dict[str, object]:
     code = call.context.updates.obstacle(md5)
     if code == GOOD:
         call.context.updates.install()
+    else:
+        call.why = OBSTACLES[code]
     return {"reponse": code == GOOD, "response": code == GOOD, "code": code}
 
 

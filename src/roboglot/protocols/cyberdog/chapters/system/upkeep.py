@@ -34,7 +34,9 @@ async def leave_low_power(call: Call) -> dict[str, object]:
         await clock.wait_for(waking.done(), WAKE_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
-    return {"success": call.context.gaits.state is not MachineState.LOW_POWER}
+    if call.context.gaits.state is MachineState.LOW_POWER:
+        return call.refused({"success": False}, waking.reason or "the charge is too low")
+    return {"success": True}
 
 
 @TABLE.on(Code.AUTOMATIC_LOW_POWER, right=Right.EDIT, needs=(Power,))
@@ -96,12 +98,12 @@ async def unlock(call: Call, *, httplink: str = "") -> dict[str, int]:
     result = UnlockResult.DONE
     try:
         await call.context.robot.clock.wait_for(call.context.robot[Developer].unlock(httplink), UNLOCK_MAX)
-    except InvalidGoal:
-        result = UnlockResult.ARGUMENTS
-    except NotFound:
-        result = UnlockResult.OTHER_ROBOT
-    except (Refused, TimeoutError):
-        result = UnlockResult.NOT_UNLOCKED
+    except InvalidGoal as error:
+        result, call.why = UnlockResult.ARGUMENTS, str(error)
+    except NotFound as error:
+        result, call.why = UnlockResult.OTHER_ROBOT, str(error)
+    except (Refused, TimeoutError) as error:
+        result, call.why = UnlockResult.NOT_UNLOCKED, str(error) or "the link did not answer"
     return {"result": int(result), "unlock_result": int(result)}
 
 
