@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from roboglot.extras import MissingExtra
 from roboglot.recording.reader import read_recording
 from roboglot.testing.server import RobotServer
 from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
@@ -41,6 +42,17 @@ def test_a_dog_calls_its_app_back(cyberdog: Any) -> None:
 
 
 @pytest.mark.world("empty")
+def test_missing_packages_of_doors_have_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With ``roboglot[testing]`` alone, a test with real ports failed with a bare "No module named 'grpc'"."""
+
+    async def start(*_: object) -> None:
+        raise ModuleNotFoundError("No module named 'grpc'", name="grpc")
+
+    monkeypatch.setattr(RobotServer, "_start", start)
+    with pytest.raises(MissingExtra, match=r"grpc, which is not installed: pip install 'roboglot\[up\]'"):
+        RobotServer().start()
+
+
 def test_program_tells_its_blocks_and_what_it_prints(program: Any) -> None:
     run = program.run(PROGRAM)
     assert run.blocks == ["one", "two"]

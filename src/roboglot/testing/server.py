@@ -15,6 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from roboglot.extras import explaining
 from roboglot.testing.addresses import free_addresses, free_port, give_back
 from roboglot.testing.blocking import PATIENCE, Loop
 from roboglot.testing.clients import Clients
@@ -69,7 +70,10 @@ class RobotServer:
         self.close()
 
     def start(self) -> RobotServer:
-        """Start; return when every door answers and the robots are localised. Raises the errors of ``up``."""
+        """Start; return when every door answers and the robots are localised.
+
+        Raises the errors of ``up``, and MissingExtra.
+        """
         configs = self.wanted.configs(free_addresses(len(self.wanted.robots)))
         self.addresses = {robot.name: robot.address for robot in configs}
         self.app_port = free_port()
@@ -79,7 +83,8 @@ class RobotServer:
         self._thread = threading.Thread(target=_serve, args=(loop,), name="roboglot", daemon=True)
         self._thread.start()
         try:
-            self._loop.run(self._start, configs, within=START_SECONDS_MAX)
+            with explaining("a robot's server", "up"):
+                self._loop.run(self._start, configs, within=START_SECONDS_MAX)
         except BaseException:
             self.close()
             raise
