@@ -132,7 +132,7 @@ def _task(context: Context, call: Call) -> IndustryTask:
     began = _time(call.began_at) if call.began_at else ""
     target = name_of(context.robot, call.target).poi_name
     request = IndustryTaskRequest(target, KINDS[call.kind], call.number, call.template, began, targets)
-    result = IndustryResult(call.reason, _time(call.changed_at))
+    result = IndustryResult(reason=call.reason, timestamp=_time(call.changed_at))
     return IndustryTask(call.id, request, call.status.value.upper(), result)
 
 
@@ -147,7 +147,7 @@ def _round(context: Context, order: Order) -> IndustryTask:
     stage = ""
     if order.status is OrderStatus.RUNNING:
         stage = ride_word(context.actions.current) or _stage_of(order)
-    result = IndustryResult(reason_of(order.failure), _time(order.changed_at), stage)
+    result = IndustryResult(stage=stage, reason=reason_of(order.failure), timestamp=_time(order.changed_at))
     return IndustryTask(order.id, asked, order.status.value.upper(), result)
 
 

@@ -112,13 +112,13 @@ class PickupResult(msgspec.Struct, omit_defaults=True):
     task_point_id: str = ""
 
 
-class TaskResult(msgspec.Struct, omit_defaults=True):
+class TaskResult(msgspec.Struct, omit_defaults=True, kw_only=True):
     """Progress of the task, without a stage before it begins, and the reason of a failure."""
 
+    stage: str = ""
     reason: str
     pickup_result: list[PickupResult]
     timestamp: str
-    stage: str = ""
 
 
 class DeliveryTask(msgspec.Struct):

@@ -69,12 +69,12 @@ class IndustryTaskRequest(msgspec.Struct):
     message: dict[str, str] = {}
 
 
-class IndustryResult(msgspec.Struct, omit_defaults=True):
+class IndustryResult(msgspec.Struct, omit_defaults=True, kw_only=True):
     """Result of a call, without ``stage`` where the client that carries it out reports only its status."""
 
+    stage: str = ""
     reason: str
     timestamp: str
-    stage: str = ""
 
 
 class IndustryTask(msgspec.Struct):

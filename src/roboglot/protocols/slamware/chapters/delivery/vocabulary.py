@@ -182,7 +182,8 @@ def task_of(robot: Robot, order: Order) -> DeliveryTask:
     if order.status is OrderStatus.RUNNING:
         stage = ride_word(next(iter(robot.actions.running(ERRAND)), None)) or stage
     stamp = datetime.fromtimestamp(order.changed_at, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-    result = TaskResult(reason_of(order.failure), results_of(order.results), stamp, stage)
+    results = results_of(order.results)
+    result = TaskResult(stage=stage, reason=reason_of(order.failure), pickup_result=results, timestamp=stamp)
     return DeliveryTask(order.id, task_request_of(robot, order), order.status.value.upper(), result)
 
 
