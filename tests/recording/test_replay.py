@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from websockets.asyncio.server import ServerConnection, serve
 
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import RealClock
-from roboglot.model.tap import Exchange
+from roboglot.model.tap import SILENT, Direction, Exchange
 from roboglot.recording.comparing.comparison import answers_only, compare
 from roboglot.recording.lines import Target, status_of
 from roboglot.recording.reader import BadRecording, Recording, read_recording
@@ -69,6 +70,33 @@ async def test_three_protocol_recording_agrees_only_with_its_double(tmp_path: Pa
     assert differing(double) == set()
     dog: Any = await run(tmp_path, "cyberdog2", "", replay)
     assert any(line.startswith(("GET ", "POST ", "chassis")) for line in differing(dog))
+
+
+async def test_answer_to_what_is_no_frame_is_found() -> None:
+    """It has an empty id, as the request has none."""
+    said = b'{"feedback": {"type": "parse", "id": "", "state": 1}}'
+
+    async def answer(socket: ServerConnection) -> None:
+        async for _ in socket:
+            await socket.send('{"block": {"id": "b"}}')
+            await socket.send(said.decode())
+
+    async with serve(answer, ADDRESS, 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        line = Target(f"visual://{ADDRESS}:{port}").line(RealClock(), lambda *_: None)
+        await line.open()
+        for payload in (b"garbage", b'{"type": "module"}', b"[]"):
+            assert await line.ask("", payload, [said]) == [(said, "state 1")]
+        await line.close()
+
+
+def test_silence_agrees_with_silence() -> None:
+    """Doors note it, proxies and clients see nothing."""
+    request = Exchange(0.0, "a", "cyberdog", "x:1", "x", Direction.REQUEST, "9999", b"{}")
+    silence = request._replace(direction=Direction.REPLY, payload=b"", status=SILENT)
+    answer = silence._replace(payload=b"{}", status="ok")
+    assert compare([request, silence], [request]).fidelity == 1.0
+    assert compare([request, silence], [request, answer]).differs
 
 
 async def test_robot_that_is_not_there_is_an_error() -> None:

@@ -25,6 +25,7 @@ _SECRET_IN_TEXT = re.compile(
 )  # JSON inside a JSON string
 LOST = "lost"  # the outcome when a real robot does not answer
 DRIVER = "driver/"  # prefix of the names of drivers, where doors have their own
+SILENT = "silent"  # status of a request that gets no answer
 PAYLOAD_MAX = 8 * 1024 * 1024  # bytes kept of one exchange
 
 

@@ -178,7 +178,7 @@ class FrameLine(Line):
         path = operation if operation.startswith("/") else FRAMES
         socket = await self._socket(path)
         await socket.send(payload.decode("utf-8", "replace"))
-        wanted, found = _frame_id(payload), Answers()
+        wanted, found = _frame_id(payload) or "", Answers()  # what has no id is answered with an empty one
         while len(found) < len(answers):
             frame = await self._next(socket, operation)
             if path != FRAMES or _frame_id(frame) == wanted:

@@ -18,7 +18,7 @@ from mcap.summary import Summary
 from msgspec import DecodeError
 
 from roboglot.model.inputs.outside import Input
-from roboglot.model.tap import DRIVER, Direction, Exchange
+from roboglot.model.tap import DRIVER, SILENT, Direction, Exchange
 from roboglot.recording.messages import decode_exchange, decode_input
 from roboglot.recording.standing import REPEATED
 from roboglot.values import dataclass
@@ -95,8 +95,8 @@ class Asked:
 
     @property
     def replies(self) -> list[Exchange]:
-        """The replies without their indices."""
-        return [reply for _, reply in self.numbered]
+        """The replies without their indices; no reply is none."""
+        return [reply for _, reply in self.numbered if reply.status != SILENT]
 
 
 def pair(exchanges: Sequence[Exchange]) -> tuple[list[Asked], list[tuple[int, Exchange]]]:

@@ -8,6 +8,7 @@ import logging
 from roboglot.model.errors import ComponentMissing, RobotError
 from roboglot.model.lateness import lateness
 from roboglot.model.stand_in import StandIn
+from roboglot.model.tap import SILENT
 from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters import programming  # noqa: F401
@@ -33,7 +34,6 @@ from roboglot.wire.cyberdog.text import NotJson, fitting, misfits, read_params, 
 
 log = logging.getLogger(__name__)
 DOOR = "cyberdog"
-SILENT = "silent"  # outcome of a request that gets no answer
 _NAMES = {int(row.key): row.name for row in contract("cyberdog")}
 KNOWN = (_NAMES.keys() | UNPUBLISHED) - TEXT_ONLY
 
