@@ -1,7 +1,4 @@
-"""Chapter "image transmission": the camera live by WebRTC (4001): signalling as requests and pushes, a peer per uid.
-
-Peers run on real time: the network's delays do not follow the robot's clock.
-"""
+"""Chapter "image transmission": the app's signals (4001); ``transmission`` answers them."""
 
 from __future__ import annotations
 
@@ -12,10 +9,7 @@ from roboglot.model.components.sensing.camera import Camera
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.table import TABLE
-from roboglot.wire.cyberdog.chapters.camera import (
-    BadSignal,
-    read_signal,
-)
+from roboglot.wire.cyberdog.chapters.camera import BadSignal, read_signal
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.text import read_params
 
