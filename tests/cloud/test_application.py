@@ -12,11 +12,11 @@ from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from roboglot.cloud import application
-from roboglot.cloud import connection as http_connection
 from roboglot.cloud.application import BackEnd
-from roboglot.cloud.connection import HEAD_MAX, BackEndConnection
 from roboglot.storage.cloud import CloudStore
 from roboglot.storage.database import Database
+from roboglot.transport import http as http_connection
+from roboglot.transport.http import HEAD_MAX, BoundedConnection
 from roboglot.wire.visual.cloud import CloudCode, parse_answer
 
 
@@ -52,7 +52,7 @@ async def port() -> AsyncIterator[int]:
     config.load()
     state = ServerState()
     server = await asyncio.get_running_loop().create_server(
-        lambda: BackEndConnection(config=config, server_state=state, app_state={}), "127.0.0.1", 0
+        lambda: BoundedConnection(config=config, server_state=state, app_state={}), "127.0.0.1", 0
     )
     yield server.sockets[0].getsockname()[1]
     server.close()

@@ -15,6 +15,7 @@ from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.overview import PAGE, SEEN_MAX, Overview
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.supervisor import Shard, State
+from roboglot.transport import http as connections
 
 PICTURE = b"\x89PNG"
 
@@ -102,6 +103,22 @@ async def test_page_lists_all_worlds_and_changes_nothing(fleet_host) -> None:
         }
         assert list(statuses.values()) == [303, 200, 200, 404, 405, 404, 502, 400]
         assert (await request(page, "GET /api/fleet", host="rebound.example"))[0] == 403
+    finally:
+        await page.close()
+
+
+async def test_slow_head_is_not_waited_for(fleet_host, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "REQUEST_SECONDS_MAX", 0.1)
+    page = Overview(fleet_host, "127.16.3.1", 0)
+    page.open()
+    await page.ready()
+    try:
+        address, port = page.address.removeprefix("http://").removesuffix(PAGE).split(":")
+        reader, writer = await asyncio.open_connection(address, int(port))
+        writer.write(b"GET / HTTP/1.1\r\nX: ")
+        async with asyncio.timeout(60.0):
+            assert await reader.read() == b""
+        writer.close()
     finally:
         await page.close()
 

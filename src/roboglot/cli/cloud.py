@@ -82,12 +82,12 @@ def _serve(store: CloudStore, address: str, port: int, hosts: list[str], verbose
     import uvicorn
 
     from roboglot.cloud.application import BackEnd
-    from roboglot.cloud.connection import BackEndConnection
     from roboglot.protocols.browsers import Browsers
+    from roboglot.transport.http import BoundedConnection
 
     uvicorn.run(
         BackEnd(store, Browsers("", (), hosts)),
-        http=BackEndConnection,
+        http=BoundedConnection,
         ws="none",
         host=address,
         port=port,

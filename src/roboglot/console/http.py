@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from typing import Any
 
 import msgspec
 
-from roboglot.console.settings import BODY_MAX
+from roboglot.console.settings import BODY_MAX, BODY_SECONDS_MAX
 from roboglot.misfits import misfit
 
 Scope = MutableMapping[str, Any]
@@ -35,8 +36,13 @@ class Problem(Exception):
 async def read_json(receive: Receive) -> Mapping[str, object]:
     """Return the body as a JSON object; empty without a body. Raises Problem."""
     body = b""
+    deadline = asyncio.get_running_loop().time() + BODY_SECONDS_MAX
     while True:
-        message = await receive()
+        try:
+            async with asyncio.timeout_at(deadline):
+                message = await receive()
+        except TimeoutError:
+            raise Problem(408, f"the body took longer than {BODY_SECONDS_MAX:g} s") from None
         if message["type"] != "http.request":
             raise Problem(400, "the client went away")
         body += message.get("body", b"")

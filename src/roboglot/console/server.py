@@ -83,11 +83,11 @@ class Console:
     async def _serve(self, listening: socket.socket) -> None:
         await load(_load)
         from uvicorn.config import Config
-        from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
         from uvicorn.server import ServerState
 
         from roboglot.console.application import Application
         from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
+        from roboglot.transport.http import BoundedConnection
 
         browsers = Browsers("[console]", self._config.origins, self._config.hosts)
         classroom = await asyncio.to_thread(self._build_classroom)
@@ -112,7 +112,7 @@ class Console:
         asking = (robot.admission for robot in self._desk.robots.values() if robot.admission.asks)
         self._gate = Gate(next(asking, Admission()), self._tls)
         end_vanished(listening)
-        gated = self._gate.before(lambda: HttpToolsProtocol(config, state, {}, loop), "console pages")
+        gated = self._gate.before(lambda: BoundedConnection(config, state, {}, loop), "console pages")
         self._server = await loop.create_server(gated, sock=listening, backlog=BACKLOG)
         self._tasks.append(loop.create_task(self._beat(self._application), name="console beat"))
         if self._config.otlp:

@@ -5,6 +5,7 @@ from __future__ import annotations
 VIEWERS_MAX = 32  # open pages
 MESSAGE_MAX = 64 * 1024  # bytes per message from a page
 BODY_MAX = 256 * 1024  # bytes per request body
+BODY_SECONDS_MAX = 30.0  # s (machine clock) for it to arrive
 MESSAGES_PER_SECOND_MAX = 100  # from one page
 NAME_MAX = 40  # characters of a person's name
 JOIN_TRIES = 10  # wrong class codes per minute from one address

@@ -79,8 +79,9 @@ class Overview:
     async def _serve(self, listening: socket.socket) -> None:
         await load(lambda: [importlib.import_module(library) for library in LIBRARIES])
         from uvicorn.config import Config
-        from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
         from uvicorn.server import ServerState
+
+        from roboglot.transport.http import BoundedConnection
 
         config = Config(
             self, ws="none", lifespan="off", interface="asgi3", log_config=None, access_log=False, proxy_headers=False
@@ -89,7 +90,7 @@ class Overview:
         state, loop = ServerState(), asyncio.get_running_loop()
         self._connections = state.connections
         self._server = await loop.create_server(
-            lambda: HttpToolsProtocol(config, state, {}, loop), sock=listening, backlog=BACKLOG
+            lambda: BoundedConnection(config, state, {}, loop), sock=listening, backlog=BACKLOG
         )
 
     async def __call__(self, scope: Scope, _receive: Receive, send: Send) -> None:

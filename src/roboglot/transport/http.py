@@ -1,6 +1,6 @@
-"""One HTTP connection of the reference cloud: uvicorn's, with limits on a request's head.
+"""One HTTP connection of the console or the reference cloud: uvicorn's, with limits on a request's head.
 
-Knows no path; the back end checks bodies. Times are the machine's.
+Knows no path; the applications limit bodies. Times are the machine's.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ HEAD_MAX = 32 * 1024
 """Bytes of a request's line and headers; the parser has no limit of its own."""
 
 
-class BackEndConnection(HttpToolsProtocol):
+class BoundedConnection(HttpToolsProtocol):
     """Closes connections that send no complete head in time."""
 
     _patience: asyncio.TimerHandle | None = None
