@@ -30,6 +30,7 @@ export async function loadTable() {
   defineValues();
   defineLanguage();
   defineChange();
+  keepLetters();
   for (const f of table.functions) for (const value of formsOf(f)) defineFunction(f, value);
   return table;
 }
@@ -97,6 +98,21 @@ export function defineModule({ condition, describe }) {
     };
     return type;
   });
+}
+
+/** Letters of all languages stay in the names of variables and functions, as Python allows; values of those that begin
+ * with _ are not reported. */
+function keepLetters() {
+  /** @type {any} */ (Blockly.Names.prototype).safeName = (/** @type {string} */ name) => {
+    const letters = name.normalize("NFKC").replace(/[^\p{ID_Continue}]/gu, "_");
+    return /^\p{ID_Start}/u.test(letters) ? letters : `my_${letters}`;
+  };
+}
+
+/** Python's name of a variable of a workspace. @param {any} workspace @returns {(model: any) => string} */
+export function variablesOf(workspace) {
+  python.init(workspace);
+  return (model) => python.getVariableName(model.getId());
 }
 
 /** As a pupil would write it; a variable that is changed begins at 0. */

@@ -1,5 +1,6 @@
 // Values in bubbles at their blocks: what a function answered there, what the variables of a block hold.
 import { t, translated } from "../base.js";
+import { variablesOf } from "./blocks.js";
 import * as editor from "./editor.js";
 
 const NS = "http://www.w3.org/2000/svg", LONG = 40, PAD = 6, HEIGHT = 22; // characters, workspace units
@@ -8,9 +9,6 @@ pen.font = "600 13px ui-monospace, monospace"; // as in studio.css
 /** By id of the block: what is shown there. @type {Map<string, string>} */
 const shown = new Map();
 let due = false;
-
-/** Python's name of a variable. @param {string} name */
-const pythonic = (name) => encodeURI(name.replaceAll(" ", "_")).replace(/\W/g, "_").replace(/^(\d)/, "my_$1");
 
 const SUCCESS = "(state (code 0, describe success)";
 const DONE = /^(, response \((motion_id -?\d+, )?result True, code 0(, order_process_bar -?\d+)?\))?\)$/;
@@ -30,10 +28,12 @@ export function answered(id, value) { put(id, value); }
 
 /** What variables hold, at the statements that name them. @param {Record<string, string>} held */
 export function held(held) {
-  for (const block of editor.workspace?.getAllBlocks(false) ?? []) {
+  if (!editor.workspace) return;
+  const python = variablesOf(editor.workspace);
+  for (const block of editor.workspace.getAllBlocks(false)) {
     if (block.outputConnection || block.isInsertionMarker()) continue;
-    const names = block.getVarModels().map((model) => model.getName()).filter((name) => pythonic(name) in held);
-    if (names.length) put(block.id, names.map((name) => `${name} = ${held[pythonic(name)]}`).join(", "));
+    const models = block.getVarModels().filter((model) => python(model) in held);
+    if (models.length) put(block.id, models.map((model) => `${model.getName()} = ${held[python(model)]}`).join(", "));
   }
 }
 
