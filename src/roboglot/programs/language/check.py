@@ -89,7 +89,7 @@ def _parse(source: str) -> tuple[ast.Module | None, Problem | None]:
             warnings.simplefilter("ignore")
             return ast.parse(source.removeprefix("\ufeff")), None
     except SyntaxError as error:
-        return None, from_syntax_error(error.msg, error.lineno or 1, max(1, error.offset or 1))
+        return None, from_syntax_error(error.msg, error.lineno or 1, max(1, error.offset or 1), error.text or "")
     except (RecursionError, MemoryError):
         return None, _too_deep()
     except ValueError as error:  # null bytes; lone surrogates raise UnicodeEncodeError, also a ValueError

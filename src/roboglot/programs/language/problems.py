@@ -196,16 +196,26 @@ The program contains an invisible character that does not belong there.
 This is not a valid statement; perhaps '{0}' is meant.
 这里的写法不对，也许应该写成 '{0}'。
 
+^write '(.+)' for '(.+)'$
+Python writes '{0}' for '{1}'.
+Python 里 '{1}' 写成 '{0}'。
+
 ^invalid syntax$
 This is not a valid statement.
 这里的写法不对。
 """
 
+_HABITS = {"else if": "elif", "&&": "and", "||": "or", "++": "+= 1", "--": "-= 1"}  # of other languages
+_HABIT = re.compile(r"(?:(else) +i|(&&|\|\||\+\+|--)\W*)$")  # as far as the place of the error
+_VAGUE = ("invalid syntax", "expected ':'")
 _SYNTAX = [tuple(entry.split("\n")) for entry in _SENTENCES.strip().split("\n\n")]
 
 
-def from_syntax_error(message: str, line: int, column: int) -> Problem:
-    """Return the problem for one of CPython's syntax messages; an unknown message is quoted."""
+def from_syntax_error(message: str, line: int, column: int, text: str = "") -> Problem:
+    """Return the problem for one of CPython's syntax messages about a line's text; an unknown message is quoted."""
+    if message in _VAGUE and (found := _HABIT.search(text[:column])):
+        habit = found[2] or "else if"
+        message = f"write '{_HABITS[habit]}' for '{habit}'"
     for pattern, english, chinese in _SYNTAX:
         found = re.search(pattern, message)
         if found:
