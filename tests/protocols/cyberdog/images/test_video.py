@@ -12,6 +12,7 @@ import pytest
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 from aiortc.sdp import candidate_from_sdp
 
+from roboglot.media import webrtc
 from roboglot.media.video import VideoStream
 from roboglot.protocols.cyberdog.chapters.camera import transmission as door_video
 from roboglot.protocols.cyberdog.server import CyberDogDoor
@@ -217,6 +218,12 @@ async def test_candidates_that_come_before_the_offer_are_kept(watch, client, doo
     answer = watcher.signals("answer_sdp")[0]["answer_sdp"]
     await watcher.peer.setRemoteDescription(RTCSessionDescription(answer["sdp"], "answer"))
     await until(lambda: watcher.peer.connectionState == "connected")
+
+
+async def test_answer_of_a_robot_with_many_addresses_comes(watch, monkeypatch) -> None:
+    real = webrtc.VideoCall.candidates
+    monkeypatch.setattr(webrtc.VideoCall, "candidates", lambda call: [*real(call)][:1] * 40)
+    await watch().connect()
 
 
 async def test_more_apps_than_there_is_room_for(watch, client, door, monkeypatch) -> None:

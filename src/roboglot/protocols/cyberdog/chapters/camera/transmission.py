@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 SIGNAL = push(Code.VIDEO, depth=20)
+PUSHED_MAX = 16  # addresses beside an answer, which has all of them and would be dropped before more
 PATIENCE = 10.0  # s (machine clock) to find a way to the app
 PEERS_MAX = 16  # apps that watch or connect at the same time
 TASKS_MAX = 4 * PEERS_MAX  # calls that are answered, served or closed at the same time
@@ -141,7 +142,7 @@ class Transmission:
             await call.close()
             return
         self._push(Description(peer.uid, "answer", answer))
-        for ours in call.candidates():
+        for ours in call.candidates()[:PUSHED_MAX]:
             self._push(Candidate(peer.uid, ours.text, ours.mid, ours.index))
         await peer.pass_on(webrtc.BadOffer)
 
