@@ -224,7 +224,7 @@ def test_the_mark_is_written_once() -> None:
     ("described", "version"),
     [("", "0.3.dev0"), ("v1.2.3", "1.2.3"), ("v1.2.3-4-g6b36cc8", "1.2.4.dev4")],
 )
-def test_archive_has_a_version_of_its_tag_or_the_fallback(tmp_path: Path, described: str, version: str) -> None:
+def test_archive_has_version_of_tag_or_fallback(tmp_path: Path, described: str, version: str) -> None:
     """``git archive`` and *Download ZIP* fill in .git_archival.txt, without a tag with an empty description."""
     (tmp_path / "pyproject.toml").write_bytes((ROOT / "pyproject.toml").read_bytes())
     text = (ROOT / ".git_archival.txt").read_text()

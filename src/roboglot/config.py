@@ -10,6 +10,7 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import field
 from datetime import UTC, tzinfo
 from ipaddress import IPv4Address, ip_address
@@ -43,9 +44,9 @@ class StartConfig:
 class RobotConfig:
     """One robot: name, body, and address of all its doors (empty: the one after the previous robot's).
 
-    A body with "://" in it is the URL of a real robot, "slamware://192.168.11.1". ``start`` and ``serial``
-    are for simulated robots; without a start, they start on a dock or beside the others; without a serial number, it is
-    made of seed and name. Where communicating robots meet, the one with the higher ``priority`` goes first.
+    A body with "://" in it is the URL of a real robot, "slamware://192.168.11.1". ``start`` (else a dock, or beside the
+    others) and ``serial`` (else made of seed and name) are for simulated robots. Where communicating robots meet, the
+    one with the higher ``priority`` goes first.
     """
 
     name: str = "a"
@@ -208,11 +209,9 @@ class Config:
 
 def is_address(host: str) -> bool:
     """Return True for an IP address, False for a name."""
-    try:
-        ip_address(host)
-    except ValueError:
-        return False
-    return True
+    with suppress(ValueError):
+        return bool(ip_address(host))
+    return False
 
 
 def is_loopback(host: str) -> bool:
@@ -300,9 +299,8 @@ def config_of(
 
 def _moved(robots: object, address: object) -> object:
     """Return rows of robots with the first one at ``address``; other values are unchanged, and refused later."""
-    match robots:
-        case [dict() as first, *others]:
-            return [{**first, "address": address}, *others]
+    if isinstance(robots, list) and robots and isinstance(robots[0], dict):
+        return [{**robots[0], "address": address}, *robots[1:]]
     return robots
 
 
@@ -354,8 +352,7 @@ def _start(text: str, where: str) -> StartConfig:
         x, y, yaw = map(float, [*numbers, "0"][:3])
         floor = int(numbers[3]) if len(numbers) > 3 else 0
     except ValueError:
-        x = y = yaw = math.nan
-        floor = 0
+        x, y, yaw, floor = math.nan, 0.0, 0.0, 0
     if not (2 <= len(numbers) <= 4 and math.isfinite(x + y + yaw) and floor >= 0):
         raise ValueError(f"a robot starts at x,y or x,y,yaw or x,y,yaw,floor (m, rad), not {where!r} in {text!r}")
     return StartConfig(x, y, yaw, floor)
@@ -389,8 +386,7 @@ def _refuse_unknown(
     values: Mapping[str, object], kind: type, prefix: str, doors: Mapping[str, type] = MappingProxyType({})
 ) -> None:
     """Raise ValueError for a key that is not a setting, as a misspelt one would be ignored silently."""
-    fields: dict[str, object] = {f.name: f.default_factory for f in dataclasses.fields(kind) if f.name != "doors"}
-    fields |= doors
+    fields = {f.name: f.default_factory for f in dataclasses.fields(kind) if f.name != "doors"} | dict(doors)
     for key, value in values.items():
         if key not in fields:
             if not prefix and key in {field.name for field in dataclasses.fields(RobotConfig)}:

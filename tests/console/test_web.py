@@ -47,7 +47,7 @@ def test_every_key_of_the_pages_has_words() -> None:
         assert any(key.startswith(prefix) for key in WORDS["en"]), prefix
 
 
-def test_names_of_present_faults_have_words_in_both_languages() -> None:
+def test_names_of_faults_have_words_in_both_languages() -> None:
     wanted = {f"robot.{name}" for name in (LINK_LOST, TAKEN, OUTSIDE, *(watch.name for watch in WATCHES))}
     assert [sorted(wanted - set(WORDS[language])) for language in ("en", "zh")] == [[], []]
 

@@ -1,4 +1,4 @@
-"""Which asserts the plugin lets pytest rewrite."""
+"""Asserts that the plugin lets pytest rewrite."""
 
 from __future__ import annotations
 

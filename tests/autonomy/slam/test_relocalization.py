@@ -117,7 +117,7 @@ async def test_place_found_everywhere_replaces_a_half_fitting_one(tour: Tour, mo
 
 
 @pytest.mark.world("empty")
-async def test_a_lost_robot_keeps_saying_that_several_places_look_alike(tour: Tour) -> None:
+async def test_lost_robot_keeps_saying_that_places_look_alike(tour: Tour) -> None:
     await tour.go((8.5, 5.0))
     tour.world.hands.place("a", Pose(5.6, 5.0))
     await tour.clock.advance(4.0)
