@@ -133,6 +133,12 @@ def test_command_without_its_extra_names_the_remedy(core: Path, tmp_path: Path) 
         assert line.endswith(f"pip install 'roboglot[{extra}]'")
 
 
+def test_database_server_without_its_driver_names_the_remedy(core: Path) -> None:
+    done = run(core, "-m", "roboglot", "access", "list", "--database", "postgresql://127.0.0.1/x")
+    (line,) = done.stderr.splitlines()
+    assert line.endswith("needs psycopg, which is not installed: pip install 'roboglot[postgresql]'")
+
+
 def test_remedy_brings_what_is_missing() -> None:
     """A command's extra is named only for what it brings: with ``logs`` installed, its name would be no help."""
     for module, extra, remedy in (

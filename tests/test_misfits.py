@@ -43,6 +43,7 @@ class Sent(msgspec.Struct, forbid_unknown_fields=True):
         ({"corners": []}, "corners must have at least 1 entries"),
         ({"corners": [{"cornerX": 1}, {}]}, "corners[1].cornerX is missing"),
         ({"by_number": {"one": "1"}}, "a key of by_number must be a whole number, not text"),
+        ({True: 1}, "a key of the value must be text"),  # such as `on: push` in YAML
         ({"side": "right"}, "side cannot be 'right'"),
         ({"name": "aaaa"}, "name must have at most 3 characters"),
         ({"name": "b"}, r"name must match ^a\D*"),

@@ -21,6 +21,7 @@ _FORMS = {  # the library's messages; the first group of a missing or unknown fi
     r"Object missing required field `(.+)`": "{place} is missing",
     r"Object contains unknown field `(.+)`": "{place} is unknown",
     r"Expected `(.+)`, got `(.+)`": "{place} must be {}, not {}",
+    r"Expected `str`": "{place} must be text",  # a field's name
     r"Expected `array` of length (\d+), got (\d+)": "{place} must have {} entries, not {}",
     r"Expected `array` of at least length (\d+), got (\d+)": "{place} must have at least {} entries, not {}",
     r"Expected `str` of length <= (\d+)": "{place} must have at most {} characters",

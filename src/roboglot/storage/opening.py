@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
+from roboglot.extras import explained
 from roboglot.storage.database import ROBOTS, Database
 from roboglot.storage.transactions import Transactions
 
@@ -58,6 +59,6 @@ def open_database(
         raise ValueError("the database's URL begins with postgresql://")
     try:
         from roboglot.storage.postgresql import PostgreSQL
-    except ImportError:
-        raise OSError("PostgreSQL needs another package, which roboglot's extra `postgresql` brings") from None
+    except ModuleNotFoundError as missing:
+        raise OSError(explained(missing, "a database's server") or str(missing)) from None
     return PostgreSQL(url, robots=robots, in_place=in_place, only_read=only_read)

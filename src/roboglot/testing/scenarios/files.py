@@ -217,7 +217,7 @@ def read(path: Path) -> Found:
         _check(scenario)
         scenario.given.wanted(path.parent)
     except (OSError, UnicodeDecodeError, YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
-        why = error.strerror if isinstance(error, OSError) and error.strerror else misfit(error)
+        why = error.strerror if isinstance(error, OSError) and error.strerror else misfit(error, "the file")
         raise BadScenario(f"{path}: {' '.join(why.split())}") from None
     return Found(path, scenario)
 
