@@ -19,6 +19,7 @@ from roboglot.wire.robomaster.telemetry import (
     TargetsSeen,
     broadcast_of,
     hear,
+    number_of,
 )
 
 
@@ -89,3 +90,11 @@ def test_nothing_breaks_it(parts: list[bytes]) -> None:
 )
 def test_broadcasts(data: bytes, address: str | None) -> None:
     assert broadcast_of(data) == address
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "-1e999", "1e10"])
+def test_what_is_no_number_is_left_out(number: str) -> None:
+    for text in (f"chassis push attitude 0 {number} 0;", f"AI push people 1 {number} 0.5 0.5 0.5;"):
+        assert list(hear(f"{text}chassis push position 1 2;".encode())) == [ChassisPosition(1, 2)]
+    with pytest.raises(ValueError, match="no number"):
+        number_of(number)

@@ -9,6 +9,7 @@ from enum import StrEnum
 from roboglot.clients.errors import BadAnswer
 from roboglot.clients.robomaster.errors import RoboMasterRefused
 from roboglot.wire.robomaster.replies import Reply
+from roboglot.wire.robomaster.telemetry import number_of
 
 ANSWER_SECONDS = 2.0  # for answers that come at once
 MOTION_SECONDS = 65.0  # for answers that come at the end of a motion
@@ -51,7 +52,7 @@ class Chapter:
         """Return the words of ``_words`` as numbers."""
         words = await self._words(command, count, **parameters)
         try:
-            return [float(word) for word in words]
+            return [number_of(word) for word in words]
         except ValueError:
             raise BadAnswer(f"{command} ?: {' '.join(words)!r}") from None
 

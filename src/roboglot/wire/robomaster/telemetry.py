@@ -149,6 +149,7 @@ _EVENTS: tuple[tuple[re.Pattern[str], Callable[..., Telemetry]], ...] = (
     (re.compile(r"sound event applause (\d{1,9})"), Applause),
     (re.compile(r"sensor_adapter event io_level \((\d{1,3}), ?(\d{1,3}), ?(\d{1,3})\)"), AdapterLevel),
 )
+NUMBER_MAX = 1e9
 _GAME = re.compile(r"game msg push \[(-?\d{1,9}(?:, ?-?\d{1,9}){0,63})\]")
 _BROADCAST = re.compile(r"robot ip ([0-9.]{7,15}) ?;?")
 
@@ -193,7 +194,15 @@ def status_of(words: Sequence[str]) -> ChassisStatus:
 def _floats(words: Sequence[str], count: int) -> list[float]:
     if len(words) != count:
         raise ValueError(f"{count} numbers expected, not {len(words)}")
-    return [float(word) for word in words]
+    return [number_of(word) for word in words]
+
+
+def number_of(word: str) -> float:
+    """Return a number of a robot's. Raises ValueError, also for what is not finite or too large."""
+    number = float(word)
+    if not abs(number) <= NUMBER_MAX:
+        raise ValueError(f"no number of a robot's: {word}")
+    return number
 
 
 def _event(text: str) -> Iterator[Telemetry]:
@@ -213,7 +222,7 @@ def _seen(words: Sequence[str]) -> Iterator[Telemetry]:
         size = POINTS_PER_LINE * 4 if kind == "line" else 5 if kind in WITH_INFO else 4
         if not kind or not 0 <= count <= TARGETS_MAX or len(rest) < count * size:
             raise ValueError("not what an AI push looks like")
-        targets = [[float(rest.pop()) for _ in range(size)] for _ in range(count)]
+        targets = [[number_of(rest.pop()) for _ in range(size)] for _ in range(count)]
         if kind == "line":
             yield LinesSeen(tuple(tuple(LinePoint(*t[at : at + 4]) for at in range(0, size, 4)) for t in targets))
         elif kind in WITH_INFO:
