@@ -51,6 +51,16 @@ def test_parameters_bodies_and_answers() -> None:
     assert create["summary"]
 
 
+def test_answers_list_the_words_they_have() -> None:
+    schemas = document()["components"]["schemas"]
+    assert schemas["Box"]["properties"]["door_status"]["enum"] == ["CLOSED", "CLOSING", "OPEN", "OPENING", "SEMIOPEN"]
+    assert schemas["PowerStatus"]["properties"]["sleepMode"]["enum"] == ["asleep", "awake", "waking_up"]
+    stages = schemas["IndustryResult"]["properties"]["stage"]
+    assert {"WAIT_OPERATION", "IN_ELEVATOR", "GOING_TO_TARGET_POINT"} <= set(stages["enum"])
+    assert "" not in stages["enum"]  # a stage that there is not is left out
+    assert "default" not in stages
+
+
 def test_every_operation_has_a_chinese_summary() -> None:
     assert summaries().keys() == {row.name for row in contract("slamware")}
     assert all(re.search("[\u4e00-\u9fff]", text) for text in summaries().values())

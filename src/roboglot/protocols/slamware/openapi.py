@@ -4,23 +4,44 @@ from __future__ import annotations
 
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from typing import Any
 
 import msgspec
 
+from roboglot.model.components.logistics.delivery import OrderStatus
 from roboglot.operations import Operation
+from roboglot.protocols.slamware.chapters import industry
+from roboglot.protocols.slamware.chapters.delivery import vocabulary as delivery
 from roboglot.protocols.slamware.chapters.firmware.uploads import Upload
 from roboglot.protocols.slamware.chapters.motion.actions import FACTORIES
+from roboglot.protocols.slamware.chapters.system.system import SLEEP_MODES
 from roboglot.protocols.slamware.routes import ALIASES, BEYOND, SHORTHANDS
 from roboglot.protocols.slamware.table import TABLE, NoContent, Text
+from roboglot.protocols.slamware.vocabulary import RIDE_STAGES
 from roboglot.wire.contracts import contract
 
 BODIES = (bytes, Upload)  # not JSON
 REFERENCE = "#/components/schemas/{name}"
 BINARY = {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}
 Schema = dict[str, Any]
+_RIDES = [word for word in RIDE_STAGES.values() if word]
+_STATUSES = [status.upper() for status in OrderStatus]
+# Words of answers that are plain text in their types, as other firmware has more of them.
+WORDS: Mapping[str, Iterable[str]] = {
+    "Box.door_status": delivery.DOORS.values(),
+    "Box.lock_status": ("LOCKED", "UNLOCKED"),
+    "Box.stock_status": delivery.STOCKS.values(),
+    "Box.status": ("EMPTY", "NOT_EMPTY", "ERROR"),
+    "DeliveryTask.status": _STATUSES,
+    "DeliveryTaskRequest.type": delivery.KIND_WORDS.values(),
+    "IndustryResult.stage": (*_RIDES, *industry.STAGES.values(), "WAIT_OPERATION"),
+    "IndustryTask.status": _STATUSES,
+    "PowerStatus.powerStage": ("running", "restarting", "shutingdown"),
+    "PowerStatus.sleepMode": SLEEP_MODES.values(),
+    "TaskResult.stage": (*_RIDES, *delivery.STAGES.values()),
+}
 
 
 def document() -> Schema:
@@ -80,6 +101,11 @@ class _Schemas:
         request = self._components["ActionRequest"]["properties"]
         request["options"] = {"anyOf": [*options, {"type": "null"}]}
         request["action_name"]["examples"] = [f"slamtec.agent.actions.{name}" for name in FACTORIES]
+        for place, words in WORDS.items():
+            name, _, field = place.partition(".")
+            listed = self._components[name]["properties"][field]
+            listed["enum"] = sorted(set(words))
+            listed.pop("default", None)  # a word that there is not is left out
         return {name: _without_tuples(schema) for name, schema in self._components.items()}
 
     def describe(self, operation: Operation[str], path: str) -> Schema:

@@ -32,8 +32,8 @@ class Restart(msgspec.Struct):
 
 
 Speed = Literal["base.max_moving_speed", "base.max_angular_speed"]
-Readable = Speed | Literal["docking.docked_register_strategy"]
-Settable = Speed | Literal["base.emergency_stop", "base.brake_release"]
+Readable = Literal[Speed, "docking.docked_register_strategy"]
+Settable = Literal[Speed, "base.emergency_stop", "base.brake_release"]
 
 
 class Parameter(msgspec.Struct):
