@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.browser.served import shows, until
-from tests.browser.test_studio import FOREVER, Open, loaded, phase, studio
+from tests.browser.test_studio import FOREVER, Open, Page, loaded, phase, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -46,6 +46,13 @@ QUICK = {
     }
 }  # fmt: skip
 QUICK_WORDS = "change n by"
+
+
+async def error_is_in_the_teachers_language(teacher: Page, pupil: Page) -> None:
+    for language, other in (("en", "中文"), ("zh", "EN")):
+        words = await pupil.evaluate(f"studio.runner.failure.value.{language}")
+        await until(teacher, f"document.querySelector('.pupils li.bad')?.textContent.includes({words!r})")
+        await teacher.click(f"header >> text={other}")
 
 
 async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
@@ -86,8 +93,7 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     await loaded(anna, WRONG)
     await anna.keyboard.press("F5")
     await until(anna, "studio.runner.failure.value")
-    failure = await anna.evaluate("studio.runner.failureWords.value")
-    await until(teacher, f"document.querySelector('.pupils li.bad')?.textContent.includes({failure!r})")
+    await error_is_in_the_teachers_language(teacher, anna)
     await anna.click("#panel .button.main")
     await until(teacher, f"{row}.includes('handed in')")
     await teacher.set_viewport_size({"width": 1600, "height": 900})  # narrow cards, three in a row

@@ -1,12 +1,12 @@
 // The class: join by a code, hand in; the teacher's grid of what each pupil's program does. Where several worlds share
 // the class, a pupil's page goes on to the console of the world that is theirs.
 import { effect, signal } from "@preact/signals";
-import { Button, elsewhere, html, kept, person, say, sent, t } from "../base.js";
+import { Button, elsewhere, html, kept, language, person, say, sent, t, translated } from "../base.js";
 import { choose, hello } from "../link.js";
 import { ask, listen, online, open, send } from "./link.js";
 import { results } from "./missions.js";
 import { program, python, show, whole } from "./program.js";
-import { failure, failureWords, line, lit, module, phase } from "./runner.js";
+import { failure, line, lit, module, phase } from "./runner.js";
 
 const EVERY = 700, SLOWLY = 3000, AGAIN = 2000; // ms between two reports of a pupil, at least and at most; until another try
 const code = kept("studio.class", ""), role = kept("studio.role", "");
@@ -15,7 +15,10 @@ export const grid = signal(/** @type {any} */ (null)); // of a teacher
 const maps = signal(/** @type {Record<string, string>} */ ({})); // of pupils, by their names
 
 const stars = () => Object.values(results()).reduce((sum, n) => sum + n, 0);
-const doing = () => ({ phase: phase.value, lit: litWords(), program: program.value.name.slice(0, 100), error: String(failureWords.value ?? "").slice(0, 280), mission: program.value.lesson ?? "", stars: stars() });
+const doing = () => ({ phase: phase.value, lit: litWords(), program: program.value.name.slice(0, 100), error: wrong(), mission: program.value.lesson ?? "", stars: stars() });
+/** In both languages: the teacher's page may have another one. */
+const wrong = () => { const { en, zh, text } = failure.value ?? {}; return en ? `${en.slice(0, 140)}\n${zh.slice(0, 140)}` : String(text ?? "").slice(0, 280); };
+const inOwnWords = (/** @type {string} */ error) => { const [en, zh = translated(en)] = error.split("\n"); return language.value === "zh" ? zh : en; };
 function litWords() {
   const block = window.studio?.editor.workspace?.getBlockById(lit.value);
   return (module.value || (block ? block.toString(60) : program.value.kind === "text" && line.value ? t("studio.line", { n: line.value }) : "")).slice(0, 200);
@@ -90,7 +93,7 @@ async function look(name) {
 
 function exported() {
   const cell = (text) => { const plain = String(text).replace(/^[=+@-]/, "'$&"); return `"${plain.replaceAll('"', '""')}"`; };
-  const rows = [t("studio.class.columns").split("|"), ...grid.value.pupils.map((p) => [p.name, p.world, p.robot, p.stars, t(p.handed ? "studio.yes" : "studio.no"), p.mission, p.error])];
+  const rows = [t("studio.class.columns").split("|"), ...grid.value.pupils.map((p) => [p.name, p.world, p.robot, p.stars, t(p.handed ? "studio.yes" : "studio.no"), p.mission, inOwnWords(p.error)])];
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([`\ufeff${rows.map((row) => row.map(cell).join(",")).join("\n")}\n`], { type: "text/csv" }));
   link.download = `class-${grid.value.code}.csv`;
@@ -103,7 +106,7 @@ function Teacher() {
   return html`<h2>${name || t("studio.tab.group")} <code class="code">${grid.value.code}</code></h2><p class="muted">${t("studio.class.tell")}</p>
     <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop.all")} onClick=${() => wish({ do: "stop_all" })} /><${Button} label=${t("studio.class.export")} onClick=${exported} /><${Button} label=${t("studio.class.leave")} onClick=${leave} /><${Button} label=${t("studio.class.end")} onClick=${() => { if (confirm(t("studio.class.end.sure"))) wish({ do: "close" }); }} /></div>
     ${pupils.length ? html`<ul class="rows pupils">${pupils.map((p) => html`<li key=${p.name} class=${p.error ? "bad" : ""}>${maps.value[p.name] ? html`<img class="map" alt=${t("studio.class.map", { name: p.name })} src=${`data:image/png;base64,${maps.value[p.name]}`} />` : html`<span class="map"></span>`}<span class="grow"><b>${p.name}${p.here ? "" : ` (${t("studio.class.away")})`}</b>
-        <small>${[p.world, p.robot, p.robot && t(`studio.phase.${p.phase === "idle" && p.error ? "failed" : p.phase}`), p.lit].filter(Boolean).join(" · ")}</small><small>${[p.program, p.error].filter(Boolean).join(" · ")}</small>
+        <small>${[p.world, p.robot, p.robot && t(`studio.phase.${p.phase === "idle" && p.error ? "failed" : p.phase}`), p.lit].filter(Boolean).join(" · ")}</small><small>${[p.program, inOwnWords(p.error)].filter(Boolean).join(" · ")}</small>
         <small class="done">${p.stars} ★${p.handed ? ` · ${t("studio.class.handed")}` : ""}</small></span><${Button} compact icon="eye" label=${t("studio.class.look.at", { name: p.name })} onClick=${() => look(p.name)} /></li>`)}</ul>` : html`<p class="muted">${t("studio.class.empty")}</p>`}`;
 }
 
