@@ -62,6 +62,15 @@ def test_local_links_lead_somewhere(page: Path) -> None:
         assert not anchor or anchor in anchors(target), link
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name.endswith(".zh.md")], ids=str)
+def test_chinese_pages_link_to_chinese_pages(page: Path) -> None:
+    """Only the link to the same page in English leaves the language, where there is a Chinese page."""
+    for link in LINK.findall(FENCE.sub("", page.read_text())):
+        target = (page.parent / link.partition("#")[0]).resolve()
+        if target.suffix == ".md" and target.name != page.name.replace(".zh.md", ".md"):
+            assert target.name.endswith(".zh.md") or not target.with_suffix(".zh.md").exists(), link
+
+
 @every_page
 def test_paths_exist(page: Path) -> None:
     for path in PATH.findall(FENCE.sub("", page.read_text())):

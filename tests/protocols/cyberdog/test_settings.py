@@ -209,7 +209,7 @@ async def test_a_robot_without_electronic_skin(client) -> None:
     assert await client.ask(11002, {"mode": 1, "wave_cycle_time": 0}) == {"error_code": 322}
 
 
-NOES: tuple[tuple[int, dict[str, object]], ...] = (
+REFUSED: tuple[tuple[int, dict[str, object]], ...] = (
     (1020, {"member": ""}),
     (1021, {"account": "nobody"}),
     (1022, {"member": "nobody"}),
@@ -230,7 +230,7 @@ NOES: tuple[tuple[int, dict[str, object]], ...] = (
 
 async def test_each_refusal_has_its_reason_in_the_log(client, caplog) -> None:
     caplog.set_level(logging.INFO)
-    for code, params in NOES:
+    for code, params in REFUSED:
         caplog.clear()
         await client.ask(code, params)
         lines = [record.message for record in caplog.records if record.message.startswith(f"{code}: ")]
