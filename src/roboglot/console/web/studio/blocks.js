@@ -100,8 +100,7 @@ export function defineModule({ condition, describe }) {
   });
 }
 
-/** Letters of all languages stay in the names of variables and functions, as Python allows; values of those that begin
- * with _ are not reported. */
+/** Names keep the letters of all languages; none begins with _, since values of such are not reported. */
 function keepLetters() {
   /** @type {any} */ (Blockly.Names.prototype).safeName = (/** @type {string} */ name) => {
     const letters = name.normalize("NFKC").replace(/[^\p{ID_Continue}]/gu, "_");

@@ -245,7 +245,7 @@ listen((message) => {
   }
 });
 
-/** A call that the robot could not do: said once for each place and reason. @param {typeof refused.value[0]} call */
+/** Said once for each place and reason. @param {typeof refused.value[0]} call */
 function noteRefused(call) {
   if (refused.value.length >= REFUSED_MAX || refused.value.some(({ line, module, words }) => line === call.line && module === call.module && words === call.words)) return;
   refused.value = [...refused.value, call];
