@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 import pytest
 
-from roboglot.misfits import PYTHON, misfit
+from roboglot.misfits import PYTHON, misfit, read_answer
 
 
 class Side(StrEnum):
@@ -102,3 +102,14 @@ def test_a_deep_nest_is_named() -> None:
     with pytest.raises(RecursionError) as raised:
         msgspec.json.decode(b"[" * 100_000)
     assert misfit(raised.value) == "JSON is nested too deeply"
+
+
+@pytest.mark.parametrize("word", ["nan", "NaN", "inf", "-Infinity", "-nan"])
+def test_a_number_in_an_answer_is_finite(word: str) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        read_answer(f'{{"cornerX": "{word}"}}'.encode(), Corner)
+
+
+def test_numbers_in_answers_may_be_text() -> None:
+    assert read_answer(b'{"cornerX": "1.5", "y": "2"}', Corner) == Corner(1.5, 2)
+    assert read_answer(b'["nan"]', list[str]) == ["nan"]

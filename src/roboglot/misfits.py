@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import TypeVar
 
 import msgspec
+
+T = TypeVar("T")
 
 KINDS = {
     "float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "array": "a list",
@@ -36,6 +39,7 @@ _FORMS = {  # the library's messages; the first group of a missing or unknown fi
     r"Expected `str` matching regex '(.+)'": "{place} must match {}",
     r"Invalid (?:enum )?value (.+)": "{place} cannot be {}",
 }
+_NO_NUMBER = re.compile(rb'"-?(nan|inf|infinity)"', re.IGNORECASE)  # read as a number where text may be one
 _MATCHERS = [(re.compile(pattern, re.DOTALL), form) for pattern, form in _FORMS.items()]
 FORMS = frozenset(form.replace("{place}", "{}") for form in _FORMS.values())
 
@@ -70,3 +74,8 @@ def _in_words(value: str, kinds: Mapping[str, str]) -> str:
     if set(value.split(" | ")) <= {*kinds, "null"}:
         return " or ".join(kinds.get(kind, kind) for kind in value.split(" | "))
     return value.removesuffix(".0").replace("\\\\", "\\")  # a pattern comes as Python writes it
+
+
+def read_answer(body: bytes, kind: type[T]) -> T:
+    """Return an answer in JSON as a value; numbers may be text there, but are finite. Raises msgspec's errors."""
+    return msgspec.json.decode(body, type=kind, strict=_NO_NUMBER.search(body) is not None)

@@ -11,6 +11,7 @@ import msgspec
 
 from roboglot.clients.cyberdog.link import DogLink
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot, TimedOut
+from roboglot.misfits import read_answer
 from roboglot.model.clock import Clock
 from roboglot.wire.cyberdog.codes import Code, InBandError
 
@@ -105,6 +106,6 @@ def _text(params: object) -> str:
 def decode(text: str, kind: type[T], code: Code) -> T:
     """Return a decoded answer to ``code``. Raises BadAnswer."""
     try:
-        return msgspec.json.decode(text, type=kind, strict=False)
+        return read_answer(text.encode(), kind)
     except msgspec.MsgspecError as error:
         raise BadAnswer(f"{code.name}: {error}: {text[:200]}") from None

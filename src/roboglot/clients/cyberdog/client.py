@@ -37,6 +37,7 @@ from roboglot.clients.cyberdog.chapters.system.upkeep import Upkeep
 from roboglot.clients.cyberdog.link import Certificates, DogLink, Heartbeat
 from roboglot.clients.cyberdog.values import PUSHED, Value
 from roboglot.clients.errors import ClientError
+from roboglot.misfits import read_answer
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
 from roboglot.transport.seldom import Seldom
@@ -129,7 +130,7 @@ class CyberDogClient(
             if code == Code.VIDEO:
                 self.signals.push(read_signal(read_params(text)))
             elif code in self._feeds:
-                self._feeds[code].push(msgspec.json.decode(text or "{}", type=PUSHED[Code(code)], strict=False))
+                self._feeds[code].push(read_answer(text.encode() or b"{}", PUSHED[Code(code)]))
             else:
                 log.debug("unknown push %d", code)
         except (msgspec.MsgspecError, NotJson, BadSignal) as error:

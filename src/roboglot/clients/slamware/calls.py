@@ -18,7 +18,7 @@ import msgspec
 
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot
 from roboglot.clients.slamware.http import Answer, HttpLink
-from roboglot.misfits import misfit
+from roboglot.misfits import misfit, read_answer
 from roboglot.model.tap import LOST, Line
 from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap, decode_explore_map
@@ -147,7 +147,7 @@ def without_none(value: Any) -> Any:
             return value
 
 
-def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
+def _decoder(key: str, kind: Any) -> Callable[[Answer], object]:
     """Return a decoder of answers to values of type ``kind``; it raises BadAnswer."""
     if kind in (None, NoneType):
         return lambda _: None
@@ -156,7 +156,7 @@ def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
     if (binary := BINARY_IN.get(kind)) is not None:
         convert: Callable[[bytes], object] = binary
     else:
-        convert = msgspec.json.Decoder(kind, strict=False).decode
+        convert = functools.partial(read_answer, kind=kind)
 
     def decode(answer: Answer) -> object:
         try:
