@@ -11,7 +11,7 @@ import inspect
 import re
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from types import NoneType
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 from urllib.parse import quote, urlencode
 
 import msgspec
@@ -147,7 +147,7 @@ def without_none(value: Any) -> Any:
             return value
 
 
-def _decoder(key: str, kind: Any) -> Callable[[Answer], object]:
+def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
     """Return a decoder of answers to values of type ``kind``; it raises BadAnswer."""
     if kind in (None, NoneType):
         return lambda _: None
@@ -156,7 +156,7 @@ def _decoder(key: str, kind: Any) -> Callable[[Answer], object]:
     if (binary := BINARY_IN.get(kind)) is not None:
         convert: Callable[[bytes], object] = binary
     else:
-        convert = functools.partial(read_answer, kind=kind)
+        convert = functools.partial(read_answer, kind=cast("type[object]", kind))
 
     def decode(answer: Answer) -> object:
         try:

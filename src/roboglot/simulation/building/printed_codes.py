@@ -5,7 +5,6 @@ Arrays of 1 (black) and 0 (white), row 0 at the top, without the white margin. K
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 Squares = NDArray[np.uint8]
 QR_BYTES_MAX = 106  # in the largest code produced here
-_FAMILY = Path(__file__).parent / "april_36h11.json"  # 36 bits each, row by row, 1 is white
+_FAMILY = Path(__file__).parent / "april_36h11.bin"  # 36 bits in 5 bytes each, row by row, 1 is white
 # By version, error correction level L, one block: bytes of data and of correction.
 _QR_SIZES = {1: (19, 7), 2: (34, 10), 3: (55, 15), 4: (80, 20), 5: (108, 26)}
 _UNSET = 2
@@ -23,7 +22,8 @@ _UNSET = 2
 
 @cache
 def _family() -> tuple[int, ...]:
-    return tuple(json.loads(_FAMILY.read_text()))
+    codes = _FAMILY.read_bytes()
+    return tuple(int.from_bytes(codes[at : at + 5], "big") for at in range(0, len(codes), 5))
 
 
 def april(number: int) -> Squares:
