@@ -117,6 +117,26 @@ def test_what_is_not_read_is_counted(tmp_path: Path) -> None:
     assert read_drive_log(carmen(tmp_path / "drive.log")).unread == {"lines of SONAR": 12, "broken lines of FLASER": 1}
 
 
+def test_impossible_times_and_places_are_left_out(tmp_path: Path) -> None:
+    lines = columns(tmp_path / "drive.txt").read_text().splitlines()
+    for number, column, word in ((3, 1, "1e300"), (6, 2, "-20000"), (8, 0, "1e300")):  # after a comment
+        words = lines[number].split()
+        lines[number] = " ".join([*words[:column], word, *words[column + 1 :]])
+    (tmp_path / "odd.txt").write_text("\n".join(lines))
+    recording = read_drive_log(tmp_path / "odd.txt")
+    assert [scan.odometry for scan in recording.scans] == [POSES[k] for k in range(12) if k not in (2, 5, 7)]
+    assert recording.unread == {"impossible scans": 3}
+
+
+@pytest.mark.parametrize("word", ["nan", "-1", "81.91"])
+def test_recording_without_any_echo_is_refused(tmp_path: Path, word: str) -> None:
+    ranges = " ".join([word] * 181)
+    lines = [f"FLASER 181 {ranges} {k / 10} 0 0 {k / 10} 0 0 {k} host {k}" for k in range(9)]
+    (tmp_path / "dark.log").write_text("\n".join(lines))
+    with pytest.raises(BadDriveLog, match="no scan has an echo"):
+        read_drive_log(tmp_path / "dark.log")
+
+
 def test_zero_of_a_coreslam_log_is_unknown(tmp_path: Path) -> None:
     rows = np.zeros((3, 706), int)
     rows[:, 0] = [0, 100_000, 200_000]

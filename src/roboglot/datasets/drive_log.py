@@ -14,8 +14,8 @@ from roboglot.values import dataclass
 FILE_BYTES_MAX = 4_000_000_000
 SCANS_MAX = 2_000_000
 RAYS_MAX = 8192
-USUAL_SHARE = 0.001  # of all readings: the largest reading means "no echo" if it recurs at least this often
-SICK_NO_ECHO = 80.0  # m: from here on, these scanners report codes instead of distances
+USUAL_SHARE = 0.001  # of all readings: the largest means "no echo" if it recurs so often
+SICK_NO_ECHO = 80.0  # m from which these scanners report codes
 
 
 class BadDriveLog(ValueError):
@@ -43,7 +43,7 @@ class DriveLog:
 def no_echo(ranges: NDArray[np.float64], *, least: float) -> float:
     """Return the reading (m) from which rays have no echo: the largest if it recurs and exceeds ``least``, else inf.
 
-    Scanners report "nothing within range" as one fixed large number, which depends on the make.
+    Scanners report it as one large number, which depends on the make.
     """
     readings = ranges[np.isfinite(ranges)]
     if not readings.size:

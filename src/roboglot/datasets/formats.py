@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from roboglot.datasets.carmen import read_carmen
 from roboglot.datasets.columns import read_columns
 from roboglot.datasets.coreslam import COLUMNS, read_coreslam
@@ -11,6 +13,7 @@ from roboglot.datasets.drive_log import FILE_BYTES_MAX, BadDriveLog, DriveLog
 from roboglot.datasets.own_recording import MAGIC, read_own_recording
 from roboglot.datasets.rawlog import read_rawlog
 from roboglot.datasets.rosbag import is_bag, read_bag
+from roboglot.model.geometry import POSITION_MAX, Pose
 
 HEAD_BYTES = 65_536
 GZIP = b"\x1f\x8b"
@@ -19,6 +22,17 @@ CARMEN_WORDS = ("FLASER", "ROBOTLASER", "RAWLASER", "ODOM", "PARAM", "# message_
 
 def read_drive_log(path: Path) -> DriveLog:
     """Read the recording at ``path``. Raises BadDriveLog, MissingExtra, OSError."""
+    log = _read(path)
+    middle = np.median([(it.odometry.x, it.odometry.y) for it in log.scans] or [(0.0, 0.0)], axis=0)
+    near = [it for it in log.scans if it.scan.stamp < 1e11 and it.odometry.distance_to(Pose(*middle)) < POSITION_MAX]
+    if not any(np.isfinite(it.scan.ranges).any() for it in near):
+        raise BadDriveLog(f"{path.name}: no scan has an echo")
+    if lost := len(log.scans) - len(near):
+        log.unread["impossible scans"] = lost
+    return DriveLog(log.name, near, log.unread)
+
+
+def _read(path: Path) -> DriveLog:
     if path.is_dir():
         if is_bag(path, b""):
             return read_bag(path)

@@ -1,4 +1,4 @@
-"""Feeds an estimator from a recording in place of a robot: odometry and lidar components with recorded readings."""
+"""Odometry and lidar with the readings of a recording, for an estimator."""
 
 from __future__ import annotations
 

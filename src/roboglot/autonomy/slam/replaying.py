@@ -21,7 +21,7 @@ RADIUS = 0.3  # m, for a robot of unknown hull
 
 @dataclass(frozen=True, slots=True)
 class MappedDrive:
-    """Result of a replay; ``seconds`` of processor time and ``qualities`` (0..1) of each scan, ``news``: its events.
+    """Result of a replay; processor ``seconds`` and ``qualities`` (0..1) of each scan, ``news``: its events.
 
     ``noise``: learnt noise of odometry's way and yaw, as multiples of the assumed one.
     """

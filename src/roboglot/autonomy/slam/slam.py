@@ -203,7 +203,7 @@ class Slam:
         sure = self._may_add and self._agreement >= TRUSTED and self._known > NEW_GROUND
         self._excursions.take(scan, odometry, self._step, turn, sure=sure)
         self._trajectory.follow(event.stamp, odometry, self._loops.anchor, drives=way >= STILL or turn >= STILL_YAW)
-        if searches:  # last, as in lockstep the result is there at once, and nothing above may replace it
+        if searches:  # last: in lockstep it answers at once, and nothing may replace that
             self._look_everywhere(scan, odometry, event.stamp)
 
     @property
@@ -299,7 +299,7 @@ class Slam:
         return (belief.lost is not None or fell) and not self._looking and stamp - self._looked_at >= LOST_PERIOD
 
     def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
-        """Search the whole map for the place of ``scan``; a known place is given up only for a much better one."""
+        """Search the whole map for the place of ``scan``; a known one is given up only for a much better."""
         belief, grid, agreement = self._belief, self._belief.map, self._agreement
         self._looked_at, self._looking = stamp, True
 
@@ -335,7 +335,7 @@ class Slam:
         return search(self._belief.map, scan, before, window)
 
     def _doubted(self, best: Match, scan: ScanPoints, before: Pose, stamp: float) -> Match:
-        """Return ``best``, or a better match found without odometry, as wheels slip and robots are pushed."""
+        """Return ``best``, or a better match without odometry, as wheels slip and robots are pushed."""
         belief = self._belief
         lost = belief.quality < LOST_QUALITY and stamp - self._searched_at >= LOST_PERIOD
         if belief.search or lost:

@@ -1,4 +1,4 @@
-"""Watches whether the pose in the map is known: reports its loss with a reason, and its recovery."""
+"""Reports when the pose in the map is lost, with a reason, and found again."""
 
 from __future__ import annotations
 
