@@ -39,6 +39,11 @@ PASTS = (1.0, 4.0)  # s of history over which odometry is compared again
 PAST_TURN_MAX = 2.0  # rad turned within them, at most
 
 
+def is_long(step: Pose) -> bool:
+    """Return whether a step of odometry is too long to be compared, and for neighbours to drag its match along."""
+    return math.hypot(step.x, step.y) > WAY_MAX or abs(step.yaw) > TURN_MAX
+
+
 @dataclass(frozen=True, slots=True)
 class Moment:
     """Pose by the ``wheels`` alone and as believed (map); ``way``: m so far; ``variance`` of the wheels, m2."""
@@ -75,10 +80,10 @@ class WheelWitness:
 
         ``before``: pose by odometry (``prior``: its covariance) after the newest ``step`` (in the last base_link).
         """
-        way = math.hypot(step.x, step.y)
-        if way > WAY_MAX or abs(step.yaw) > TURN_MAX:
+        if is_long(step):
             self.forget()
             return None
+        way = math.hypot(step.x, step.y)
         newest = self._odometry.noise.newest.way
         driven = contested(grid, scan, before, best, prior, way, self._sigma(way, newest))
         if not self._past:

@@ -17,7 +17,7 @@ from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.slam.adding import Adding
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, is_well_painted, supported
-from roboglot.autonomy.slam.contest import WheelWitness
+from roboglot.autonomy.slam.contest import WheelWitness, is_long
 from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.excursion import Excursions
 from roboglot.autonomy.slam.loops import LoopCloser
@@ -254,8 +254,9 @@ class Slam:
         shoved = self._check_displaced(before, best, prior, stamp)
         if shoved is None and driven is None and _is_sure(best):
             moved = moved if belief.lost is None else None
-            correction = Correction(before, best, prior, self._step, moved, seconds)
-            self.odometry.learn(correction, self._way, lambda: is_well_painted(belief.map, scan, best.pose))
+            step, pose = self._step, best.pose
+            correction = Correction(before, best, prior, step, moved, seconds)
+            self.odometry.learn(correction, self._way, lambda: is_long(step) or is_well_painted(belief.map, scan, pose))
         belief.covariance = prior if driven else best.covariance
         belief.move_to(best.pose, odometry)
         if shoved is not None:
