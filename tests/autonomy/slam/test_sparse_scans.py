@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def walls(dice: random.Random) -> NDArray[np.float64]:
             line += [(at, 0.0), (at, 0.2 * side), (at + 0.9, 0.2 * side), (at + 0.9, 0.0)]
             at += 0.9
         corners = [(x0 + c * a - s * b, y0 + s * a + c * b) for a, b in [*line, (long, 0.0)]]
-        found += [(*one, *other) for one, other in zip(corners, corners[1:], strict=False)]
+        found += [(*one, *other) for one, other in pairwise(corners)]
     return np.array(found)
 
 
@@ -49,7 +50,8 @@ def ranges(pose: Pose, segments: NDArray[np.float64]) -> NDArray[np.float64]:
     cross = dx * ey - dy * ex
     with np.errstate(divide="ignore", invalid="ignore"):
         along, beside = (x * ey - y * ex) / cross, (x * dy - y * dx) / cross
-    return np.where((along > 0) & (beside >= 0) & (beside <= 1), along, np.inf).min(axis=1)
+    nearest: NDArray[np.float64] = np.where((along > 0) & (beside >= 0) & (beside <= 1), along, np.inf).min(axis=1)
+    return nearest
 
 
 def drive(dice: random.Random) -> DriveLog:
@@ -57,7 +59,7 @@ def drive(dice: random.Random) -> DriveLog:
     segments, scans = walls(dice), list[RecordedScan]()
     corners = [(1.0, 1.0), (LENGTH - 1, 1.0), (LENGTH - 1, DEPTH - 1), (1.0, DEPTH - 1), (1.0, 1.0)]
     places = []
-    for (x, y), (to_x, to_y) in zip(corners, corners[1:], strict=False):
+    for (x, y), (to_x, to_y) in pairwise(corners):
         yaw, way = math.atan2(to_y - y, to_x - x), math.hypot(to_x - x, to_y - y)
         count = int(way / STEP)
         places += [
