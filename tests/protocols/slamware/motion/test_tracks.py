@@ -48,6 +48,12 @@ def test_tracks_are_joined_where_they_cross_and_touch() -> None:
     assert [(p.x, p.y) for p in way] == [(0, 0.5), (0, 0), (2, 0), (2.05, 2), (5, 2), (5, 2.5)]
 
 
+def test_tracks_without_length_are_no_way() -> None:
+    dot = track(0.0, 0.0, 0.0, 1e-200)
+    assert way_along([dot], Point(0, 0), Point(0, 0)) == []
+    assert way_along([dot, track(0, 0, 4, 0)], Point(0, 0), Point(4, 0)) == [Point(0, 0), Point(4, 0)]
+
+
 def test_no_way() -> None:
     assert way_along([], Point(0, 0), Point(1, 1)) == []
     apart = [track(0, 0, 1, 0), track(0, 5, 1, 5)]

@@ -15,6 +15,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
 
 JOIN = 0.1  # m between pieces that are joined
+SAME = 1e-6  # m between two points that count as one
 PIECES_MAX = 3000
 _Points = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ def way_along(tracks: Sequence[Line], start: Point, end: Point, *, directed: boo
 
     ``directed``: every track only from its start to its end. Raises InvalidGoal for too many tracks.
     """
-    pieces = [(a, b) for track in tracks for a, b in pairwise(track.points()) if a != b]
+    pieces = [(a, b) for track in tracks for a, b in pairwise(track.points()) if a.distance_to(b) > SAME]
     if not pieces:
         return []
     if len(pieces) > PIECES_MAX:
@@ -37,7 +38,7 @@ def way_along(tracks: Sequence[Line], start: Point, end: Point, *, directed: boo
     if not found:
         return []
     way = [start, *(Point(*nodes[n].tolist()) for n in found), end]
-    return [way[0], *(b for a, b in pairwise(way) if a.distance_to(b) > 1e-6)]
+    return [way[0], *(b for a, b in pairwise(way) if a.distance_to(b) > SAME)]
 
 
 def _shares(begins: _Points, spans: _Points, point: _Points) -> NDArray[np.float64]:
