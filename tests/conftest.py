@@ -9,6 +9,7 @@ import importlib.util
 import inspect
 import os
 import re
+import signal
 import socket
 import sys
 import tempfile
@@ -33,6 +34,9 @@ settings.load_profile("same")
 # httpx's pool tries to import it at every request: a third of a request's time was spent on a missing module.
 if importlib.util.find_spec("sniffio") is None:
     sys.modules["sniffio"] = None  # type: ignore[assignment]
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background; tests interrupt their processes
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 os.environ.setdefault(installation.WARM, "0")  # no process outlives the tests, and workers are measured as they are
 warm_start.install()
