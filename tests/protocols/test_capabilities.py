@@ -40,6 +40,8 @@ OFF = SILENCING | {"POST /api/core/system/v1/power/:hibernate"}
 REFUSED, NOT_IMPLEMENTED = 400, 501
 # Requests that check themselves whether a part of a component is there: the page lists them as served, with a note.
 ASK_THEMSELVES = {
+    "GET /api/core/system/v1/parameter",  # a dock, for one of its parameters
+    "PUT /api/core/system/v1/parameter",  # an emergency stop, for two of them
     "GET /api/core/system/v1/network/apn",  # a modem
     "PUT /api/core/system/v1/network/apn",
     "PUT /api/core/system/v1/network/route",
