@@ -1,4 +1,4 @@
-"""CARMEN logs, as Radish's: FLASER, ROBOTLASER1, RAWLASER1 with ODOM, and PARAM lines."""
+"""CARMEN logs, the format of Radish's data sets: FLASER, ROBOTLASER1, RAWLASER1 with ODOM, and PARAM lines."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Plain tables, a line per scan: stamp, odometry x y yaw, optionally a reference x y yaw, ranges in m, from the right.
+"""Plain tables, one line per scan: stamp, odometry x y yaw, optionally a reference x y yaw, then the ranges in m.
 
-180, 181, 360 or 361 ranges span 180 degrees, other counts 360.
+180, 181, 360 or 361 ranges span 180 degrees, from the right to the left; other counts span 360 degrees.
 """
 
 from __future__ import annotations
@@ -69,5 +69,5 @@ def table(path: Path) -> NDArray[np.float64]:
         raise BadDriveLog(f"{path.name}: no line of numbers")
     result = np.stack(rows)
     if not np.isfinite(result[:, :4]).all():
-        raise BadDriveLog(f"{path.name}: a stamp or pose is no number")
+        raise BadDriveLog(f"{path.name}: a stamp or a pose is not a number")
     return result

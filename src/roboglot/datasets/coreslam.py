@@ -24,7 +24,7 @@ RANGE_MIN, RANGE_MAX = 0.02, 5.6  # m
 
 
 def read_coreslam(path: Path) -> DriveLog:
-    """Read a log. Raises BadDriveLog."""
+    """Read the log at ``path``. Raises BadDriveLog."""
     rows = table(path)
     if rows.shape[1] not in COLUMNS:
         raise BadDriveLog(f"{path.name}: {rows.shape[1]} columns; a log of CoreSLAM has {COLUMNS[0]}")

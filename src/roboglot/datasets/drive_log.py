@@ -14,8 +14,8 @@ from roboglot.values import dataclass
 FILE_BYTES_MAX = 4_000_000_000
 SCANS_MAX = 2_000_000
 RAYS_MAX = 8192
-USUAL_SHARE = 0.001  # of all readings: the largest means "no echo" if it recurs so often
-SICK_NO_ECHO = 80.0  # m from which these scanners report codes
+USUAL_SHARE = 0.001  # of all readings: the largest means "no echo" if it recurs at least this often
+SICK_NO_ECHO = 80.0  # m from which these scanners report codes instead of distances
 
 
 class BadDriveLog(ValueError):

@@ -16,6 +16,7 @@ from roboglot.datasets.rosbag import is_bag, read_bag
 from roboglot.model.geometry import POSITION_MAX, Pose
 
 HEAD_BYTES = 65_536
+STAMP_MAX = 1e11  # s since 1970, some 3,000 years: a log with later scans is damaged
 GZIP = b"\x1f\x8b"
 CARMEN_WORDS = ("FLASER", "ROBOTLASER", "RAWLASER", "ODOM", "PARAM", "# message_name", "# CARMEN", "SYNC")
 
@@ -23,13 +24,18 @@ CARMEN_WORDS = ("FLASER", "ROBOTLASER", "RAWLASER", "ODOM", "PARAM", "# message_
 def read_drive_log(path: Path) -> DriveLog:
     """Read the recording at ``path``. Raises BadDriveLog, MissingExtra, OSError."""
     log = _read(path)
-    middle = np.median([(it.odometry.x, it.odometry.y) for it in log.scans] or [(0.0, 0.0)], axis=0)
-    near = [it for it in log.scans if it.scan.stamp < 1e11 and it.odometry.distance_to(Pose(*middle)) < POSITION_MAX]
-    if not any(np.isfinite(it.scan.ranges).any() for it in near):
+    places = [(taken.odometry.x, taken.odometry.y) for taken in log.scans]
+    middle = Pose(*np.median(places or [(0.0, 0.0)], axis=0))
+    possible = [
+        taken
+        for taken in log.scans
+        if taken.scan.stamp < STAMP_MAX and taken.odometry.distance_to(middle) < POSITION_MAX
+    ]
+    if not any(np.isfinite(taken.scan.ranges).any() for taken in possible):
         raise BadDriveLog(f"{path.name}: no scan has an echo")
-    if lost := len(log.scans) - len(near):
+    if lost := len(log.scans) - len(possible):
         log.unread["impossible scans"] = lost
-    return DriveLog(log.name, near, log.unread)
+    return DriveLog(log.name, possible, log.unread)
 
 
 def _read(path: Path) -> DriveLog:

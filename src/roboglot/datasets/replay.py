@@ -1,4 +1,4 @@
-"""Odometry and lidar with the readings of a recording, for an estimator."""
+"""Feeds an estimator from a recording in place of a robot: odometry and lidar components with recorded readings."""
 
 from __future__ import annotations
 

@@ -177,7 +177,7 @@ class Courier:
 
     async def _rest(self) -> None:
         """Drive to the parking place, or onto the dock off work and with a low battery."""
-        ask_for(client())  # the robot's own decision, whatever became of the right of the last order's client
+        ask_for(client())  # the robot's own decision: the last order's client may have lost its right
         robot, readiness = self._robot, self.readiness
         readiness.rest_due = False
         docked = readiness.docked

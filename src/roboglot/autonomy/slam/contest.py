@@ -1,7 +1,8 @@
-"""Decides between odometry and scan: in a crowd moving along, most points suggest that the robot stands.
+"""Decides between contradicting odometry and scan: in a crowd moving along, most points suggest that the robot stands.
 
-In a static world, all points that distinguish both poses agree; if not, the wheels are believed, corrected by walls
-alone. The last seconds are judged too: robots ahead drag matches back by millimetres. Needs the kernels.
+In a static world, all points that distinguish both poses agree. If they disagree, some are on moving things, and the
+wheels are believed: their pose, matched to walls alone. Robots driving ahead drag matches back by millimetres per step,
+too little for a single step: so the last seconds are judged too. Needs the kernels.
 """
 
 from __future__ import annotations
@@ -46,7 +47,10 @@ def is_long(step: Pose) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Pose by the ``wheels`` alone and as believed (map); ``way``: m so far; ``variance`` of the wheels, m2."""
+    """Pose of base_link at ``stamp``, by the ``wheels`` alone and as believed (map); sums up to that time.
+
+    ``way``: m driven; ``variance`` of the wheels' noise, m2.
+    """
 
     stamp: float
     wheels: Pose
@@ -56,7 +60,7 @@ class Moment:
 
 
 class WheelWitness:
-    """Checks every match against the wheels."""
+    """Checks every match against the wheels, over the newest step and over the last seconds."""
 
     def __init__(self, odometry: OdometryLearner) -> None:
         self._odometry = odometry
@@ -64,6 +68,7 @@ class WheelWitness:
         self._wheels, self._variance = Pose(), 0.0
 
     def forget(self) -> None:
+        """Forget the past, as the pose was set or is in doubt."""
         self._past.clear()
 
     def note(self, stamp: float, pose: Pose, way: float) -> None:
@@ -106,12 +111,12 @@ class WheelWitness:
         return driven
 
     def _forget_since(self, then: Moment) -> None:
-        """Drop the poses believed after ``then``: they were wrong."""
+        """Drop the poses believed after ``then``: they were wrong, and must not contradict a true one."""
         while self._past[-1] is not then:
             self._past.pop()
 
     def _sigma(self, way: float, variance: float) -> float:
-        """Return the wheels' standard deviation (m) after ``way`` m, with ``variance`` (m2) of noise."""
+        """Return the standard deviation (m) of the wheels after ``way`` m, with ``variance`` (m2) of noise."""
         return STILL + math.sqrt(variance) + self._odometry.bias.scale_doubt * way
 
 
@@ -124,9 +129,9 @@ def contested(
     way: float,
     sigma: float,
 ) -> Match | None:
-    """Return the pose by odometry, unless the scan's points clearly speak for the ``best`` match.
+    """Return the pose by odometry, if the scan's points do not clearly speak for the ``best`` match; else None.
 
-    ``before``: pose by odometry (``prior``: covariance; ``sigma``: m) after ``way`` m.
+    ``before``: pose by odometry (``prior``: its covariance; ``sigma``: its standard deviation, m) after ``way`` m.
     """
     if best.pose.distance_to(before) < max(CONTRADICTION, SIGMAS * sigma):
         return None
@@ -153,7 +158,7 @@ def contested(
 
 
 def _by_walls(grid: EvidenceGrid, scan: ScanPoints, before: Pose, tight: NDArray[np.float64]) -> Match:
-    """Return the wheels' pose, corrected by walls only."""
+    """Return the wheels' pose, corrected by walls only; the match is judged by the whole scan."""
     points = scan.points[:: math.ceil(len(scan.points) / MATCH_POINTS_MAX)]
     walls = np.ascontiguousarray(points[on_walls(points)])
     if len(walls) >= POINTS_MIN:

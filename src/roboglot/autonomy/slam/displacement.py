@@ -1,6 +1,6 @@
-"""Detects motion by anything but the wheels, from the scans' poses against odometry's.
+"""Detects motion of the robot by anything but its wheels, from the scans' poses against odometry's.
 
-A shove is larger than odometry's errors, and sudden.
+Odometry's own errors grow with the distance and are in the prior of each match; a shove is larger, and sudden.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ QUIET = 1.0  # s after a pose was set in which corrections are ignored
 
 
 class DisplacementWatch:
-    """Watch over trusted matches."""
+    """Watch over the corrections of all trusted matches."""
 
     def __init__(self) -> None:
         # stamp; x, y in map; m driven; m, the prior's standard deviation
@@ -28,7 +28,7 @@ class DisplacementWatch:
         self._quiet_until = -math.inf
 
     def forget(self, stamp: float) -> None:
-        """Forget past corrections and ignore the next: the pose is in doubt."""
+        """Forget past corrections, and ignore the next ones: the pose was set, or is in doubt."""
         self._corrections.clear()
         self._quiet_until = stamp + QUIET
 

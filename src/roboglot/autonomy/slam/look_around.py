@@ -1,7 +1,8 @@
-"""Confirms a found place, or decides between similar ones.
+"""Further scans to confirm a found place, or to decide between similar ones.
 
-A newer scan must confirm a single place, as the robot may be carried on. Of several places, those are kept that fit
-after a short drive, too; turning would not change an all-round lidar's view. Needs the kernels.
+A newer scan must confirm a single place, as the robot may be carried on during the search. Of several places, those are
+kept that still fit after a short drive: turning would not change the view of an all-round lidar, so the robot drives to
+where the scan shows room. Needs the kernels.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ SETTLED, SETTLED_YAW = 0.02, math.radians(1.0)  # m, rad between two scans of a 
 
 
 async def settle(clock: Clock, estimator: Slam, belief: Belief) -> bool:
-    """Follow newer scans around the found place until one confirms it; False if they do not fit."""
+    """Follow newer scans around the found place until one confirms it; return False if they do not fit there."""
     end, seen = clock.time() + SETTLE_SECONDS, estimator.newest
     while clock.time() < end:
         await clock.sleep(LISTEN_PERIOD)

@@ -203,7 +203,7 @@ class Slam:
         sure = self._may_add and self._agreement >= TRUSTED and self._known > NEW_GROUND
         self._excursions.take(scan, odometry, self._step, turn, sure=sure)
         self._trajectory.follow(event.stamp, odometry, self._loops.anchor, drives=way >= STILL or turn >= STILL_YAW)
-        if searches:  # last: in lockstep it answers at once, and nothing may replace that
+        if searches:  # last: in lockstep its pose comes at once, and must stay
             self._look_everywhere(scan, odometry, event.stamp)
 
     @property

@@ -1,6 +1,6 @@
 """Detects wheels that turn in vain, by two scans: ranges that should change stay, at an obstacle close by.
 
-Matches cannot where a corridor's end is hidden.
+Needed where matches cannot detect it: in a corridor, pressed against an obstacle that hides its end.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STEEP = 0.3  # cosine between ray and surface below which a range is ignored
 
 
 class SlipWatch:
-    """Watch over every scan; ``radius`` of the hull, m."""
+    """Watch over every scan with odometry's pose; ``radius`` of the hull, m."""
 
     def __init__(self, radius: float) -> None:
         self._radius = radius

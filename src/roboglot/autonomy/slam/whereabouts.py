@@ -1,4 +1,4 @@
-"""Reports when the pose in the map is lost, with a reason, and found again."""
+"""Watches whether the pose in the map is known: reports its loss with a reason, and its recovery."""
 
 from __future__ import annotations
 
