@@ -104,7 +104,7 @@ def test_a_deep_nest_is_named() -> None:
     assert misfit(raised.value) == "JSON is nested too deeply"
 
 
-@pytest.mark.parametrize("word", ["nan", "NaN", "inf", "-Infinity", "-nan"])
+@pytest.mark.parametrize("word", ["nan", "NaN", "inf", "-Infinity", "-nan", r"\u006ean", r"\u002dinf", r"n\u0061n"])
 def test_a_number_in_an_answer_is_finite(word: str) -> None:
     with pytest.raises(msgspec.ValidationError):
         read_answer(f'{{"cornerX": "{word}"}}'.encode(), Corner)

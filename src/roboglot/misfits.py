@@ -39,7 +39,8 @@ _FORMS = {  # the library's messages; the first group of a missing or unknown fi
     r"Expected `str` matching regex '(.+)'": "{place} must match {}",
     r"Invalid (?:enum )?value (.+)": "{place} cannot be {}",
 }
-_NO_NUMBER = re.compile(rb'"-?(nan|inf|infinity)"', re.IGNORECASE)  # read as a number where text may be one
+# Text that would be read as a number where text may be one, or has letters of these words or a minus escaped.
+_NO_NUMBER = re.compile(rb'"-?(nan|inf|infinity)"|\\u00(2d|[46][169e]|[57][49])', re.IGNORECASE)
 _MATCHERS = [(re.compile(pattern, re.DOTALL), form) for pattern, form in _FORMS.items()]
 FORMS = frozenset(form.replace("{place}", "{}") for form in _FORMS.values())
 

@@ -60,7 +60,7 @@ async def test_what_comes_after_the_right_starts_nothing(
 
 
 async def test_no_motion_begins_without_right_to_drive(runtime: Runtime, store: AccessStore) -> None:
-    """Whatever was waited for between the request's check and the motion's start."""
+    """However long passes between the request's check and the motion's start."""
     robot = runtime.fleet.robots["a"]
     store.add_machine("cell", [Grant("a", MAY_ALL)])
     assert runtime.guard is not None

@@ -198,9 +198,7 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
         raise InvalidGoal(f"an update needs files with their sizes and has at most {MODULES_MAX} modules")
     # The total size, and the first file's checksum for all: they are installed together.
     # The manual's example gives no size (0) and ten digits of the checksum.
-    size, versions = (
-        max(1, sum(file.fileSize for file in files)),
-        {module.module: module.latest.version for module in wanted},
-    )
+    size = max(1, sum(file.fileSize for file in files))
+    versions = {module.module: module.latest.version for module in wanted}
     package = FirmwarePackage(wanted[0].latest.version, size, files[0].md5.lower(), versions, url="app")
     return package, frozenset(file.md5.lower() for file in files)
