@@ -1,18 +1,19 @@
 """Contracts: one JSON file per protocol with all of its operations, the reference for coverage.
 
-A row is ``["key", "chapter", "name"]``: the wire name under which a handler registers, the vendor's chapter, and the
-vendor's own identifier.
+A file lists chapters, ``["chapter", [row, ...]]``; a row is ``["key", "name"]``, the wire name under which a handler
+registers and the vendor's own identifier, or just ``"key"``.
 """
 
 from __future__ import annotations
 
 from functools import cache
 from importlib import resources
+from typing import NamedTuple
 
 import msgspec
 
 
-class Row(msgspec.Struct, frozen=True, array_like=True):
+class Row(NamedTuple):
     """One operation, command, message code or function of a protocol."""
 
     key: str
@@ -24,4 +25,9 @@ class Row(msgspec.Struct, frozen=True, array_like=True):
 def contract(protocol: str) -> tuple[Row, ...]:
     """Return all rows of ``protocol``, in the manual's order."""
     data = (resources.files(__package__) / f"{protocol}.json").read_bytes()
-    return msgspec.json.decode(data, type=tuple[Row, ...])
+    chapters = msgspec.json.decode(data, type=list[tuple[str, list[str | tuple[str, str]]]])
+    return tuple(
+        Row(row, chapter, row) if isinstance(row, str) else Row(row[0], chapter, row[1])
+        for chapter, rows in chapters
+        for row in rows
+    )
