@@ -93,10 +93,11 @@ class Lookout:
         points = np.concatenate((seen, remembered)) if len(remembered) else seen
         tight = planner.free_way(path, points, pose, tuning.slow_margin)
         if math.isfinite(tight):
-            self.gap = follower.route.centre(seen, planner.radius + tuning.slow_margin)
-            aim = follower.carrot()  # it may have moved
-            path = follower.route.ahead(pose, *aim, tuning.horizon)
-            tight = planner.free_way(path, points, pose, tuning.slow_margin)
+            self.gap, moved = follower.route.centre(seen, planner.radius + tuning.slow_margin)
+            if moved:
+                aim = follower.carrot()
+                path = follower.route.ahead(pose, *aim, tuning.horizon)
+                tight = planner.free_way(path, points, pose, tuning.slow_margin)
         follower.slow_at = follower.along + tight
         free = planner.free_way(path, points, pose, tuning.touch_margin) if math.isfinite(tight) else tight
         follower.stop_at, blocked = follower.along + free, math.isfinite(free)

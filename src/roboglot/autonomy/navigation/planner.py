@@ -108,6 +108,8 @@ class PlanningTask:
 
     def _check_near(self) -> None:
         """Raise Unreachable for goals more than OFF_MAP m beyond the known map."""
+        if all(self.evidence[self._cell(goal)] for goal in self.goals):
+            return  # all are on it
         rows, columns = (np.flatnonzero(self.evidence.any(axis=axis)) for axis in (1, 0))
         if not len(rows):
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +48,6 @@ class Route:
         self.points, self.along, places = _densified(self.vertices)
         ends = np.cumsum([len(leg) for leg in legs]) - 1
         self.vertices_along = self.along[places]
-        self._corners = [Point(x, y) for x, y in self.vertices.tolist()]
-        self._corners_along: list[float] = self.vertices_along.tolist()
         self.goals_along: list[float] = self.vertices_along[ends].tolist()
         self.goals: list[Point] = [Point(x, y) for x, y in self.vertices[ends].tolist()]
         pairs = zip(self.goals, wanted or self.goals, strict=True)
@@ -60,15 +59,30 @@ class Route:
         self.ends_known = False  # whether the map knows the floor at all goals
         self._ceilings: NDArray[np.float64] = np.zeros(len(self.points))
         self.end = self.goals[-1]
-        self._marks: list[float] = self.along.tolist()  # the same, for single look-ups
-        self._spots: list[list[float]] = self.points.tolist()
+        self.length = float(self.along[-1])  # m
         self._at = 0
         self._planned = self.points.copy()
+        self._moved_to = 0  # points from there on are as planned
 
-    @property
-    def length(self) -> float:
-        """Total length, m."""
-        return self._marks[-1]
+    # For single look-ups; most plans are never driven.
+    @cached_property
+    def _marks(self) -> list[float]:
+        found: list[float] = self.along.tolist()
+        return found
+
+    @cached_property
+    def _spots(self) -> list[list[float]]:
+        found: list[list[float]] = self.points.tolist()
+        return found
+
+    @cached_property
+    def _corners(self) -> list[Point]:
+        return [Point(x, y) for x, y in self.vertices.tolist()]
+
+    @cached_property
+    def _corners_along(self) -> list[float]:
+        found: list[float] = self.vertices_along.tolist()
+        return found
 
     def set_speeds(self, ceilings: NDArray[np.float64], acceleration: float) -> None:
         """Set the speed limits: ``ceilings`` (n; m/s), less in bends, and braking in time for those and the end."""
@@ -89,27 +103,30 @@ class Route:
         lowest = np.minimum.accumulate(energy[::-1])[::-1]
         self.speeds = np.sqrt(np.maximum(0.0, lowest - 2.0 * BRAKING_SHARE * acceleration * self.along))
 
-    def centre(self, echoes: NDArray[np.float64], clearance: float) -> float:
+    def centre(self, echoes: NDArray[np.float64], clearance: float) -> tuple[float, bool]:
         """Move the next stretch to the middle of gaps with less than ``clearance`` (m) on both sides.
 
-        ``echoes`` (n, 2; map, m): present obstacles. Goals keep their places. Returns the narrowest gap's width (m);
-        inf if there is none.
+        ``echoes`` (n, 2; map, m): present obstacles. Goals keep their places. Returns the narrowest gap's width (m; inf
+        if there is none), and whether points may have moved.
         """
         stretch = slice(self._at, min(self._at + CENTRED, len(self.points)))
         way = self._planned[stretch]
         shift, width = sideways(way, echoes, clearance)
+        if math.isinf(width) and self._at >= self._moved_to:
+            return width, False
+        self._moved_to = 0 if math.isinf(width) else stretch.stop
         begin, far = Point(*way[0].tolist()), CENTRED * SPACING + GOAL_KEPT
         for goal in (goal for goal in self.goals if begin.distance_to(goal) <= far):
             shift[np.hypot(way[:, 0] - goal.x, way[:, 1] - goal.y) < GOAL_KEPT] = 0.0
         self.points[stretch] = way + shift
         self._spots[stretch] = self.points[stretch].tolist()
-        return width
+        return width, True
 
     def _bend(self, place: int) -> float:
         """Return the turn (rad, >= 0) at a point of the route."""
         if not 0 < place < len(self.points) - 1:
             return 0.0
-        before, here, behind = (Point(*self._spots[k]) for k in (place - 1, place, place + 1))
+        before, here, behind = (Point(x, y) for x, y in self.points[place - 1 : place + 2].tolist())
         return abs(wrap_angle(here.bearing_to(behind) - before.bearing_to(here)))
 
     def advance(self, pose: Pose, goal: int) -> tuple[float, float]:

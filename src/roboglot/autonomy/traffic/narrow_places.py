@@ -61,17 +61,29 @@ class NarrowPlaces:
         No disc as wide as two robots fits into the free floor there, or it is a door.
         """
         self._update(grid, Point(float(points[0, 0]), float(points[0, 1])), now)
-        while UNSEEN in (found := kinds_at(self._found, points, *self._corner, RESOLUTION, OPEN)):
-            x, y = points[found.tolist().index(UNSEEN)].tolist()
-            piece = math.floor(y / RESOLUTION) // TILE, math.floor(x / RESOLUTION) // TILE
-            top, left = (number * TILE - first for number, first in zip(piece, self._corner, strict=True))
-            self._found[top : top + TILE, left : left + TILE] = self._examined(piece)
-        is_narrow: NDArray[np.bool_] = found == NARROW
-        return is_narrow
+        while True:
+            found = kinds_at(self._found, points, *self._corner, RESOLUTION, OPEN)
+            if (first := found.tobytes().find(UNSEEN)) < 0:
+                return np.equal(found, NARROW)
+            x, y = points[first].tolist()
+            self._examine(math.floor(y / RESOLUTION), math.floor(x / RESOLUTION))
 
     def holds(self, grid: EvidenceGrid, here: Point, place: Point, now: float) -> bool:
         """Return the same for one ``place``; the robot is ``here``."""
-        return bool(self.at(grid, np.array([(here.x, here.y), (place.x, place.y)]), now)[1])
+        self._update(grid, here, now)
+        at = row, column = math.floor(place.y / RESOLUTION), math.floor(place.x / RESOLUTION)
+        row, column = row - self._corner[0], column - self._corner[1]
+        if not (0 <= row < self._found.shape[0] and 0 <= column < self._found.shape[1]):
+            return False
+        if self._found[row, column] == UNSEEN:
+            self._examine(*at)
+        return bool(self._found[row, column] == NARROW)
+
+    def _examine(self, row: int, column: int) -> None:
+        """Examine the piece around a cell, counted from the map's origin."""
+        piece = row // TILE, column // TILE
+        top, left = (number * TILE - first for number, first in zip(piece, self._corner, strict=True))
+        self._found[top : top + TILE, left : left + TILE] = self._examined(piece)
 
     def _update(self, grid: EvidenceGrid, here: Point, now: float) -> None:
         """Copy the map around ``here`` if the copy is too old, or of another place."""

@@ -84,11 +84,9 @@ class Traffic:
         if not self._trail or self._trail[-1].distance_to(pose) > TRAIL_STEP:
             self._trail.append(pose.point)
         heard = self._announcer.heard(stamp)
-        movers = [
-            mover
-            for mover in self._watch().observe(echoes, self._belief.map, pose, stamp)
-            if not any(mover.point.distance_to(other.pose) < SAME for other in heard)
-        ]
+        movers = [*self._watch().observe(echoes, self._belief.map, pose, stamp)]
+        if heard:
+            movers = [one for one in movers if not any(one.point.distance_to(other.pose) < SAME for other in heard)]
         self._announcer.watch((m.x, m.y, m.radius, m.speed) for m in movers if _is_passing(m, self._belief.map, stamp))
         inside = self._announcer.inside = self._is_inside(pose, heard, movers, stamp)
         self._ways = []

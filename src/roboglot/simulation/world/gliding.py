@@ -69,11 +69,13 @@ class Gliding:
         (*moving, slack, stiffness, damping), (_, ranges, *servos) = self.state, self.servos
         springs = ranges, slack, stiffness, damping
         self._motion = hulls, uprights, *moving, *springs, *servos, GRAVITY, float(model.opt.timestep)
-        self._car: tuple[FloatArray, FloatArray, FloatArray] | None = None  # place, rate and goal
+        self._car: tuple[memoryview[float], memoryview[float], memoryview[float]] | None = None  # place, rate and goal
         if car:
             joint, servo = model.joint("car"), model.actuator("car").id
             q, v = joint.qposadr[0], joint.dofadr[0]
-            self._car = data.qpos[q : q + 1], data.qvel[v : v + 1], data.ctrl[servo : servo + 1]  # views
+            views = data.qpos[q : q + 1], data.qvel[v : v + 1], data.ctrl[servo : servo + 1]
+            place, rate, goal = (view.data.cast("B").cast("d") for view in views)
+            self._car = place, rate, goal
 
     def load_kernels(self) -> None:
         """Compute with the compiled kernels from now on."""
@@ -112,5 +114,5 @@ class Gliding:
     def _car_stands(self) -> bool:
         if self._car is None:
             return True
-        place, rate, goal = (float(number[0]) for number in self._car)
-        return -RESTS <= rate <= RESTS and -RESTS <= place - goal <= RESTS
+        place, rate, goal = self._car
+        return -RESTS <= rate[0] <= RESTS and -RESTS <= place[0] - goal[0] <= RESTS
