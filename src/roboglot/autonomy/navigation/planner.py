@@ -99,12 +99,8 @@ class PlanningTask:
         route.set_speeds(ceilings, self.acceleration)
         unknown = self.evidence[cells[:, 1], cells[:, 0]] == 0
         route.unknown = float(np.diff(route.along, prepend=0.0)[unknown].sum())
-        route.ends_known = self._are_known(self.goals)
+        route.ends_known = all(self.evidence[self._cell(goal)] < 0 for goal in self.goals)
         return route
-
-    def _are_known(self, goals: tuple[Point, ...]) -> bool:
-        """Return whether all goals lie on known floor."""
-        return all(bool(self.evidence[self._cell(goal)] < 0) for goal in goals)
 
     def _check_near(self) -> None:
         """Raise Unreachable for goals more than OFF_MAP m beyond the known map."""
