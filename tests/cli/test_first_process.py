@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -32,9 +33,9 @@ def test_a_first_process_that_loads_ends_at_sigterm() -> None:
         assert process.stdout
         if process.stdout.readline() != "loading\n":
             pytest.skip("no process namespaces here")
-        first = subprocess.check_output(["ps", "--ppid", str(process.pid), "-o", "pid="], text=True)
-        os.kill(int(first), signal.SIGTERM)
         try:
+            first = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
+            os.kill(int(first), signal.SIGTERM)
             assert process.wait(20) == 128 + signal.SIGTERM
         finally:
             process.kill()

@@ -19,12 +19,13 @@ async def listen(
     try:
         server = await asyncio.get_running_loop().create_server(factory, address, port, backlog=backlog)
     except OSError as error:
-        if error.errno == errno.EADDRINUSE:
+        number = error.errno or errno.EADDRNOTAVAIL  # for which Python 3.13 and later give no number
+        if number == errno.EADDRINUSE:
             reason = f"{address}:{port} is in use by another program"
         else:
-            why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or str(error)
+            why = os.strerror(number) if number > 0 else error.strerror or str(error)
             reason = f"cannot listen on {address}:{port}: {why}"
-        raise OSError(error.errno, reason) from None
+        raise OSError(number, reason) from None
     for listening in server.sockets:
         end_vanished(listening)
     return server
