@@ -279,14 +279,15 @@ class LockstepClock(Clock):
         self._end = math.nextafter(end, -math.inf) if turn >= 0 else limit
         while self._heap and self._heap[0][0] <= limit:
             when, _, timer = self._heap[0]
-            if (callback := timer.callback) is not None and max(when, self._now) == end:
-                fired = self._turn if self._now == end else 0
-                if 0 <= turn <= fired:
-                    break
+            callback = timer.callback
+            last = turn >= 0 and callback is not None and max(when, self._now) == end
+            if last and turn <= (self._turn if self._now == end else 0):
+                break
             heapq.heappop(self._heap)
             if callback is None:
                 continue
-            self._set(max(self._now, when))
+            if when > self._now:
+                self._now, self._turn = when, 0
             self._turn += 1
             callback()
             if ready or self._held or self._arrived:  # the usual case: nothing to run

@@ -52,8 +52,7 @@ class LowSight:
         if DepthCamera in robot and (image := robot[DepthCamera].image) is not None:
             views.append(self._in_image(image))
         if TimeOfFlight in robot:
-            eyes = robot[TimeOfFlight]
-            views.append(self._in_zones([eyes.reading(name) for name in eyes.names]))
+            views.append(self._in_zones(robot[TimeOfFlight].readings))
         if not views:
             return LowView(NONE, NONE)
         obstacles = _joined([standing for standing, _ in views if len(standing)])

@@ -59,6 +59,11 @@ class PersonState:
         row[PERSON_X], row[PERSON_X + 1], row[PERSON_X + 2] = pose.x, pose.y, pose.yaw
 
     @property
+    def spot(self) -> tuple[float, float]:
+        """Present place."""
+        return self._row[PERSON_X], self._row[PERSON_X + 1]
+
+    @property
     def walking(self) -> bool:
         """True if they walked in the last tick."""
         return self._row[PERSON_STRIDES] != 0.0

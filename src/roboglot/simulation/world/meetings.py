@@ -39,7 +39,10 @@ class Meetings:
     @property
     def known(self) -> bool:
         """True if nothing but people has jumped since the last ``note``."""
-        return self._changes() == self._revision and not any(hull.disturbed for hull in self._hulls)
+        for hull in self._hulls:
+            if hull.disturbed:
+                return False
+        return self._changes() == self._revision
 
     def note(self) -> None:
         """Note that contacts were searched for, or found impossible, with everything at its present place."""

@@ -165,8 +165,7 @@ class Sight:
         for walker in self._walkers:
             person = walker.person
             if walker.floor == floor and 0.0 < height < person.height:
-                pose = walker.pose
-                found.append((pose.x, pose.y, _girth(person.radius, person.height, height), 0.0))
+                found.append((*walker.spot, _girth(person.radius, person.height, height), 0.0))
         return found
 
     def _robots_at(self, floor: int, height: float) -> list[Four]:

@@ -293,18 +293,19 @@ class World:
             self._clock.go_ahead(self.time)
             self.building.step(self.time, TICK)
         self._environment.sight.moved()
-        ticking.end(left, self.time, beads.fly if beads.flying else None)
+        now = self.time
+        ticking.end(left, now, beads.fly if beads.flying else None)
         yield
-        yield from rounds.sense(robots, self.time)
+        yield from rounds.sense(robots, now)
 
     def _most(self) -> int:
         """Return how many ticks may be done at once, the present one included; 0: it takes small steps."""
         if self._environment.beads.flying:
             return 0
-        until = min(self._clock.free_until, self.faults.next)
-        if until <= self.time or not self.building.rests:
+        most = self._rounds.free(AHEAD_MAX) if self.building.rests else 1
+        until = min(self._clock.free_until, self.faults.next) if most > 1 else -math.inf
+        if until <= self.time:
             return 1
-        most = self._rounds.free(AHEAD_MAX)
         while most > 1 and self._origin + (self._ticks + most - 1) * TICK > until:
             most -= 1
         return most

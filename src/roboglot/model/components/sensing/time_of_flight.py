@@ -46,6 +46,11 @@ class TimeOfFlight(Component):
     names: tuple[str, ...]
     rate: float
 
+    @property
+    def readings(self) -> list[ZoneDistances]:
+        """The latest measurements of all, in the order of ``names``."""
+        return [self.reading(name) for name in self.names]
+
     @abstractmethod
     def reading(self, name: str) -> ZoneDistances:
         """Return the latest measurement. Raises NotFound."""

@@ -221,4 +221,5 @@ PART = Part(
     after=("base", "dock_contact"),
     sense=SimulatedBattery.sense,
     every=5,
+    first=5,
 )

@@ -83,5 +83,6 @@ PART = Part(
     after=("base", "bumper_stop"),
     sense=SoftTouch.sense,
     every=PERIOD,
+    first=PERIOD,
     duty=lambda touch: touch.duty,
 )

@@ -70,18 +70,22 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         bundle = _bundle(section.field_of_view)
         self._bundles = np.concatenate([bundle @ rotation((0.0, eye.pitch), eye.yaw).T for eye in section.sensors])
         self._mounts = np.array([(eye.forward, eye.left, eye.above_belly) for eye in section.sensors])
-        self._readings: dict[str, ZoneDistances] = {}
+        self._readings: list[ZoneDistances] = []
         self._measured_at = -math.inf
         self._held: _Held | None = None
 
-    def reading(self, name: str) -> ZoneDistances:
-        if name not in self.names:
-            raise NotFound(f"there is no time-of-flight sensor {name!r}")
+    @property
+    def readings(self) -> list[ZoneDistances]:
         now = self._clock.time()
         if now - self._measured_at >= 1.0 / self.rate - 1e-6:
             self._measured_at = now
             self._measure(now)
-        return self._readings[name]
+        return self._readings
+
+    def reading(self, name: str) -> ZoneDistances:
+        if name not in self.names:
+            raise NotFound(f"there is no time-of-flight sensor {name!r}")
+        return self.readings[self.names.index(name)]
 
     def _measure(self, stamp: float) -> None:
         """Take readings of all sensors at once."""
@@ -100,8 +104,8 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         distances[distances < section.range_min] = -np.inf
         grids, low, high = distances.reshape(-1, ZONES, ZONES).astype(np.float32), section.range_min, section.range_max
         grids.setflags(write=False)
-        for name, grid, rays, eye in zip(self.names, grids, held.rays, held.places, strict=True):
-            self._readings[name] = ZoneDistances(stamp, grid, low, high, rays, eye)
+        views = zip(grids, held.rays, held.places, strict=True)
+        self._readings = [ZoneDistances(stamp, grid, low, high, rays, eye) for grid, rays, eye in views]
 
     def _hold(self, posture: tuple[Orientation, Point, float]) -> _Held:
         """Compute the sensors' positions and rays, once per posture of the torso."""

@@ -284,4 +284,5 @@ PART = Part(
     fit=_fit,
     sense=SimulatedNetwork.sense,
     every=5,
+    first=5,
 )
