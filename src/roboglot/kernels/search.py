@@ -252,7 +252,10 @@ def reopen(
     height, width = cost.shape
     around = int(np.ceil(reach)) + 3
     for row in range(height):
+        some = np.uint8(0)
         for col in range(width):
+            some |= trodden[row, col]
+        for col in range(width if some else 0):  # most rows have none
             if trodden[row, col] == 0 or np.isfinite(cost[row, col]):
                 continue
             nearest = (reach + 3.0) ** 2

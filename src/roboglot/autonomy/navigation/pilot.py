@@ -140,9 +140,9 @@ class Pilot:
 
     def _step(self, follower: Follower) -> State:
         """Set the base's velocity for the next period; return the state that follows. Raises Blocked, NotLocalized."""
-        if self._is_over(follower):
-            return State.TURNING
         pose = self._belief.pose
+        if self._is_over(follower, pose):
+            return State.TURNING
         if self._replanner.advance(follower):
             self._patience.take(follower.left)
         if not self._lookout.watches(follower) or self._belief.in_doubt:
@@ -165,9 +165,9 @@ class Pilot:
         self._patience.begin_anew()
         return State.FOLLOWING
 
-    def _is_over(self, follower: Follower) -> bool:
+    def _is_over(self, follower: Follower, pose: Pose) -> bool:
         """Return whether to brake at the end of the route. Raises Blocked or NotLocalized to give up."""
-        pose, patience, tuning = self._belief.pose, self._patience, self._tuning
+        patience, tuning = self._patience, self._tuning
         follower.locate(pose)
         self._journey.far += follower.speed * PERIOD
         self._count(follower, pose)

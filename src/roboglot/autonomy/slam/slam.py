@@ -166,7 +166,7 @@ class Slam:
     def _take(self, event: ScanTaken) -> None:
         belief, odometry, self._newest = self._belief, event.odometry, event
         self._straighten(odometry, event.stamp)
-        if _is_covered(event.scan.ranges):
+        if not len(belief.reader.read(event.scan).ends) and _is_covered(event.scan.ranges):
             belief.quality *= 1.0 - QUALITY_GAIN
             return  # a covered lidar sends empty scans: treat it as silent
         if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
@@ -375,8 +375,6 @@ class Slam:
 
 def _is_covered(ranges: NDArray[np.float32]) -> bool:
     """Return whether nearly all rays are NaN."""
-    if not math.isnan(np.minimum.reduce(ranges, initial=np.inf)):  # no NaN passes this
-        return False
     return bool(np.count_nonzero(np.isnan(ranges)) > (1.0 - ECHO_SHARE_MIN) * len(ranges))
 
 

@@ -53,6 +53,8 @@ class OneWay:
         if not coming:
             return None
         tight = narrow()
+        if not tight[: round(NEAR / SPACING) + 1].any():
+            return None
         for begin, end in () if tight[0] else _stretches(tight):
             if begin * SPACING > NEAR:
                 return None

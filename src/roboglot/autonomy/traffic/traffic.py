@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,13 +90,14 @@ class Traffic:
         if heard:
             movers = [one for one in movers if not any(one.point.distance_to(other.pose) < SAME for other in heard)]
         self._announcer.watch((m.x, m.y, m.radius, m.speed) for m in movers if _is_passing(m, self._belief.map, stamp))
-        inside = self._announcer.inside = self._is_inside(pose, heard, movers, stamp)
+        inside = partial(self._is_inside, pose, heard, movers, stamp)  # most movers are far from narrow places
+        self._announcer.inside = bool(heard or self._announcer.frame) and inside()
         self._ways = []
         if heard:
             mine = self._announcer.announcement(stamp)
             self._ways = [announced_way(other, mine, lively=self._goes(other)) for other in heard]
         self._went = {other.robot: self._went[other.robot] for other in heard if other.robot in self._went}
-        self._ways += [_expected(self._tight, mover, pose, stamp, inside=inside) for mover in movers]
+        self._ways += [_expected(self._tight, mover, pose, stamp, inside) for mover in movers]
         self._one_way.observe(self._ways, stamp)
 
     def _is_inside(self, pose: Pose, heard: list[Announcement], movers: list[Mover], stamp: float) -> bool:
@@ -299,10 +302,10 @@ def _is_passing(mover: Mover, grid: EvidenceGrid, stamp: float) -> bool:
     return within and bool(grid.evidence[row, column] < 0)
 
 
-def _expected(tight: Tight, mover: Mover, pose: Pose, stamp: float, *, inside: bool) -> Way:
+def _expected(tight: Tight, mover: Mover, pose: Pose, stamp: float, inside: Callable[[], bool]) -> Way:
     """Return the way of a robot that announces none: it goes first if only it is in a narrow place."""
     stood, proven = stamp - mover.moved_at, stamp - mover.since >= PROVEN
-    if not inside and proven and stood <= STOPPED and tight.holds(pose.point, mover.point):
+    if proven and stood <= STOPPED and tight.holds(pose.point, mover.point) and not inside():
         points = straight_on(mover, THROUGH)
         narrow = tight.along(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
         return through_narrow(mover, points, narrow)
