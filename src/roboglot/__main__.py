@@ -5,6 +5,18 @@ import os
 import signal
 import sys
 
+STDERR = 2
+
+
+def hold_standard_files() -> None:
+    """Open those that are closed, before a library's file or a socket gets such a number, and is read as our input.
+
+    uvloop aborts on its own among them.
+    """
+    while (null := os.open(os.devnull, os.O_RDWR)) <= STDERR:
+        pass
+    os.close(null)
+
 
 def _look_elsewhere_last() -> None:
     """Search PYTHONPATH last, so that no module of another project shadows a library of ours."""
@@ -28,6 +40,7 @@ def run() -> None:
     Loading leaves hardly any garbage: the collector, which would look at all of it many times, begins with a command.
     """
     gc.disable()
+    hold_standard_files()
     if os.getpid() == 1:  # in a container, where the kernel drops signals that have no handler yet
         signal.signal(signal.SIGTERM, lambda *_: os._exit(128 + signal.SIGTERM))
     _look_elsewhere_last()

@@ -15,9 +15,10 @@ from roboglot.cli.up import FILE_MAX, LINE_MAX, lines_of
 TEXT = b"1\n" + b"9" * (LINE_MAX + 1) + b"\n 0.5\n"
 LINES = ["1", "(a line that is too long)", "0.5"]
 PROCESS = """
+from roboglot.__main__ import hold_standard_files
+hold_standard_files()
 import os, uvloop
 from roboglot.cli import up
-up.prepare()
 async def main():
     print([line async for line in up.lines_of(0)], os.path.exists("/proc/self/fd/0"))
 uvloop.run(main())

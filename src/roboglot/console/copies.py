@@ -86,7 +86,7 @@ def _rest_python(request: Request, address: str) -> str:
         "from urllib.error import HTTPError\nfrom urllib.request import Request, urlopen\n\n"
         f"request = Request({address + request.path!r}, method={request.method!r}{body})\n"
         "try:\n    answer = urlopen(request)\nexcept HTTPError as refusal:\n    answer = refusal\n"
-        "print(answer.status, answer.read().decode())\n"
+        "with answer:\n    print(answer.status, answer.read().decode())\n"
     )
 
 

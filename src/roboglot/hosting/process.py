@@ -11,15 +11,11 @@ import threading
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # from malloc.h
 SWITCH_SECONDS = 0.001  # s for which other threads (database, pictures) may block the main thread
 KEPT, SPARE = 1 << 19, 1 << 21  # bytes of blocks that come from the heap, and of free heap that is not given back
-STDERR = 2
 LAST_SECONDS = 10.0  # s after a signal; closing takes one or two
 
 
 def prepare() -> None:
     """Set up heap, threads and gRPC's log for a process that serves robots; before NumPy is imported."""
-    while (null := os.open(os.devnull, os.O_RDWR)) <= STDERR:  # uvloop aborts on its own descriptors among these
-        pass
-    os.close(null)
     _give_memory_back()
     sys.setswitchinterval(SWITCH_SECONDS)
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # the door logs the errors that matter
