@@ -25,7 +25,8 @@ PORTS = (1448, 40923, 50052)
 LATER = (  # what a start need not load: clients come later, files may be old, doors closed
     "PIL av cryptography numba rich uvicorn yaml websockets roboglot.access.guard roboglot.console.application"
     " roboglot.console.studio.lessons roboglot.protocols.foxglove.dispatch roboglot.protocols.ros2.server"
-    " roboglot.protocols.vda5050.server roboglot.recording.recorder"
+    " roboglot.protocols.vda5050.server roboglot.recording.recorder statistics webbrowser importlib.resources"
+    " google.protobuf.descriptor_pb2"
 )
 OPENED = f"""
 import asyncio, sys
@@ -39,6 +40,18 @@ async def start():
     await built.close()
 
 asyncio.run(start())
+"""
+CONNECTED = """
+import sys
+from roboglot.extras import open_uvicorn
+open_uvicorn()
+import uvicorn.lifespan.off, uvicorn.protocols.http.httptools_impl, uvicorn.protocols.websockets.wsproto_impl
+from uvicorn.server import ServerState
+open_uvicorn()
+print({"click", "multiprocessing", "uvicorn.main"} & sys.modules.keys())
+assert uvicorn.Config is uvicorn.config.Config
+from uvicorn import Server, run
+assert Server is sys.modules["uvicorn.server"].Server and uvicorn.run is run and uvicorn.Config is uvicorn.config.Config
 """
 
 
@@ -104,3 +117,8 @@ def test_a_start_loads_nothing_for_later(tmp_path: Path) -> None:
     run = [sys.executable, "-c", OPENED, str(tmp_path / "data")]
     ended = subprocess.run(run, capture_output=True, text=True, check=True)
     assert ended.stdout == "[]\n"
+
+
+def test_uvicorn_comes_without_its_command_line() -> None:
+    found = subprocess.run([sys.executable, "-c", CONNECTED], stdout=subprocess.PIPE, text=True, check=True)
+    assert found.stdout.strip() == "set()"

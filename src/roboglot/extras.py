@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
-from importlib.util import find_spec
+from importlib.util import find_spec, module_from_spec
 from types import ModuleType
 
 # The extra to install for a module; for a module in several extras, the one most likely missing.
@@ -148,6 +148,23 @@ class _Lazy(ModuleType):
 def lazy(module: str) -> object:
     """Return a module that is imported at its first use; that raises MissingExtra if its extra is not installed."""
     return _Lazy(module)
+
+
+def open_uvicorn() -> None:
+    """Let modules of uvicorn be imported without its command line (1.5 MB), which comes once it is asked for."""
+    if "uvicorn" in sys.modules or (spec := find_spec("uvicorn")) is None or (loader := spec.loader) is None:
+        return
+    package = module_from_spec(spec)
+
+    def look_up(name: str) -> object:
+        if name == "Config":
+            return import_module("uvicorn.config").Config
+        vars(package).pop("__getattr__", None)
+        loader.exec_module(package)
+        return getattr(package, name)
+
+    vars(package)["__getattr__"] = look_up
+    sys.modules["uvicorn"] = package
 
 
 @cache

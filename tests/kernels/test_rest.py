@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import numpy as np
@@ -9,6 +10,19 @@ import pytest
 
 from roboglot.kernels import _unwritten, loading, rest
 
+WITHOUT_YAML = """
+import importlib, sys
+from concurrent.futures import ThreadPoolExecutor
+from roboglot.kernels import loading
+finders = len(sys.meta_path)
+with loading():
+    import numba
+    print("yaml" in sys.modules)
+    ThreadPoolExecutor().submit(importlib.import_module, "yaml").result()
+    del sys.modules["yaml"]
+import yaml
+print(len(sys.meta_path) > finders)
+"""
 MAPS = """\
 7f00-7f10 r-xp 00001000 08:01 7 /x/libllvmlite.so
 Rss:                  40 kB
@@ -76,3 +90,9 @@ def test_nothing_is_given_back_when_nothing_was_loaded(monkeypatch: pytest.Monke
     with loading():
         monkeypatch.setitem(sys.modules, "roboglot.kernels.sweep", roboglot.kernels.sweep)
     assert asked
+
+
+def test_numba_is_loaded_without_yaml_which_others_find() -> None:
+    """Numba would read a file of settings with it; another thread may need it at the same time."""
+    found = subprocess.run([sys.executable, "-c", WITHOUT_YAML], stdout=subprocess.PIPE, text=True, check=True)
+    assert found.stdout.split() == ["False", "False"]

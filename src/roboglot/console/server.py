@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from roboglot.config import ConsoleConfig
 from roboglot.console.desk import Desk
 from roboglot.console.settings import BEAT, BEAT_PAGES, PORTS_TRIED_MAX
-from roboglot.extras import MissingExtra, in_words, is_there
+from roboglot.extras import MissingExtra, in_words, is_there, open_uvicorn
 from roboglot.model.admission import Admission
 from roboglot.model.background import load
 from roboglot.model.errors import RobotError
@@ -199,6 +199,7 @@ def those_due(pages: Sequence[Page], number: int) -> list[Page]:
 
 def _load() -> None:
     """Import slow libraries; call it off the loop."""
+    open_uvicorn()
     for library in LIBRARIES:
         importlib.import_module(library)
 

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import get_ident
 
 # The order: needed by mapping and navigation, imported by others, slow to compile.
 NAVIGATION = (
@@ -38,9 +39,28 @@ def loading() -> Iterator[None]:
     Costs nothing if everything was there already.
     """
     before = _loaded()
-    yield
+    with _without_yaml():
+        yield
     if _loaded() != before:
         rest()
+
+
+@contextmanager
+def _without_yaml() -> Iterator[None]:
+    """Context in which this thread finds no ``yaml``, which Numba loads for a file that hardly anybody has: 0.8 MB."""
+    thread = get_ident()
+
+    class Finder:
+        @staticmethod
+        def find_spec(name: str, _path: object, _target: object = None) -> None:
+            if name == "yaml" and get_ident() == thread and not Path(".numba_config.yaml").exists():
+                raise ModuleNotFoundError(f"{name} is not needed", name=name)
+
+    sys.meta_path.insert(0, Finder)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(Finder)
 
 
 def _loaded() -> set[str]:

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from roboglot.extras import MissingExtra, in_words, is_there
+from roboglot.extras import MissingExtra, in_words, is_there, open_uvicorn
 from roboglot.model.components.mapping.storeys import Storeys
 from roboglot.model.components.system.firmware import Module
 from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, ShuttingDown
@@ -111,6 +111,7 @@ class SlamwareDoor:
 
     def _connection(self) -> HttpConnection:
         if self._connections is None:
+            open_uvicorn()
             from roboglot.protocols.slamware.http_connection import HttpConnections
 
             self._connections = HttpConnections(self._application)
