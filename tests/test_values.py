@@ -220,18 +220,23 @@ def test_threads_may_use_a_class_first() -> None:
         assert len(set(made)) == 1
 
 
-def test_no_signature_is_worded_for_a_method(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_signature_is_worded_for_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
     """The library words one for a class without a docstring, which takes as long as all else."""
     monkeypatch.delattr(inspect, "signature")  # the library then fails
 
     @values.dataclass(frozen=True)
     class Plain:
-        """A class like ours, which has a docstring."""
+        """A class like most of ours."""
 
+        x: int
+
+    @values.dataclass(slots=True)
+    class Bare:
         x: int
 
     assert repr(Plain(1)) == f"{Plain.__qualname__}(x=1)"
     assert {Plain(1)} == {Plain(1)}
+    assert (Plain.__doc__, Bare.__doc__) == ("A class like most of ours.", "Bare()")
 
 
 def test_initialisers_can_be_made_ahead() -> None:

@@ -1,5 +1,6 @@
 """Usage of the command, however it is called, and readers of its output that go."""
 
+import gc
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from rich.text import Text
 from typer.main import get_command
 
+from roboglot import cli
 from roboglot.cli import COMMANDS, loaded, screen, up
 
 
@@ -62,3 +64,13 @@ def test_a_robot_is_given_once() -> None:
     assert bodies == [("a", "cyberdog2"), ("b", "hermes")]
     with pytest.raises(ValueError, match=r"robot b is given twice: by 'b=hermes', and before$"):
         up._robots(["b=universal", "b=hermes"])
+
+
+def test_collector_scans_nothing_loaded_before_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its first look at all that takes a fortieth of a start."""
+    kept: list[int] = []
+    monkeypatch.setattr(cli, "built", lambda _: lambda **_: kept.append(gc.get_freeze_count()))
+    monkeypatch.setattr(sys, "argv", ["roboglot", "doctor"])
+    before, loaded_before = gc.get_freeze_count(), [[number] for number in range(10_000)]
+    cli.main()
+    assert kept[0] - before > len(loaded_before) / 2

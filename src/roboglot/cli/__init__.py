@@ -124,6 +124,7 @@ def _obey(name: str) -> None:
     elif name in COMMANDS:
         command = built(name)
         sys.argv[:2] = [f"roboglot {name}"]
+        gc.freeze()  # everything loaded stays: the collector need not scan it
         gc.enable()
         command(prog_name=f"roboglot {name}")
     else:

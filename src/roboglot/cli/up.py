@@ -15,7 +15,6 @@ import signal
 import sqlite3
 import sys
 import threading
-import webbrowser
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Annotated
@@ -220,6 +219,8 @@ async def _serve(config: Config, *, open_console: bool) -> int:
         announce(config, {name: doors.endpoints for name, doors in runtime.doors.items()}, page)
         print("ready", flush=True)
         if page and open_console:
+            import webbrowser
+
             threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()  # it may wait for a browser
         stepping = asyncio.ensure_future(_step(runtime.clock)) if isinstance(runtime.clock, LockstepClock) else None
         await stop.wait()

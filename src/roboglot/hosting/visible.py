@@ -13,7 +13,7 @@ _WRITTEN_OUT = {
     for code in (*_CONTROLS, *_REORDERING)
     if chr(code) not in _KEPT
 }
-_NOT_XML = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # characters that XML 1.0 lacks
+_NOT_XML = "[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # characters that XML 1.0 lacks
 
 
 def visible(text: str) -> str:
@@ -23,7 +23,7 @@ def visible(text: str) -> str:
 
 def xml_text(text: str) -> str:
     """Return ``text`` with characters that XML cannot hold replaced."""
-    return _NOT_XML.sub("\ufffd", text)
+    return re.sub(_NOT_XML, "\ufffd", text)
 
 
 class VisibleFormatter(logging.Formatter):

@@ -13,7 +13,7 @@ import sqlite3
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from importlib import resources
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -228,7 +228,7 @@ def _empty(schema: str) -> bytes:
 
 def _migrate(connection: sqlite3.Connection, schema: str) -> None:
     """Apply the schema files that this database has not seen yet; other programs may do so at the same time."""
-    files = resources.files(schema)
+    files = Path(*import_module(schema).__path__)
     versions = sorted(int(m[1]) for f in files.iterdir() if (m := re.fullmatch(r"v(\d+)\.sql", f.name)))
     while (current := _version(connection)) != versions[-1]:
         if current > versions[-1]:

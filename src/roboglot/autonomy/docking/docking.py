@@ -6,7 +6,8 @@ An unknown dock is searched nearby: everything that looks like one is tried.
 from __future__ import annotations
 
 import math
-import statistics
+
+import numpy as np
 
 from roboglot.autonomy.docking.dock_finder import (
     SEARCH_REACH,
@@ -158,10 +159,7 @@ class RearDocking(Docking):
         found = [sighting for sighting in sightings if sighting is not None]
         if len(found) < LOOKS // 2 + 1:
             return None
-        x, y, turn = (
-            statistics.median(values)
-            for values in zip(*((f.x, f.y, wrap_angle(f.yaw - found[0].yaw)) for f in found), strict=True)
-        )
+        x, y, turn = np.median([(f.x, f.y, wrap_angle(f.yaw - found[0].yaw)) for f in found], axis=0).tolist()
         return pose.compose(Pose(x, y, wrap_angle(found[0].yaw + turn))).compose(Pose(radius))
 
     async def _scans(self) -> list[Echoes]:

@@ -44,7 +44,6 @@ from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.pem_files import FOLDER
 from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
-from roboglot.protocols.cyberdog.reflection import add_reflection
 from roboglot.protocols.cyberdog.requests import add_calls
 from roboglot.protocols.cyberdog.service import CALLS_MAX, Service
 from roboglot.protocols.cyberdog.table import TABLE
@@ -91,6 +90,8 @@ class CyberDogDoor:
         self._cleanup.append(self._handshakes.close)
         add_calls(server, Service(self._context, self._handshakes), self._robot.clock.holding)
         if self._config.reflection:
+            from roboglot.protocols.cyberdog.reflection import add_reflection
+
             add_reflection(self._server)
         self.port = self._bind(server, certificates)
         self._handshakes.port = self.port

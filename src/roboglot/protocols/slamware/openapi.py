@@ -5,7 +5,7 @@ from __future__ import annotations
 import types
 import typing
 from collections.abc import Iterable, Mapping
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -78,7 +78,7 @@ def document() -> Schema:
 
 def summaries() -> Mapping[str, str]:
     """Chinese summaries by the operation's name."""
-    data = (resources.files("roboglot.protocols.slamware") / "page" / "summaries.zh.json").read_bytes()
+    data = Path(__file__).with_name("page").joinpath("summaries.zh.json").read_bytes()
     return msgspec.json.decode(data, type=dict[str, str])
 
 

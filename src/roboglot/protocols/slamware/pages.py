@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from importlib import resources
+from pathlib import Path
 
 import msgspec
 
@@ -28,7 +28,7 @@ class Pages:
         if path not in FILES:
             return None
         name, content_type = FILES[path]
-        return content_type, (resources.files("roboglot.protocols.slamware") / "page" / name).read_bytes()
+        return content_type, Path(__file__).with_name("page").joinpath(name).read_bytes()
 
     @cached_property
     def _description(self) -> bytes:

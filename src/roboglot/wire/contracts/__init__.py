@@ -7,7 +7,7 @@ registers and the vendor's own identifier, or just ``"key"``.
 from __future__ import annotations
 
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
@@ -24,7 +24,7 @@ class Row(NamedTuple):
 @cache
 def contract(protocol: str) -> tuple[Row, ...]:
     """Return all rows of ``protocol``, in the manual's order."""
-    data = (resources.files(__package__) / f"{protocol}.json").read_bytes()
+    data = Path(__file__).with_name(f"{protocol}.json").read_bytes()
     chapters = msgspec.json.decode(data, type=list[tuple[str, list[str | tuple[str, str]]]])
     return tuple(
         Row(row, chapter, row) if isinstance(row, str) else Row(row[0], chapter, row[1])
