@@ -21,6 +21,7 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.misfits import misfit
+from roboglot.spelling import instead
 from roboglot.values import dataclass
 
 RECORDING = "recording:"  # prefix of the body of a recorded robot
@@ -176,9 +177,8 @@ class Config:
 
     ``doors``: the doors' own sections by name; missing ones have their defaults.
     ``database``: URL of a PostgreSQL server for the robots' stored data, for a fleet on several machines; without it,
-    they are in a file of the data folder.
-    ``registry``: where programs agree on who runs which robot: a server's URL, or a file shared on one machine;
-    default: ``database``; without either, programs do not check that.
+    they are in a file of the data folder. ``registry``: where programs agree on who runs which robot: a server's URL,
+    or a file shared on one machine; default: ``database``; without either, programs do not check that.
     ``insecure``: robots may listen outside loopback without access control, so that all clients there may drive them.
     """
 
@@ -391,7 +391,7 @@ def _refuse_unknown(
         if key not in fields:
             if not prefix and key in {field.name for field in dataclasses.fields(RobotConfig)}:
                 raise ValueError(f"{key} is a setting of one robot: it stands below [[robots]]")
-            raise ValueError(f"{prefix + key} is not a setting; there are {', '.join(fields)}")
+            raise ValueError(f"{prefix + key} is not a setting{instead(key, fields)}")
         nested = fields[key]
         if isinstance(value, dict) and isinstance(nested, type) and dataclasses.is_dataclass(nested):
             _refuse_unknown(value, nested, f"{prefix}{key}.")

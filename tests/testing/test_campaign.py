@@ -106,6 +106,31 @@ def test_trials_are_all_tabulated_and_never_played_twice(folder: Path) -> None:
     assert [row["seed"] for row in rows(folder) if row["scenario"] == "stays.yaml"] == ["1", "2"]
 
 
+def test_hidden_files_are_left_out(folder: Path) -> None:
+    (folder / "scenarios" / os.fsdecode(b"st\xe9ys.yaml")).write_text(STAYS)
+    (folder / "scenarios/.venv").mkdir()
+    for hidden in (".venv/settings.yaml", ".hidden.yml"):
+        (folder / "scenarios" / hidden).write_text("no: scenario")
+    first = begin(folder, "--seeds", "1")
+    said, _ = first.communicate(timeout=200)
+    assert "1 scenario of" in said
+    assert "st\\xe9ys.yaml" in said
+    assert "Traceback" not in said
+    assert [row["scenario"] for row in rows(folder)] == ["st\\xe9ys.yaml"], said
+    again = begin(folder, "--seeds", "1")
+    assert "1 of 1 trials are in" in again.communicate(timeout=200)[0]
+
+
+def test_report_quotes_names_for_the_shell() -> None:
+    broken = Row("s", "s", 1, Outcome.BROKEN, "why", 1.0, 1, "f")
+    for name in (b"plain.yaml", b"it's \xe9.yaml", b"a b.yaml"):
+        label = Trial("/", os.fsdecode(name), "", 1, "").label
+        text = report([broken._replace(scenario=label)], Path("/x"), 1)
+        line = text.partition("roboglot test ")[2].partition(" --seed")[0]
+        shown = subprocess.run(["bash", "-c", f"printf %s {line}"], capture_output=True, check=True).stdout
+        assert shown == b"/x/" + name
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_campaign_leaves_a_table_and_no_process(number: signal.Signals, folder: Path) -> None:
     (folder / "scenarios/a_stays.yaml").write_text(STAYS)

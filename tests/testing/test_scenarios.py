@@ -20,7 +20,7 @@ WRONG = {
     "name: x\nwhen: [{run: a, text: b}]\nthen: [{refused: 0}]\n": "when 1: one of run, rest",
     "name: x\nwhen: [{within: 3}]\nthen: [{refused: 0}]\n": "not none",
     "name: x\nwhen: [{until: {}}]\nthen: [{refused: 0}]\n": "when 1: until: one of pose",
-    "name: x\nwhen: []\nthen: [{battery: {at_least: 3, robot: b}}]\n": "no robot 'b', only a",
+    "name: x\nwhen: []\nthen: [{battery: {at_least: 3, robot: b}}]\n": "no robot 'b'; there are a",
     "name: x\nwhen: []\nthen: [{refused: 0}]\ngiven: {robots: []}\n": "robots must have at least 1 entries",
     "name: x\nwhen: []\nthen: [{refused: 0}]\nthen: [{refused: 1}]\n": "'then' is given twice in .* line 4",
     "name: x\nwhen: []\nthen: [{moved: {x: 1, x: 2}}]\n": "'x' is given twice",

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
     import typer
+    from typer._click import Command
 
 COMMANDS = {
     "up": "start the robots with all their doors",
@@ -128,7 +129,9 @@ def _obey(name: str) -> None:
         gc.enable()
         command(prog_name=f"roboglot {name}")
     else:
-        sys.exit(f"roboglot: there is no command {name!r}; there are {', '.join(COMMANDS)}")
+        from roboglot.spelling import instead
+
+        sys.exit(f"roboglot: there is no command {name!r}{instead(name, COMMANDS)}")
 
 
 def _run_with_extra(name: str, arguments: list[str]) -> None:
@@ -158,7 +161,39 @@ def built(name: str) -> Callable[..., object]:
     """Return one of COMMANDS, to be called."""
     from typer.main import get_command
 
-    return get_command(loaded(name))
+    return _guessing(get_command(loaded(name)))
+
+
+def _guessing(command: Command) -> Callable[..., object]:
+    """Let a command and its subcommands name what was probably meant, or nothing; Typer's own guesses are far off."""
+    from typer.exceptions import TyperException
+
+    from roboglot.spelling import instead, nearest
+
+    parse, resolve = command.parse_args, getattr(command, "resolve_command", None)
+    commands: dict[str, Command] = getattr(command, "commands", {})
+
+    def parse_args(context: typer.Context, words: list[str]) -> list[str]:
+        try:
+            return parse(context, words)
+        except TyperException as error:
+            if option := getattr(error, "option_name", ""):
+                known = [name for part in command.params for name in (*part.opts, *part.secondary_opts)]
+                vars(error)["possibilities"] = [near] if (near := nearest(option, known)) else []
+            raise
+
+    def resolve_command(context: typer.Context, words: list[str]) -> object:
+        try:
+            return resolve(context, words) if resolve else None
+        except TyperException as error:
+            if words[0] not in commands:
+                vars(error)["message"] = f"No such command {words[0]!r}{instead(words[0], commands)}"
+            raise
+
+    vars(command).update(parse_args=parse_args, resolve_command=resolve_command)
+    for each in commands.values():
+        _guessing(each)
+    return command
 
 
 def loaded(name: str) -> typer.Typer:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 SEEDS_MAX = 100_000
 OUT = Path("campaign")
+SHOWN_MAX = 10  # scenarios that are listed
 KEPT_MAX = 10  # trials per scenario that keep recordings, maps and messages
 
 
@@ -59,6 +60,7 @@ def command(
     except (files.BadScenario, OtherCampaign, OSError) as bad:
         print(f"roboglot campaign: {visible(in_words(bad))}", file=sys.stderr)
         raise typer.Exit(2) from None
+    print(_read(folder, [trial.label for trial in trials[: len(found)]]))
     if len(left) < len(trials):
         print(f"{len(trials) - len(left)} of {len(trials)} trials are in {table.path} already")
     try:
@@ -70,6 +72,13 @@ def command(
     if interrupted:
         raise typer.Exit(130)
     raise typer.Exit(0 if passed else 1)
+
+
+def _read(folder: Path, names: Sequence[str]) -> str:
+    """Return the sentence about the scenarios that were found."""
+    more = f" and {len(names) - SHOWN_MAX} more" if len(names) > SHOWN_MAX else ""
+    shown = f"{', '.join(names[:SHOWN_MAX])}{more}"
+    return visible(f"{len(names)} scenario{'s' * (len(names) > 1)} of {folder}: {shown}")
 
 
 def _player(on: str, folders: Sequence[Path], workers: int, longest: float) -> Player:
@@ -103,7 +112,7 @@ def _play(left: list[Trial], table: Table, player: Player) -> bool:
         table.add(trial, result)
         if result.outcome is not Outcome.PASSED:
             kept[trial.scenario] += 1
-            print(f"{result.outcome:7} {visible(trial.scenario)} seed {trial.seed}: {visible(result.why)}", flush=True)
+            print(f"{result.outcome:7} {visible(trial.label)} seed {trial.seed}: {visible(result.why)}", flush=True)
         if sys.stderr.isatty():
             print(f"\r{number} of {len(left)}", end="", file=sys.stderr, flush=True)
 
@@ -120,7 +129,7 @@ def _write(table: Table, folder: Path, trials: Sequence[Trial]) -> bool:
     from roboglot.testing.campaign.report import report
     from roboglot.testing.campaign.table import replacing, write_parquet
 
-    wanted = {(trial.scenario, trial.seed) for trial in trials}  # the table may hold further ones
+    wanted = {(trial.label, trial.seed) for trial in trials}  # the table may hold further ones
     rows = [row for row in table.rows if (row.scenario, row.seed) in wanted]
     page = table.path.with_name("report.md")
     with replacing(page) as fresh:

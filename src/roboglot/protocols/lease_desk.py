@@ -18,6 +18,7 @@ from roboglot.model.components.system.link import Link
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
+from roboglot.spelling import instead
 
 NAME = "lease.sock"  # in the data folder
 LEASE = "lease"  # the kind of recorded inputs from this socket
@@ -80,7 +81,7 @@ class LeaseDesk(LocalServer):
             return
         robot = self._robots.get(request.robot)
         if robot is None:
-            raise LookupError(f"there is no robot {request.robot!r}; there are {', '.join(self._robots)}")
+            raise LookupError(f"there is no robot {request.robot!r}{instead(request.robot, self._robots)}")
         await self.do(request, robot)
 
     async def do(self, request: Request, robot: Robot) -> None:

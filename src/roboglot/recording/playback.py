@@ -26,6 +26,7 @@ from roboglot.recording.matching import Normal, normal, rewritten, without_numbe
 from roboglot.recording.reader import Asked, BadRecording, Recording, pair, read_recording
 from roboglot.recording.redaction import FIELDS, Redaction
 from roboglot.recording.timeline import Timeline
+from roboglot.spelling import instead
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -249,5 +250,5 @@ def _robot(recording: Recording, name: str) -> str:
     if not name and len(recording.robots) > 1:
         raise BadRecording(f"{recording.path} has the robots {', '.join(recording.robots)}: say {recording.path}#NAME")
     if name and name not in recording.robots:
-        raise BadRecording(f"{recording.path} has no robot {name!r}; there are {', '.join(recording.robots)}")
+        raise BadRecording(f"{recording.path} has no robot {name!r}{instead(name, recording.robots)}")
     return name

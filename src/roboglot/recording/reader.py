@@ -7,12 +7,14 @@ import logging
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import field
+from datetime import UTC, datetime
+from os import SEEK_END
 from pathlib import Path
 from typing import IO, Any
 
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 from msgspec import DecodeError
@@ -161,21 +163,37 @@ def stream(path: Path, file: IO[bytes], *, chunks: bool = False) -> Iterator[Mca
     Damaged chunks are left out, with a warning, and so is then the footer. Raises BadRecording, OSError.
     """
     is_damaged = False
+    for record in _undivided(path, file):
+        if isinstance(record, Chunk) and not chunks:
+            try:
+                yield from unpacked(path, record)
+            except BadRecording as error:
+                is_damaged = True
+                seconds = (record.message_end_time - record.message_start_time) / 1e9
+                log.warning("%s; %.1f s are left out", error, seconds)
+        elif not (is_damaged and isinstance(record, Footer)):
+            yield record
+
+
+def _undivided(path: Path, file: IO[bytes]) -> Iterator[McapRecord]:
+    """Yield the records with undivided chunks; warn of missing messages at the end. Raises BadRecording, OSError."""
+    first, last, read = -1, 0, 0
+    has_all = False
     try:
         for record in StreamReader(file, emit_chunks=True, record_size_limit=RECORD_MAX).records:
-            if isinstance(record, Chunk) and not chunks:
-                try:
-                    yield from unpacked(path, record)
-                except BadRecording as error:
-                    is_damaged = True
-                    seconds = (record.message_end_time - record.message_start_time) / 1e9
-                    log.warning("%s; %.1f s are left out", error, seconds)
-            elif not (is_damaged and isinstance(record, Footer)):
-                yield record
+            read = file.tell()
+            if isinstance(record, Chunk):
+                last = max(last, record.message_end_time)
+                first = record.message_start_time if first < 0 else min(first, record.message_start_time)
+            has_all = has_all or isinstance(record, DataEnd)
+            yield record
     except DAMAGE as error:
         if isinstance(error, McapError) and file.tell() <= 16:
             raise BadRecording(f"{path} is not an MCAP file") from None
-        log.info("%s: cut off or damaged: %s", path, error)
+    if not has_all:
+        rest = file.seek(0, SEEK_END) - read
+        until = f"{(last - max(first, 0)) / 1e9:.1f} s ({datetime.fromtimestamp(last / 1e9, UTC):%F %T} UTC)"
+        log.warning("%s is cut off: it is read until %s; %d bytes after that are no whole record", path, until, rest)
 
 
 def unpacked(path: Path, chunk: Chunk) -> Sequence[McapRecord]:

@@ -13,6 +13,7 @@ import msgspec
 
 from roboglot.config import RECORDING, ROBOTS_MAX, Config, ConsoleConfig, is_loopback, refuse_unguarded
 from roboglot.shards.shard import settings_of
+from roboglot.spelling import instead, meant
 
 WORLDS_MAX = 500
 FIRST_ADDRESS = "127.10.0.1"
@@ -45,25 +46,30 @@ class FleetPlan(msgspec.Struct):
         for shard in self.shards:
             if robot in shard.robots:
                 return shard
-        raise LookupError(f"there is no robot {robot!r} in this fleet")
+        raise LookupError(f"there is no robot {robot!r} in this fleet{meant(robot, self._robots)}")
 
     def shard(self, name: str) -> ShardPlan:
         """Return a shard by name. Raises LookupError."""
         for shard in self.shards:
             if shard.name == name:
                 return shard
-        raise LookupError(f"there is no shard {name!r}; there are {self._names}")
+        raise LookupError(f"there is no shard {name!r}{instead(name, self._names)}")
 
     def find(self, name: str) -> ShardPlan:
         """Return the shard of this name, or of the robot of this name. Raises LookupError."""
         for shard in self.shards:
             if name == shard.name or name in shard.robots:
                 return shard
-        raise LookupError(f"there is no shard and no robot {name!r}; there are {self._names}")
+        guess = meant(name, [*self._names, *self._robots]) or instead(name, self._names)
+        raise LookupError(f"there is no shard and no robot {name!r}{guess}")
 
     @property
-    def _names(self) -> str:
-        return ", ".join(shard.name for shard in self.shards)
+    def _names(self) -> list[str]:
+        return [shard.name for shard in self.shards]
+
+    @property
+    def _robots(self) -> list[str]:
+        return [robot for shard in self.shards for robot in shard.robots]
 
 
 def plan_fleet(

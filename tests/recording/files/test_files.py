@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import re
 import struct
 import subprocess
 import sys
@@ -115,6 +116,31 @@ def test_cut_file_is_read_until_the_cut(tmp_path: Path) -> None:
         assert len(found) >= longest
         longest = len(found)
     assert longest == 20
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"),
+    [
+        (0, ""),
+        (40, ""),  # of the index: all messages are there
+        (0.5, r"cut.mcap is cut off: it is read until \d+\.0 s \(1970-01-01 00:00:\d\d UTC\); \d+ bytes after"),
+    ],
+)
+def test_cut_file_is_told_with_its_end(
+    lost: float, said: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    part = PartWriter(tmp_path / "x.mcap", ORIGIN, Redaction(), 0)
+    for number in range(20):
+        part.write(tick(number, number))
+        part.flush()
+    part.close()
+    whole = (tmp_path / "x.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) - round(lost if lost >= 1 else lost * len(whole))])
+    read = numbers(tmp_path / "cut.mcap")
+    assert len(caplog.messages) == bool(said)
+    if said:
+        assert re.search(said, caplog.text)
+        assert f"until {read[-1]}.0 s" in caplog.text
 
 
 def test_recording_continues_in_parts_and_keeps_its_total(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import typer
 from roboglot.cli.control import running
 from roboglot.config import default_data_folder
 from roboglot.protocols.lease_desk import NAME, Answer, Control, Request
+from roboglot.spelling import instead
 
 PATIENCE = 10.0  # s to wait until the robot has braked
 Data = Annotated[
@@ -47,7 +48,7 @@ def command(
     answer = wish("lease", Request(verb, robot, give, all_), data)
     shown = [control for control in answer.robots if robot in ("", control.robot)]
     if not shown:
-        sys.exit(f"roboglot lease: there is no robot {robot!r}; there are {', '.join(_names(answer))}")
+        sys.exit(f"roboglot lease: there is no robot {robot!r}{instead(robot, _names(answer))}")
     for control in shown:
         print(in_words(control))
 
@@ -65,7 +66,7 @@ def wish(command: str, request: Request, data: Path | None) -> Answer:
         answers, refused = _together(command, worlds, Request())
         homes = {name: world for world, answer in answers.items() for name in _names(answer)}
         if request.robot not in homes:
-            refused.append(f"roboglot {command}: there is no robot {request.robot!r}; there are {', '.join(homes)}")
+            refused.append(f"roboglot {command}: there is no robot {request.robot!r}{instead(request.robot, homes)}")
             sys.exit("\n".join(refused))
         worlds = [homes[request.robot]]
     answers, refused = _together(command, worlds, request)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import logging
 import math
 from collections.abc import Mapping, Sequence
@@ -18,6 +17,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.language import Problem
 from roboglot.programs.rehearsing import Act, Played, Scene
+from roboglot.spelling import meant
 
 log = logging.getLogger(__name__)
 
@@ -75,8 +75,7 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         functions = {operation.key for operation in ABILITIES}
         named = [*self.blocks, *(block for block in self.allowed if block.startswith("cyberdog."))]
         if unknown := next((block for block in named if block not in functions), ""):
-            near = difflib.get_close_matches(unknown, functions, n=1)
-            raise ValueError(f"there is no function {unknown!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
+            raise ValueError(f"there is no function {unknown!r}{meant(unknown, functions)}")
 
     @property
     def scene(self) -> Scene:

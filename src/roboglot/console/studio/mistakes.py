@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 
 from roboglot.programs.functions.records import RECORDS
+from roboglot.spelling import nearest
 
 _PLACE = re.compile(r" \((?:module (?P<module>\w+), )?line (?P<line>\d+): ", re.DOTALL)
 _FIELD = re.compile(r"'(\w+)' object has no attribute '(\w+)'")
@@ -78,4 +78,4 @@ def _meant(message: str) -> str:
         return ""
     kind, name = found.groups()
     fields = list(RECORDS[kind].fields) if kind in RECORDS else []
-    return next(iter(difflib.get_close_matches(name[:64], fields, n=1)), "")
+    return nearest(name, fields)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import ast
 import builtins
-import difflib
 import math
 from collections.abc import Iterable, Iterator
 
 from roboglot.programs.language.problems import Problem, ProblemKind
+from roboglot.spelling import nearest
 from roboglot.values import dataclass
 
 MODULES = frozenset({"time", "math", "random", "numbers"})
@@ -140,9 +140,9 @@ def _everything(module: str | None) -> frozenset[str]:
 
 
 def _unknown(node: ast.Name | ast.Attribute, name: str, owner: str, candidates: Iterable[str]) -> Problem:
-    guesses = difflib.get_close_matches(name[:64], list(set(candidates)), n=1)
-    hint = f" Did you mean '{guesses[0]}'?" if guesses else ""
-    hint_zh = f"是不是想写 '{guesses[0]}'？" if guesses else ""
+    near = nearest(name, candidates)
+    hint = f" Did you mean '{near}'?" if near else ""
+    hint_zh = f"是不是想写 '{near}'？" if near else ""
     if owner:
         english, chinese = f"'{owner}' has no '{name}'.{hint}", f"'{owner}' 里没有 '{name}'。{hint_zh}"
     elif hasattr(builtins, name):

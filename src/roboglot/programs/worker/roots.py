@@ -5,11 +5,11 @@ Knows names only: calls become functions, attributes are fetched at every read.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from roboglot.programs.worker.prelude import Prelude
+from roboglot.spelling import meant
 
 HostCall = Callable[..., object]
 
@@ -91,5 +91,4 @@ class _Namespace:
 
 
 def _missing(owner: str, part: str, members: Iterable[str]) -> str:
-    guesses = difflib.get_close_matches(part[:64], list(members), n=1)
-    return f"'{owner}' has no '{part}'" + (f"; did you mean '{guesses[0]}'?" if guesses else "")
+    return f"'{owner}' has no '{part}'{meant(part, members)}"

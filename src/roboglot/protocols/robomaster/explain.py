@@ -13,16 +13,18 @@ from msgspec import Meta
 
 from roboglot.operations import BadParameters
 from roboglot.protocols.robomaster.shapes import Shape
+from roboglot.spelling import nearest
 from roboglot.wire.robomaster.commands import QUERY, Command, Value
 
 EXCLUSIVE_STEP = 0.1  # distance of a suggested number from an excluded bound
 
 
-def nearest_command(command: Command, keys: typing.Iterable[str]) -> str:
+def nearest_command(command: Command, keys: typing.Collection[str]) -> str:
     """Return the most similar known command with the given words, or ""."""
     meant = " ".join((*command.words[:2], *((QUERY,) if command.query else ())))
-    found = difflib.get_close_matches(meant, tuple(keys), n=1, cutoff=0.6)
-    return f"did you mean `{_spelt(found[0], command.words[2:])}`?" if found else ""
+    alike = {key for key in keys if key.endswith(QUERY) == command.query}
+    near = nearest(meant, alike) or nearest(meant, keys)  # the mark alone may be what is wrong
+    return f"did you mean `{_spelt(near, command.words[2:])}`?" if near else ""
 
 
 def _spelt(key: str, words: typing.Iterable[str]) -> str:

@@ -12,6 +12,7 @@ from roboglot.simulation.bodies.body import Body, HullSection
 from roboglot.simulation.bodies.part import parts
 from roboglot.simulation.bodies.realism import PRESETS, USUAL, with_realism
 from roboglot.simulation.world.declarations import BadFile, read_toml
+from roboglot.spelling import instead
 
 BODIES = Path(__file__).parent
 
@@ -22,8 +23,8 @@ def load_body(name: str) -> Body:
     """
     path, (name, preset) = body_source(name), split_realism(name)
     if not name.endswith(".toml") and (not name.isidentifier() or not path.is_file()):
-        known = ", ".join(sorted(file.stem for file in BODIES.glob("*.toml")))
-        raise BadFile(f"no body is named {name!r}; there are: {known}; or give the path of a .toml file")
+        known = sorted(file.stem for file in BODIES.glob("*.toml"))
+        raise BadFile(f"no body is named {name!r}{instead(name, known)}; or give the path of a .toml file")
     content: Any = read_toml(path, _file_type())
     sections = {part.name: getattr(content, part.name) for part in parts() if part.section is not None}
     for part in parts():

@@ -18,7 +18,7 @@ from roboglot.model.client_context import concerning
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
 from roboglot.model.stage import ActiveFault, FaultKind
 from roboglot.simulation.faults.fault_kinds import KINDS, FaultRecipe, FragileWorld, Target, Undo
-from roboglot.simulation.faults.spelling import nearest
+from roboglot.spelling import meant
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.description import PlannedFault
@@ -57,7 +57,7 @@ class Faults:
         in plain words otherwise.
         """
         if kind not in KINDS:
-            raise ValueError(f"no fault is called {kind!r}{nearest(kind, KINDS)}")
+            raise ValueError(f"no fault is called {kind!r}{meant(kind, KINDS)}")
         _check_options(kind, options)
         if duration is not None and not duration > 0.0:
             raise ValueError("a fault lasts for more than 0 s")
@@ -145,13 +145,13 @@ def _check_options(kind: str, options: Mapping[str, object]) -> None:
     for name in options:
         if name not in known:
             has = ", ".join(known) or "none"
-            raise ValueError(f"{kind} has no option {name!r}{nearest(name, known)}; options: {has}")
+            raise ValueError(f"{kind} has no option {name!r}{meant(name, known)}; options: {has}")
 
 
 def problem_of(plan: PlannedFault) -> str | None:
     """Return the error in a planned fault in plain words; None: there is none."""
     if plan.kind not in KINDS:
-        return f"no fault is called {plan.kind!r}{nearest(plan.kind, KINDS)}"
+        return f"no fault is called {plan.kind!r}{meant(plan.kind, KINDS)}"
     try:
         _check_options(plan.kind, plan.options)
     except ValueError as error:

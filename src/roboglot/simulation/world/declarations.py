@@ -5,7 +5,6 @@ Knows no worlds and no robots: the structure is the caller's.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Hashable
 from functools import lru_cache
@@ -15,6 +14,7 @@ from typing import TypeVar, cast
 import msgspec
 
 from roboglot.misfits import misfit
+from roboglot.spelling import meant
 
 T = TypeVar("T")
 FILE_BYTES_MAX = 4_000_000
@@ -55,8 +55,7 @@ def _explained(error: msgspec.ValidationError, structure: type) -> str:
     unknown = re.search(r"unknown field `([^`]+)`", str(error))
     if unknown is None:
         return message
-    near = difflib.get_close_matches(unknown[1], sorted(_keys_of(structure)), n=1)
-    return message + (f"; did you mean '{near[0]}'?" if near else "")
+    return message + meant(unknown[1], _keys_of(structure))
 
 
 def _keys_of(structure: type) -> set[str]:

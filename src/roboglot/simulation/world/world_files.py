@@ -29,6 +29,7 @@ from roboglot.simulation.world.description import (
     WorldDescription,
 )
 from roboglot.simulation.world.description_checks import completed
+from roboglot.spelling import instead
 
 WORLDS = Path(__file__).parent.parent / "worlds"
 CELLS_MAX = 16_000_000
@@ -63,8 +64,8 @@ def load_world(name_or_path: str | Path) -> WorldDescription:
         case ".yaml" | ".yml":
             return completed(import_ros_map(path), str(path))
         case _:
-            there_are = f"there are: {', '.join(known)}; or give the path of a .toml or .yaml file"
-            raise BadFile(f"no world is named {name!r}; {there_are}")
+            files = "or give the path of a .toml or .yaml file"
+            raise BadFile(f"no world is named {name!r}{instead(name, known)}; {files}")
 
 
 def world_sources(name_or_path: str) -> list[Path]:

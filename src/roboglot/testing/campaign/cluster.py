@@ -18,6 +18,7 @@ from roboglot.extras import explaining
 from roboglot.shards.cluster import LOCAL, joined
 from roboglot.testing.campaign.local import ATTEMPTS_MAX, Ended, Leave, interruptions, play_here
 from roboglot.testing.campaign.trials import Outcome, Result, Trial
+from roboglot.testing.scenarios.files import shown_below
 
 with explaining("--on", "fleet"):
     import ray
@@ -114,7 +115,7 @@ def pack(folder: Path, paths: Iterable[Path]) -> Files:
     packed: Files = {}
     size = 0
     for path in paths:
-        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+        for file in sorted(shown_below(path)):
             if not file.is_file():
                 continue
             size += file.stat().st_size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import shlex
 import statistics
@@ -59,7 +60,15 @@ def _reasons(scenario: Path, failed: Sequence[Row]) -> Iterator[str]:
         own = sorted(kinds[kind], key=lambda row: row.seed)
         seeds = ", ".join(str(row.seed) for row in own[:SEEDS_MAX]) + (" …" if len(own) > SEEDS_MAX else "")
         yield f"- {len(own)} x {own[0].outcome}: {_plain(own[0].why) or 'no reason'} (seeds {seeds}):"
-        yield f"  `roboglot test {shlex.quote(str(scenario))} --seed {own[0].seed}`"
+        yield f"  `roboglot test {_quoted(str(scenario))} --seed {own[0].seed}`"
+
+
+def _quoted(path: str) -> str:
+    """Return the path for a shell; bytes that are not UTF-8 are written out as bash reads them."""
+    text = os.fsencode(path).decode("utf-8", "backslashreplace")
+    if text == path and not re.search(r"\\x[89a-f][0-9a-f]", path):
+        return shlex.quote(path)
+    return "$'" + text.replace("'", "\\'") + "'"
 
 
 def _plain(text: str) -> str:

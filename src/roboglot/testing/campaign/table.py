@@ -60,17 +60,17 @@ class Table:
 
     def done(self, trial: Trial) -> bool:
         """Return whether the table has a final result of the trial. Raises OtherCampaign for another version of it."""
-        row = self._found.get((trial.scenario, trial.seed))
+        row = self._found.get((trial.label, trial.seed))
         if row is not None and row.fingerprint != trial.fingerprint:
             raise OtherCampaign(
-                f"{self.path} was made with another version of {trial.scenario} or of roboglot: choose another --out"
+                f"{self.path} was made with another version of {trial.label} or of roboglot: choose another --out"
             )
         return row is not None and row.outcome in FINAL
 
     def add(self, trial: Trial, result: Result) -> Row:
         """Write the row of a trial to disk and return it."""
         row = Row(
-            trial.scenario,
+            trial.label,
             " ".join(trial.name.split()),  # each row is written in one go, so that no partial one is read
             trial.seed,
             result.outcome,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
@@ -39,6 +40,11 @@ class Trial:
     name: str
     seed: int
     fingerprint: str
+
+    @property
+    def label(self) -> str:
+        """``scenario`` for tables and reports: bytes of a file's name that are not UTF-8 are written out."""
+        return os.fsencode(self.scenario).decode("utf-8", "backslashreplace")
 
 
 class Result(msgspec.Struct, frozen=True):

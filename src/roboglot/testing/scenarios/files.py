@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 
 from roboglot.misfits import misfit
+from roboglot.spelling import instead
 from roboglot.testing.wanted import SPEED, Wanted, WantedFault
 from roboglot.values import dataclass
 
@@ -236,14 +238,26 @@ def _check(scenario: Scenario) -> None:
         except BadScenario as error:
             raise BadScenario(f"{where}: {error}") from None
         for robot in {getattr(part, "robot", ""), getattr(value, "robot", "")} - {"", *scenario.given.robots}:
-            raise BadScenario(f"{where}: there is no robot {robot!r}, only {', '.join(scenario.given.robots)}")
+            raise BadScenario(f"{where}: there is no robot {robot!r}{instead(robot, scenario.given.robots)}")
+
+
+def shown_below(path: Path) -> Iterator[Path]:
+    """Yield the files below a folder that are not hidden; ``path`` itself if it is a file."""
+    if not path.is_dir():
+        yield path
+    for folder, inside, names in os.walk(path):
+        inside[:] = [name for name in inside if not name.startswith(".")]
+        yield from (Path(folder, name) for name in names if not name.startswith("."))
 
 
 def find(paths: Sequence[Path]) -> Sequence[Found]:
-    """Read files, and all ``*.yaml`` and ``*.yml`` below folders. Raises BadScenario, also if there are none."""
+    """Read files, and all ``*.yaml`` and ``*.yml`` below folders. Raises BadScenario, also if there are none.
+
+    Hidden files and folders (``.venv``, ``.git``) are left out unless they are named.
+    """
     files: list[Path] = []
     for path in paths:
-        files += sorted(one for one in path.rglob("*") if one.suffix in (".yaml", ".yml")) if path.is_dir() else [path]
+        files += sorted(file for file in shown_below(path) if file.suffix in (".yaml", ".yml"))
     if not files:
         raise BadScenario(f"no scenario in {', '.join(map(str, paths))}")
     return [read(file) for file in files]
