@@ -34,6 +34,24 @@ async def test_words_from_the_wire_become_types() -> None:
     assert (operation.summary, operation.partial, operation.names) == ("Move a bit.", "cannot fly", ("x", "count"))
 
 
+@pytest.mark.parametrize(
+    ("given", "count"), [("000", 0), ("0", 0), ("007", 7), ("-03", -3), ("010", 10), ("00", 0), ("0x1", None)]
+)
+async def test_zeros_before_numbers_are_no_mistake(given: str, count: int | None) -> None:
+    commands: OperationTable[str] = OperationTable("zeros")
+
+    @commands.on("take")
+    async def take(_: str, name: str, *, count: int | None = None) -> tuple[str, int | None]:
+        return name, count
+
+    operation = commands["take"]
+    if count is None:
+        with pytest.raises(BadParameters, match="count must be"):
+            operation.parse({"name": "007", "count": given})
+    else:
+        assert await operation.call("r2", {"name": "007", "count": given}) == ("007", count), "an id stays as it is"
+
+
 @pytest.mark.parametrize("values", [{"x": "5.01"}, {"x": "fast"}, {"count": "1.5"}, {"count": None}])
 def test_misfits_name_the_parameter(values: dict[str, object]) -> None:
     operation = table().get("go")

@@ -8,6 +8,7 @@ checked against their annotations. Knows no robot, no socket and no vendor.
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from enum import StrEnum
 from functools import cached_property
@@ -21,6 +22,7 @@ from roboglot.values import dataclass
 
 K = TypeVar("K", bound=Hashable)
 Handler = TypeVar("Handler", bound=Callable[..., object])
+_zeros = re.compile(r"(?<=^-)0+(?=\d)|^0+(?=\d)")  # of the first number, which JSON would not allow
 
 
 class Right(StrEnum):
@@ -56,6 +58,16 @@ class Schema:
     def parameters(self) -> type[msgspec.Struct]:
         """Struct of the parameters after the first."""
         return _parameters_of(self._handler.__qualname__, self.signature)
+
+    def without_zeros(self, values: Mapping[str, object]) -> Mapping[str, object]:
+        """Return ``values`` without the zeros before a number ("000", "-07"), which JSON does not allow."""
+        found = msgspec.inspect.type_info(self.parameters)
+        fields = found.fields if isinstance(found, msgspec.inspect.StructType) else ()
+        numbers = {field.name for field in fields if _is_number(field.type)}
+        return {
+            name: _zeros.sub("", value) if isinstance(value, str) and name in numbers else value
+            for name, value in values.items()
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +111,15 @@ class Operation(Generic[K]):
         return (self.handler.__doc__ or "").strip().partition("\n")[0]
 
     def parse(self, values: Mapping[str, object], kinds: Mapping[str, str] = KINDS) -> dict[str, object]:
-        """Convert and check wire values by name; unknown names are ignored.
+        """Convert and check wire values by name; unknown names are ignored, and zeros before a number.
 
         Raises BadParameters, in the words of ``kinds`` for types.
         """
         try:
             checked = msgspec.convert(dict(values), self.parameters, strict=False)
         except msgspec.ValidationError as error:
+            if (plain := self.schema.without_zeros(values)) != values:
+                return self.parse(plain, kinds)
             raise BadParameters(misfit(error, kinds=kinds)) from None
         return {name: getattr(checked, name) for name in self.names}
 
@@ -163,6 +177,12 @@ class OperationTable(Generic[K]):
 
     def __len__(self) -> int:
         return len(self._operations)
+
+
+def _is_number(kind: msgspec.inspect.Type) -> bool:
+    if isinstance(kind, msgspec.inspect.UnionType):
+        return all(map(_is_number, kind.types))
+    return isinstance(kind, msgspec.inspect.IntType | msgspec.inspect.FloatType | msgspec.inspect.NoneType)
 
 
 def _refuse_untyped(handler: Callable[..., object]) -> None:

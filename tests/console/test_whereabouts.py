@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 
 from roboglot.console.drawings import whereabouts
@@ -12,9 +15,11 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.errors import Unconnected
 from roboglot.model.geometry import Pose
 from roboglot.programs.rehearsing import Scene
-from roboglot.protocols.vda5050.vocabulary import position, velocity
+from roboglot.protocols.robomaster import readings
+from roboglot.protocols.vda5050.vocabulary import is_driving, position, velocity
 from roboglot.recording.entries import Entry
 from roboglot.recording.sampler import Sampler
 from roboglot.testing import Forward
@@ -54,13 +59,23 @@ async def test_nothing_is_made_up_of_an_unheard_robot(fleet: Fleet, forward: For
 
     link.move_to(LinkState.UP)
     link.heard("pose")
+    sampler.beat(0)
+    assert {"battery", "pose", "transforms"} <= {entry.kind for entry in sent}
+    assert None not in view.motion
+    assert velocity(robot)
     link.move_to(LinkState.LOST, "the cable")
+    sent.clear()
     sampler.beat(0)
     assert view.motion[0] is not None
+    assert view.motion[3:] == [None] * 3
+    assert told(view, "control", "link") == "lost: the cable"
+    assert not {"battery", "pose", "transforms"} & {entry.kind for entry in sent}, "no old value with a new time"
+    assert (velocity(robot), is_driving(robot)) == ({}, False)
     assert told(view, "battery", "charge")
     assert told(view, "safety", "docked") is True
-    assert {"battery", "pose", "transforms"} <= {entry.kind for entry in sent}
     assert position(robot, V3, "map")
+    with pytest.raises(Unconnected):
+        readings.speed(cast("readings.ReadingSource", SimpleNamespace(robot=robot)))
     sampler.close()
     view.end()
 

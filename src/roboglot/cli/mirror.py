@@ -24,7 +24,7 @@ from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.health import Health
-from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.components.system.link import Link, LinkState, is_current
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot
@@ -113,6 +113,8 @@ def _battery(robot: Robot) -> str:
 
 
 def _twist(robot: Robot) -> str:
+    if not is_current(robot):
+        return "unknown"
     twist = robot[Odometry].reading.twist
     return f"{twist.x:+z.2f} m/s ahead  {twist.y:+z.2f} m/s left  {math.degrees(twist.yaw):+z.0f}°/s"
 

@@ -17,6 +17,7 @@ from roboglot.console.openapi import document
 from roboglot.console.people.classes import Classes, Wish
 from roboglot.console.recordings import RecordingWish
 from roboglot.console.resend import resend
+from roboglot.console.state import link_of
 from roboglot.console.studio import blocks, lessons
 from roboglot.console.studio.plans import rehearse
 from roboglot.console.thumbnails import thumbnail
@@ -196,7 +197,7 @@ class Api:
     def _summary(self, name: str) -> dict[str, object]:
         view = self._desk.view(name)
         x, y, yaw, *speed = view.motion
-        return {"name": name, "pose": [x, y, yaw], "velocity": speed}
+        return {"name": name, "pose": [x, y, yaw], "velocity": speed, "link": link_of(view.robot)}
 
     def _exchange(self, name: str, number: str) -> dict[str, object]:
         exchange = self._desk.view(name).wire.get(_whole(number))

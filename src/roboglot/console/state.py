@@ -87,18 +87,23 @@ def _about(robot: Robot) -> dict[str, object]:
 
 
 def _control(robot: Robot) -> dict[str, object]:
-    lease, link = robot[Lease], ""
-    if Link in robot:
-        state, reason = robot[Link].state, robot[Link].reason
-        link = f"{state}: {reason}" if reason else str(state)
+    lease = robot[Lease]
     holder = lease.holder
     return {
         "holder": holder.who if holder else "",
         "doing": holder.doing if holder else "",
         "taken_by": lease.taken_by,
         "last": lease.last.who,
-        "link": link,
+        "link": link_of(robot),
     }
+
+
+def link_of(robot: Robot) -> str:
+    """Return the state of a real robot's link, with the reason; empty for a simulated one."""
+    if Link not in robot:
+        return ""
+    state, reason = robot[Link].state, robot[Link].reason
+    return f"{state}: {reason}" if reason else str(state)
 
 
 def _faults(robot: Robot) -> list[dict[str, object]]:

@@ -14,6 +14,7 @@ from roboglot.console.wire_log import WireLog
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationFeedback
+from roboglot.model.components.system.link import is_current
 from roboglot.model.events import ControlRefused, MapReplaced, ScanTaken
 from roboglot.model.geometry import Path, Pose
 from roboglot.model.robot import Robot
@@ -94,11 +95,16 @@ class RobotView:
 
     @property
     def motion(self) -> list[float | None]:
-        """[x, y, yaw, forward m/s, left m/s, rad/s] now, in the robot's map; all None while the pose is unknown."""
+        """[x, y, yaw, forward m/s, left m/s, rad/s] now, in the robot's map; all None while the pose is unknown.
+
+        The rates are None while the robot has no link: only where it was is known.
+        """
         robot = self.robot
         where = drawings.whereabouts(robot)
         if where is None:
             return [None] * 6
+        if not is_current(robot):
+            return [*words.pose(where), None, None, None]
         speed = robot[Base].velocity if Base in robot else None
         rates = [words.number(v) for v in (speed.x, speed.y, speed.yaw)] if speed else [0.0, 0.0, 0.0]
         return [*words.pose(where), *rates]

@@ -12,7 +12,7 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.components.system.link import Link, was_heard
+from roboglot.model.components.system.link import Link, is_current
 from roboglot.model.events import ActionChanged, Event, ScanTaken
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.inputs.outside import Input
@@ -139,7 +139,7 @@ class Sampler:
 
     def _note_places(self, at: int, wall: int, put: Put) -> None:
         robot = self._robot
-        if not was_heard(robot):
+        if not is_current(robot):
             return
         odometry = robot[Odometry].reading.pose if Odometry in robot else None
         pose = robot[Localization].pose if Localization in robot else None
@@ -160,9 +160,9 @@ class Sampler:
             plate = robot.description
             figure = (robot.id, self._base, ORIGIN, plate.radius, plate.height, True)
             self._send("body", "scene", (figure,), at, wall)
-        if Battery in robot and was_heard(robot):
+        if Battery in robot and is_current(robot):
             self._send_changed("battery", "battery", plain(robot[Battery].state), at, wall)
-        for topic, reading in readings_of(robot):
+        for topic, reading in readings_of(robot) if is_current(robot) else ():
             self._send(topic, topic, plain(reading), at, wall)
         if Health in robot:
             self._send_changed("faults", "state", {"faults": plain(robot[Health].faults)}, at, wall)

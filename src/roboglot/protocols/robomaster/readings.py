@@ -12,7 +12,7 @@ from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.motion.motion_status import MotionStatus
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.components.system.link import require_heard
+from roboglot.model.components.system.link import require_current, require_heard
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.vocabulary import wheels_in_rpm
@@ -54,7 +54,7 @@ def attitude(robot: Robot) -> tuple[float, float, float]:
 def speed(source: ReadingSource) -> tuple[float | int, ...]:
     """x m/s, y m/s, z degrees/s as odometry measures them, and the four wheels in whole rpm."""
     robot = source.robot
-    require_heard(robot)
+    require_current(robot)
     twist = robot[Odometry].reading.twist
     wheels = wheels_in_rpm(robot[Base].wheel_speeds, source.profile.as_robots)
     return (twist.x, -twist.y, -math.degrees(twist.yaw), *wheels)
@@ -62,7 +62,7 @@ def speed(source: ReadingSource) -> tuple[float | int, ...]:
 
 def status(robot: Robot) -> tuple[int, ...]:
     """Eleven flags: static, uphill, downhill, on_slope, pick_up, slip, impact_x, _y, _z, roll_over, hill_static."""
-    require_heard(robot)
+    require_current(robot)
     return tuple(int(flag) for flag in astuple(robot[MotionStatus].flags))
 
 

@@ -17,6 +17,7 @@ from roboglot.model.background import beside
 from roboglot.model.client_context import ask_for
 from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.system.link import is_current
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.ros2.config import Ros2Config
@@ -225,9 +226,9 @@ class Ros2Door:
         async for _ in self._robot.clock.every(POSE_PERIOD):
             number += 1
             sampler.beat(number)
-            if self._battery is not None and number % STATE_BEATS == 0:
+            if self._battery is not None and number % STATE_BEATS == 0 and is_current(self._robot):
                 self._show(self._battery._replace(at=self._now()))
-            if Gimbal in self._robot:
+            if Gimbal in self._robot and is_current(self._robot):
                 attitude = self._robot[Gimbal].attitude
                 joints = {"gimbal_pitch": attitude.pitch, "gimbal_yaw": attitude.yaw}
                 self._publish(self._words.joints(self._now(), joints), "joint_states")

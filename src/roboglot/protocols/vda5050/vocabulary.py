@@ -15,7 +15,7 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.sensing.bumper import Bumper
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.components.system.link import was_heard
+from roboglot.model.components.system.link import is_current, was_heard
 from roboglot.model.geometry import wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.protocols.vda5050.order_book import ActionState, OrderBook
@@ -56,8 +56,8 @@ def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
 
 
 def velocity(robot: Robot) -> dict[str, object]:
-    """Return the robot's velocity in base_link."""
-    if Odometry not in robot or not was_heard(robot):
+    """Return the robot's velocity in base_link; nothing without a link."""
+    if Odometry not in robot or not is_current(robot):
         return {}
     twist = robot[Odometry].reading.twist
     return {"velocity": {"vx": round(twist.x, 3), "vy": round(twist.y, 3), "omega": round(twist.yaw, 3)}}
@@ -65,7 +65,7 @@ def velocity(robot: Robot) -> dict[str, object]:
 
 def is_driving(robot: Robot) -> bool:
     """Return True if the robot moves or turns, for any client."""
-    if Odometry not in robot:
+    if Odometry not in robot or not is_current(robot):
         return False
     twist = robot[Odometry].reading.twist
     return math.hypot(twist.x, twist.y) > STILL or abs(twist.yaw) > STILL

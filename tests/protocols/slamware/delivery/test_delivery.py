@@ -210,6 +210,8 @@ async def test_what_is_refused(screen: Screen) -> None:
     bad = screen.request("R101", "DANCE")
     assert (await screen.client.post(TASKS, json=bad)).status_code == 400
     assert (await screen.client.get(f"{API}/cargos/{screen.cargo}/boxes/99")).status_code == 404
+    same = [(await screen.client.get(f"{API}/cargos/{screen.cargo}/boxes/{box}")).json() for box in ("0", "000")]
+    assert same[0] == same[1] == same[0] | {"id": 0}, "orders write box 0 as 000"
     assert (await screen.client.get(f"{API}/cargos/{screen.cargo}/boxes/x")).status_code == 400
     assert (await screen.client.get(f"{API}/cargos/other/boxes")).status_code == 404
     assert (await screen.client.put(f"{API}/cargos/{screen.cargo}/boxes/0/:kick")).status_code == 400

@@ -77,7 +77,7 @@ function State() {
       ${battery && html`<${Row} name=${t("battery")} kind=${battery.low ? "bad" : ""}>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}
         <small>${[battery.volts && `${battery.volts} V`, battery.amperes && `${battery.amperes} A`, battery.remaining && t("battery.left", { time: duration(battery.remaining) })].filter(Boolean).join(" · ")}</small><//>`}
       ${pose && html`<${Row} name=${t("pose")}>x ${fixed(pose[0])} · y ${fixed(pose[1])} m · ${Math.round(pose[2] * 180 / Math.PI)}°<//>
-      ${!stale && html`<${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}`}
+      ${!stale && pose[3] !== null && html`<${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}`}
       ${place.quality !== null && html`<${Row} name=${t("place.fit")} kind=${place.lost ? "bad" : ""}>${place.lost ? t("place.lost", { why: robotWord(place.lost) }) : `${Math.round(place.quality * 100)} %`}<//>`}
       ${place.floor !== null && html`<${Row} name=${t("floor")}>${place.floor}<//>`}
       ${safety.docked !== null && html`<${Row} name=${t("dock")}>${safety.docked ? t("docked") : t("undocked")}<//>`}

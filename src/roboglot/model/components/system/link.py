@@ -13,7 +13,8 @@ from roboglot.model.errors import Busy, Refused, Unconnected
 from roboglot.model.events import EventStream, LinkChanged
 from roboglot.model.robot import Robot
 
-__all__ = ["FAULT", "OTHERS", "STALE_AFTER", "US", "Link", "LinkState", "require_heard", "was_heard"]
+__all__ = ["FAULT", "OTHERS", "STALE_AFTER", "US", "Link", "LinkState"]
+__all__ += ["is_current", "require_current", "require_heard", "was_heard"]
 
 FAULT = "link lost"
 US, OTHERS = "us", "another client"
@@ -133,6 +134,17 @@ class Link(Component):
 def was_heard(robot: Robot) -> bool:
     """Return False for a real robot that has not reported yet: its components hold initial values only."""
     return Link not in robot or not math.isinf(robot[Link].age())
+
+
+def is_current(robot: Robot) -> bool:
+    """Return False for a real robot without a link: where it was is known, but not how it moves now."""
+    return was_heard(robot) and (Link not in robot or robot[Link].state is LinkState.UP)
+
+
+def require_current(robot: Robot) -> None:
+    """Raise Unconnected for a real robot without a link, of which no motion and no rate is known."""
+    if Link in robot:
+        robot[Link].require()
 
 
 def require_heard(robot: Robot) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.components.system.link import require_heard
+from roboglot.model.components.system.link import require_current
 from roboglot.model.geometry import Orientation, Vector3
 from roboglot.programs.functions.results import header, point, quaternion, vector
 from roboglot.programs.functions.session import Session
@@ -22,7 +22,7 @@ LOOK_EVERY = 0.02  # s
 @ABILITIES.on("cyberdog.odometer.data", needs=(Odometry,))
 async def odometer(session: Session) -> Record:
     """Odometry (attribute): pose in odom, m; twist in base_link, m/s and rad/s. Zero covariances mean unknown."""
-    require_heard(session.robot)
+    require_current(session.robot)
     reading = session.robot[Odometry].reading
     pose, twist = reading.pose, reading.twist
     turned = quaternion(Orientation(yaw=pose.yaw))
@@ -44,7 +44,7 @@ async def odometer(session: Session) -> Record:
 @ABILITIES.on("cyberdog.imu.data", needs=(Imu,))
 async def imu(session: Session) -> Record:
     """Imu (attribute): attitude, rad/s and m/s2 (gravity included) in base_link. Zero covariances mean unknown."""
-    require_heard(session.robot)
+    require_current(session.robot)
     reading = session.robot[Imu].reading
     return Record(
         "Imu",

@@ -20,7 +20,7 @@ from roboglot.model.components.motion.sweeping import Sweeping
 from roboglot.model.components.motion.tag_docking import TagDocking
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import ERRAND
-from roboglot.model.components.system.link import require_heard
+from roboglot.model.components.system.link import require_current
 from roboglot.model.errors import InvalidGoal, RobotError, Unreachable
 from roboglot.model.geometry import Point
 from roboglot.operations import Right
@@ -139,7 +139,7 @@ def get_remaining_milestones(context: Context) -> PathPoints:
 @TABLE.on(f"GET {API}/speed", right=Right.SEE, needs=(Odometry,))
 def get_current_speed(context: Context) -> Speed:
     """Return the robot's velocity by its odometry."""
-    require_heard(context.robot)
+    require_current(context.robot)
     twist = context.robot[Odometry].reading.twist
     return Speed(twist.x, twist.y, twist.yaw)
 
