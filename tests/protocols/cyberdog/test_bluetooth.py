@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from roboglot.model.components.interaction.remote_control import Gear, RemoteControl
-from roboglot.model.components.system.bluetooth import Bluetooth
+from roboglot.model.components.system.bluetooth import BLUETOOTH, Bluetooth
 from roboglot.model.geometry import Point, Pose
 from tests.protocols.cyberdog.phone import App, Client, Stream, answered, until
 
@@ -54,6 +54,22 @@ async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
     assert await client.ask(8007, {"mac": 7}) == {"error_code": 323}  # and nothing is forgotten
     assert await client.ask(8007, {"mac": BRACELET}) == {"success": True}
     assert await client.ask(8001, {}) == {"device_info_list": []}
+
+
+async def test_scan_ends_with_the_last_who_waits(client, door, robot, gadget, forward) -> None:
+    first, second = (Stream(client, 8001, {"scan_seconds": 50}) for _ in range(2))
+    await until(lambda: robot.actions.running(BLUETOOTH))
+    (scan,) = robot.actions.running(BLUETOOTH)
+    waiting = door._context.bracelet._waiting
+    await until(lambda: waiting[scan.id] == 2)
+    first.call.cancel()
+    await until(lambda: waiting[scan.id] == 1)
+    assert not scan.status.ended
+    second.call.cancel()
+    await until(lambda: scan.status.ended)
+    assert not waiting
+    found = await answered(client, 8001, {"scan_seconds": 3}, forward)
+    assert found["device_info_list"], "the radio is free for the next scan"
 
 
 async def test_what_is_not_there_cannot_be_connected(client, robot, gadget, forward) -> None:

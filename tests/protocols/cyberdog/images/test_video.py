@@ -226,6 +226,18 @@ async def test_answer_of_a_robot_with_many_addresses_comes(watch, monkeypatch) -
     await watch().connect()
 
 
+async def test_answers_to_all_apps_at_once_arrive(watch, client, app, door) -> None:
+    await client.ask(10001)
+    await until(lambda: app.connected)
+    uids = [str(number) for number in range(door_video.PEERS_MAX)]
+    for uid in uids:
+        door._context.video._push(door_video.Description(uid, "answer", "v=0"))
+        for number in range(door_video.PUSHED_MAX):
+            door._context.video._push(door_video.Candidate(uid, f"candidate:{number}", "0", 0))
+    await until(lambda: len(app.of(4001)) == len(uids) * (1 + door_video.PUSHED_MAX))
+    assert [push["uid"] for push in app.of(4001) if "answer_sdp" in push] == uids
+
+
 async def test_more_apps_than_there_is_room_for(watch, client, door, monkeypatch) -> None:
     monkeypatch.setattr(door_video, "PEERS_MAX", 2)
     watchers = [watch(str(number)) for number in range(3)]

@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from roboglot.media.webrtc import VideoCall
 
 log = logging.getLogger(__name__)
-SIGNAL = push(Code.VIDEO, depth=20)
 PUSHED_MAX = 16  # addresses beside an answer, which has all of them and would be dropped before more
 PATIENCE = 10.0  # s (machine clock) to find a way to the app
 PEERS_MAX = 16  # apps that watch or connect at the same time
+SIGNAL = push(Code.VIDEO, depth=PEERS_MAX * (PUSHED_MAX + 2))  # an answer, its addresses and an end for each
 TASKS_MAX = 4 * PEERS_MAX  # calls that are answered, served or closed at the same time
 EARLY_MAX = 32  # candidates of one app that arrived before its offer
 SCREEN_WIDTH = 640  # width of pictures for a screen of unknown size

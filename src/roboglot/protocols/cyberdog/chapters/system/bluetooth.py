@@ -41,7 +41,8 @@ class WireDevice(msgspec.Struct):
 async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, object]:
     """Return new devices found in ``scan_seconds``; 0: devices connected before.
 
-    While a device is connected, the results of the last scan are returned.
+    While a device is connected, the results of the last scan are returned. A scan ends when the last app that waits for
+    it has gone.
     """
     radio = call.context.robot[Bluetooth]
     here = radio.connected.address if radio.connected else ""
@@ -50,7 +51,8 @@ async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, object]:
     if not here:
         scanning = _under_way(call.context.robot) or radio.scan(min(scan_seconds, SCAN_SECONDS_MAX), source=SOURCE)
         try:
-            await call.context.robot.clock.wait_for(scanning.succeeded(), max(6.0, 1.5 * scan_seconds))
+            with call.context.bracelet.waiting_for(scanning):
+                await call.context.robot.clock.wait_for(scanning.succeeded(), max(6.0, 1.5 * scan_seconds))
         except TimeoutError:
             return {"error_code": int(InBandError.TIMEOUT)}
     known = {device.address for device in radio.history}

@@ -5,13 +5,16 @@ Pushes 8003, 8008, 8010, 8012.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.system.bluetooth import Bluetooth
 from roboglot.model.events import ActionChanged, BluetoothConnected, BluetoothLost, GearChanged
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.table import push
 from roboglot.wire.cyberdog.codes import Code
 
@@ -30,6 +33,7 @@ class Bracelet:
         self._robot, self._app = robot, app
         self._update: Action | None = None
         self._pushed = -1.0  # progress of the last push
+        self._waiting: Counter[int] = Counter()  # requests, by the number of their scan
         events = robot.events
         self._leave: list[Callable[[], None]] = [
             events.listen(BluetoothLost, lambda _: app.push(BRACELET_LOST, {"disconnected": True})),
@@ -47,6 +51,19 @@ class Bracelet:
     def follow(self, update: Action) -> None:
         """Report the progress of ``update`` until it has ended."""
         self._update, self._pushed = update, -1.0
+
+    @contextmanager
+    def waiting_for(self, scan: Action) -> Iterator[None]:
+        """Wait for a scan, which ends with the last request that waits if this door began it."""
+        self._waiting[scan.id] += 1
+        try:
+            yield
+        finally:
+            self._waiting[scan.id] -= 1
+            if not self._waiting[scan.id]:
+                del self._waiting[scan.id]
+                if scan.source == SOURCE and not scan.status.ended:
+                    scan.cancel("no app waits for it any more")
 
     def offer(self) -> None:
         """Report newer firmware for the connected device, if there is any."""
