@@ -15,14 +15,18 @@ import pytest
 from websockets.asyncio.client import connect
 
 from roboglot import runtime
+from roboglot.clients.errors import LinkLost
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
 from roboglot.demo.clients.phone import Phone
 from roboglot.demo.clients.robomaster import RoboMasterClient
 from roboglot.demo.clients.slamware import SlamwareClient
-from roboglot.model.clock import LockstepClock
+from roboglot.model.clock import LockstepClock, RealClock
+from roboglot.model.tap import Direction
 from roboglot.protocols import sections
 from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
+from roboglot.recording.lines import Target
 from roboglot.recording.playback import open_playback
+from roboglot.recording.proxy.relay import Book
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
@@ -199,3 +203,27 @@ async def by_pose(address: str) -> None:
     client = SlamwareClient(address)
     await client.pose()
     await client.close()
+
+
+async def test_calls_end_with_the_status_of_the_recording(tmp_path: Path) -> None:
+    """A proxy's recording of a dog that was too busy for one call."""
+    export_client(tmp_path / "data" / "cyberdog", tmp_path / "certificates")
+    path = tmp_path / "dog.mcap"
+    book = Book(path, Target(f"cyberdog://{ADDRESS}"), "0")
+    for status, payload in (("ok", b'{"gears": 1}'), ("error RESOURCE_EXHAUSTED", b"")):
+        asked = book.note("127.0.0.1:1", Direction.REQUEST, "8013", status.encode(), "", None)
+        book.note("127.0.0.1:1", Direction.REPLY, "8013", payload, status, asked)
+    book.close()
+
+    async def ask(host: str) -> list[str]:
+        line = Target(f"cyberdog://{host}?certs={tmp_path / 'certificates'}").line(RealClock(), lambda *_: None)
+        await line.open()
+        try:
+            said = [status for _, status in await line.ask("8013", b"ok", [b""])]
+            with pytest.raises(LinkLost) as ended:
+                await line.ask("8013", b"error RESOURCE_EXHAUSTED", [b""])
+        finally:
+            await line.close()
+        return [*said, ended.value.status]
+
+    assert await run(tmp_path, f"recording:{path}", "", ask) == ["ok", "error RESOURCE_EXHAUSTED"]

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 
 class ClientError(Exception):
-    """Anything that a client's call fails with; the message is a plain sentence."""
+    """Anything that a client's call fails with; the message is a plain sentence.
+
+    ``status``: the end of the call in the tap's words.
+    """
+
+    status = "no answer"
 
 
 class LinkLost(ClientError):

@@ -83,7 +83,7 @@ class Replay:
         except ClientError as error:
             if isinstance(error, LinkLost):
                 self._lost = self._lost or error
-            self._note(request.connection, Direction.REPLY, request.operation, b"", "no answer", began, str(error))
+            self._note(request.connection, Direction.REPLY, request.operation, b"", error.status, began, str(error))
             return
         self._answered = self._answered or bool(answers)
         for payload, status in answers:

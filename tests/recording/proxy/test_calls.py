@@ -23,6 +23,7 @@ from roboglot.wire.cyberdog.channel import ROBOT_NAME
 from tests.recording.proxy.test_relay import BETWEEN
 
 ASKED = [b"", b"one", bytes(range(256)) * 200]
+STATUSES = [0, 14, 7]
 ANSWERED = [b"yes", b"no" * 30_000]
 
 
@@ -68,7 +69,7 @@ def conversation(*, packed: bool) -> tuple[bytes, bytes]:
         answers += headers(answering, stream, [(":status", "200"), *encoding])
         for answer in ANSWERED:
             answers += data(stream, answer, last=False, packed=packed)
-        answers += headers(answering, stream, [("grpc-status", "0")], last=True)
+        answers += headers(answering, stream, [("grpc-status", str(STATUSES[number]))], last=True)
     return bytes(asks), bytes(answers)
 
 
@@ -89,7 +90,8 @@ def test_calls_are_read_however_they_are_cut(packed: bool, lengths: list[int]) -
     def note(call: Call, message: bytes) -> None:
         heard.append((call.path, message))
 
-    asking, answering = both(note, note)
+    ends: list[tuple[str, int]] = []
+    asking, answering = both(note, note, lambda call, status: ends.append((call.path, status)))
     asks, answers = conversation(packed=packed)
     answering.feed(answers[:15])  # a server's settings come first
     for piece in cut(asks, lengths):
@@ -99,11 +101,24 @@ def test_calls_are_read_however_they_are_cut(packed: bool, lengths: list[int]) -
     for piece in cut(answers[15:], lengths):
         answering.feed(piece)
     assert heard == [(f"/a/{number}", message) for number in range(len(ASKED)) for message in ANSWERED]
+    assert ends == [(f"/a/{number}", status) for number, status in enumerate(STATUSES)]
+
+
+@pytest.mark.parametrize(("reset", "status"), [(8, [1]), (7, [14]), (2, [13])])
+def test_reset_by_the_robot_is_an_end(reset: int, status: list[int]) -> None:
+    ends: list[int] = []
+    for breaks in ("app", "robot"):
+        asking, answering = both(lambda *_: None, lambda *_: None, lambda _, ended: ends.append(ended))
+        asks, answers = conversation(packed=False)
+        answering.feed(answers[:15])  # a server's settings
+        asking.feed(asks)
+        (asking if breaks == "app" else answering).feed(frame(Http2Frame.RST_STREAM, 0, 1, reset.to_bytes(4)))
+    assert ends == status, "an app that goes gets no answer"
 
 
 @given(st.binary(min_size=1, max_size=400))
 def test_nothing_but_known_errors_come_of_noise(noise: bytes) -> None:
-    asking, answering = both(lambda _call, _message: None, lambda _call, _message: None)
+    asking, answering = both(*[lambda _call, _message: None] * 3)
     for way, before in ((asking, PREFACE), (answering, b"")):
         with contextlib.suppress(Exception):  # the relay takes any, and goes on passing
             way.feed(before + noise)

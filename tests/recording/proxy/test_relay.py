@@ -29,6 +29,7 @@ from roboglot.recording.proxy.sniffers import rest_operation
 from roboglot.recording.reader import pair, read_recording
 from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run, whole_closing
 
 assert whole_closing  # a fixture for these tests, too
@@ -274,6 +275,7 @@ def test_a_request_is_named_as_in_the_contract() -> None:
     assert rest_operation("GET", "/nowhere") == ""
 
 
+REFUSED = pb.SendRequest(nameCode=10001, params="refuse").SerializeToString()
 UNREADABLE = b"\xff\xff\xff\xff not of the service"
 
 
@@ -281,8 +283,10 @@ async def test_dog_s_message_that_cannot_be_read_passes(tmp_path: Path) -> None:
     """Requests, answers, pushes and heartbeats are bytes to the proxy; what it cannot read is noted as it is."""
     path, heard, (robot_port, app_port, called) = tmp_path / "x.mcap", list[bytes](), (free_port() for _ in range(3))
 
-    async def stream(request: bytes, _context: object) -> AsyncIterator[bytes]:
+    async def stream(request: bytes, context: grpc.aio.ServicerContext) -> AsyncIterator[bytes]:
         heard.append(request)
+        if b"refuse" in request:
+            await context.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, "too many")
         yield UNREADABLE + b" answer"
 
     async def beat(request: bytes, _context: object) -> bytes:
@@ -311,13 +315,17 @@ async def test_dog_s_message_that_cannot_be_read_passes(tmp_path: Path) -> None:
             grpc.aio.insecure_channel(f"127.0.0.1:{called}") as dog,
         ):
             asked = [answer async for answer in phone.unary_stream("/grpcapi.GrpcApp/sendMsg")(UNREADABLE + b" 1")]
+            with pytest.raises(grpc.aio.AioRpcError):
+                [_ async for _ in phone.unary_stream("/grpcapi.GrpcApp/sendMsg")(REFUSED)]
             pushed = [answer async for answer in dog.unary_stream("/grpcapi.GrpcApp/sendMsg")(UNREADABLE + b" 2")]
             beaten = await dog.unary_unary("/grpcapi.GrpcApp/heartbeat")(UNREADABLE + b" 3")
     finally:
         await relay.close()
         book.close()
         await asyncio.gather(*(end.stop(None) for end in ends))
-    assert heard == [UNREADABLE + b" 1", UNREADABLE + b" 2", UNREADABLE + b" 3"]
+    assert heard == [UNREADABLE + b" 1", REFUSED, UNREADABLE + b" 2", UNREADABLE + b" 3"]
+    refused = pair(read_recording(path).of(door="cyberdog"))[0][1]
+    assert [(reply.payload, reply.status) for reply in refused.replies] == [(b"", "error RESOURCE_EXHAUSTED")]
     assert [*asked, *pushed, beaten] == [UNREADABLE + b" answer"] * 3
     assert UNREADABLE + b" answer" in [exchange.payload for exchange in read_recording(path).of(door="cyberdog")]
 

@@ -266,7 +266,9 @@ async def _refuse(rpc: grpc.aio.ServicerContext) -> NoReturn:
 
 def _lost(error: grpc.aio.AioRpcError) -> LinkLost:
     kind = TimedOut if error.code() is grpc.StatusCode.DEADLINE_EXCEEDED else LinkLost
-    return kind(f"{error.code().name.lower()}: {error.details()}")
+    lost = kind(f"{error.code().name.lower()}: {error.details()}")
+    lost.status = f"error {error.code().name}"
+    return lost
 
 
 def _on_this_machine(host: str) -> bool:

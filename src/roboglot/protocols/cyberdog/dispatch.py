@@ -26,7 +26,7 @@ from roboglot.protocols.cyberdog.chapters.system import (  # noqa: F401
     status,
     upkeep,
 )
-from roboglot.protocols.cyberdog.errors import codes_of
+from roboglot.protocols.cyberdog.errors import RecordedEnd, codes_of
 from roboglot.protocols.cyberdog.table import TABLE, unread
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
@@ -66,6 +66,9 @@ async def _followed(call: Call) -> object | None:
         answered = error(InBandError.BAD_PARAMETERS)
         tap.reply(DOOR, key, write(answered), _status(answered), str(bad), began)
         raise
+    except RecordedEnd as end:
+        tap.reply(DOOR, key, "", end.status, "the recorded robot ended the call so", began)
+        raise
     if last is not None or call.why:
         text, status = ("", SILENT) if last is None else (write(last), _status(last))
         tap.reply(DOOR, key, text, status, call.why, began)
@@ -89,6 +92,7 @@ async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
         call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
     reads = operation is not None and operation.right is Right.SEE
     async for reply in stand_in.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
+        RecordedEnd.check(reply.status)
         if reply.status == SILENT:
             call.why = "the recorded robot said nothing, either"
             return None

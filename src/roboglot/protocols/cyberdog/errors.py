@@ -7,6 +7,22 @@ from roboglot.values import dataclass
 from roboglot.wire.cyberdog.chapters.motion.motion import MotionCode
 from roboglot.wire.cyberdog.codes import Feedback, InBandError
 
+ENDED = "error "  # before the name of gRPC's status
+
+
+class RecordedEnd(Exception):
+    """The recorded robot ended the call with a status of gRPC: ``code``."""
+
+    def __init__(self, status: str) -> None:
+        super().__init__(status)
+        self.status, self.code = status, status.removeprefix(ENDED)
+
+    @classmethod
+    def check(cls, status: str) -> None:
+        """Raise it for the recorded status of such an end."""
+        if status.startswith(ENDED):
+            raise cls(status)
+
 
 @dataclass(frozen=True, slots=True)
 class ErrorCodes:

@@ -19,6 +19,7 @@ from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.camera.camera import get_file
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.dispatch import answer, error
+from roboglot.protocols.cyberdog.errors import RecordedEnd
 from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.stops import stops
 from roboglot.protocols.turns import wait_for_turn
@@ -72,6 +73,9 @@ class Service:
                 reason = f"a host has at most {HOST_CALLS_MAX} calls at the same time"
                 await rpc.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, reason)
             return await serve(request, rpc)
+        except RecordedEnd as end:
+            await rpc.abort(grpc.StatusCode.__members__.get(end.code, grpc.StatusCode.UNKNOWN), "as recorded")
+            raise
         finally:
             self._open[host] -= 1
             if not self._open[host]:

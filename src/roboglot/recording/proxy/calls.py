@@ -52,6 +52,7 @@ class Call:
     code: str = ""
     at: float = 0.0
     ways: dict[str, _Messages] = field(default_factory=dict)
+    status: int = 0  # of gRPC, with which it ended
 
 
 @dataclass(slots=True)
@@ -63,16 +64,20 @@ class _Messages:
 
 
 Heard = Callable[[Call, bytes], None]
+Ended = Callable[[Call, int], None]
+UNKNOWN, INTERNAL = 2, 13  # statuses of gRPC
+RESETS = {7: 14, 8: 1, 11: 8, 12: 7}  # from HTTP/2's errors: unavailable, cancelled, exhausted, denied
 
 
 class OneWay:
-    """One direction of a connection: ``feed`` it; ``heard`` gets each whole message of a call.
+    """One direction of a connection: ``feed`` it; ``heard`` gets each whole message of a call, ``ended`` the status
+    with which the called side ended it.
 
     Raises ValueError, IndexError or hpack's HPACKError for bytes that are not HTTP/2.
     """
 
-    def __init__(self, name: str, calls: dict[int, Call], heard: Heard, preface: bytes = b"") -> None:
-        self._name, self._calls, self._heard = name, calls, heard
+    def __init__(self, name: str, calls: dict[int, Call], heard: Heard, ended: Ended, preface: bytes = b"") -> None:
+        self._name, self._calls, self._heard, self._ended = name, calls, heard, ended
         self._preface = preface
         self._rest = bytearray()
         self._decoder = Decoder()
@@ -122,7 +127,7 @@ class OneWay:
                     raise ValueError("headers without an end")
                 self._head(flags, stream)
             case Http2Frame.RST_STREAM:
-                self._calls.pop(stream, None)
+                self._end(stream, RESETS.get(int.from_bytes(payload[:4]), INTERNAL))
             case Http2Frame.SETTINGS if not flags & Flag.ACK:
                 self._settings(payload)
 
@@ -137,13 +142,20 @@ class OneWay:
             call = self._calls[stream] = Call(found[":path"])
         if call is not None and "grpc-encoding" in found:
             call.ways.setdefault(self._name, _Messages()).packing = found["grpc-encoding"]
+        if call is not None and (status := found.get("grpc-status", "0")) != "0" and self._name == "answers":
+            call.status = int(status) if status.isascii() and status.isdigit() else UNKNOWN
         if self._ends:
             self._end_with(Flag.END_STREAM, stream)
 
     def _end_with(self, flags: Flag, stream: int) -> None:
         """Forget a call when the side that answers ends it."""
         if flags & Flag.END_STREAM and self._name == "answers":
-            self._calls.pop(stream, None)
+            self._end(stream, 0)
+
+    def _end(self, stream: int, status: int) -> None:
+        call = self._calls.pop(stream, None)
+        if call is not None and self._name == "answers":  # a caller that goes has no answer
+            self._ended(call, call.status or status)
 
     def _data(self, call: Call, data: bytes) -> None:
         way = call.ways.setdefault(self._name, _Messages())
@@ -166,10 +178,10 @@ class OneWay:
                 self.peer.remember(int.from_bytes(payload[at + 2 : at + SETTING]))
 
 
-def both(asked: Heard, answered: Heard) -> tuple[OneWay, OneWay]:
+def both(asked: Heard, answered: Heard, ended: Ended) -> tuple[OneWay, OneWay]:
     """Return the two directions of a connection: the caller's, which begins with the preface, and the answerer's."""
     calls: dict[int, Call] = {}
-    asking, answering = OneWay("asks", calls, asked, PREFACE), OneWay("answers", calls, answered)
+    asking, answering = OneWay("asks", calls, asked, ended, PREFACE), OneWay("answers", calls, answered, ended)
     asking.peer, answering.peer = answering, asking
     return asking, answering
 

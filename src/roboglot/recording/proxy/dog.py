@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from google.protobuf.message import DecodeError, Message
+from grpc import StatusCode
 
 from roboglot.clients.cyberdog.link import Certificates
 from roboglot.model.tap import Direction
@@ -30,6 +31,7 @@ from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
 log = logging.getLogger(__name__)
+NAMES: dict[int, str] = {code.value[0]: code.name for code in StatusCode}
 SERVICE = "/grpcapi.GrpcApp/"
 SEND, FETCH, BEAT = SERVICE + "sendMsg", SERVICE + "getFile", SERVICE + "heartbeat"
 
@@ -113,7 +115,7 @@ class GrpcSniffer(Sniffer):
 
     def __init__(self, note: Note) -> None:
         super().__init__(note)
-        asking, answering = both(self.asked, self.answered)
+        asking, answering = both(self.asked, self.answered, self.ended)
         self._asking: Callable[[bytes], None] = asking.feed
         self._answering: Callable[[bytes], None] = answering.feed
 
@@ -128,6 +130,9 @@ class GrpcSniffer(Sniffer):
 
     def answered(self, call: Call, message: bytes) -> None:
         """Handle a message of the called side."""
+
+    def ended(self, call: Call, status: int) -> None:
+        """Handle the end of a call, with gRPC's status."""
 
 
 class AppSniffer(GrpcSniffer):
@@ -144,6 +149,10 @@ class AppSniffer(GrpcSniffer):
         read = _read(pb.RecResponse, message)
         answer = message if read is None else read.data.encode()
         self._note(Direction.REPLY, call.code, answer, status_of("cyberdog", answer), call.at)
+
+    def ended(self, call: Call, status: int) -> None:
+        if status and call.path in (SEND, FETCH):
+            self._note(Direction.REPLY, call.code, b"", f"error {NAMES.get(status, status)}", call.at)
 
 
 class RobotSniffer(GrpcSniffer):

@@ -18,6 +18,7 @@ from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.chapters.camera.transfers import error_of
 from roboglot.protocols.cyberdog.context import Context
+from roboglot.protocols.cyberdog.errors import RecordedEnd
 from roboglot.protocols.cyberdog.table import TABLE, files
 from roboglot.wire.cyberdog.codes import Code, FileError
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -67,6 +68,7 @@ async def _played(context: Context, stand_in: StandIn, code: int, params: str) -
         return
     try:
         async for reply in stand_in.answer("cyberdog", str(int(code)), params.encode(), reads=code == Code.SAVED_FILE):
+            RecordedEnd.check(reply.status)
             yield pb.FileChunk.FromString(reply.payload)
     except (NotFound, DecodeError) as error:
         log.info("cannot send a file: %s", error)
