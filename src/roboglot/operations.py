@@ -76,7 +76,8 @@ class Operation(Generic[K]):
 
     ``partial``: the missing part in plain words; empty if the operation is
     complete. The coverage page counts only complete ones. ``right``: the right that a client needs; None, which a test
-    refuses, means ADMIN. ``needs``: components of the robot without which the handler refuses.
+    refuses, means ADMIN. ``needs``: components of the robot without which the handler refuses; ``some``: those that
+    only some values of its parameters need.
     """
 
     key: K
@@ -85,6 +86,7 @@ class Operation(Generic[K]):
     partial: str
     right: Right | None
     needs: frozenset[type]
+    some: frozenset[type] = frozenset()
 
     @property
     def parameters(self) -> type[msgspec.Struct]:
@@ -139,9 +141,14 @@ class OperationTable(Generic[K]):
         self._operations: dict[K, Operation[K]] = {}
 
     def on(
-        self, *keys: K, right: Right | None = None, needs: tuple[type, ...] = (), partial: str = ""
+        self,
+        *keys: K,
+        right: Right | None = None,
+        needs: tuple[type, ...] = (),
+        some: tuple[type, ...] = (),
+        partial: str = "",
     ) -> Callable[[Handler], Handler]:
-        """Register a handler under ``keys``, for clients with ``right`` and robots with the components in ``needs``."""
+        """Register a handler under ``keys``, for clients with ``right`` and robots with ``needs``: see Operation."""
 
         def register(handler: Handler) -> Handler:
             _refuse_untyped(handler)
@@ -149,7 +156,8 @@ class OperationTable(Generic[K]):
             for key in keys:
                 if key in self._operations:
                     raise ValueError(f"{self.name}: {key!r} is declared twice")
-                self._operations[key] = Operation(key, handler, schema, partial, right or self._right, frozenset(needs))
+                parts = frozenset(needs), frozenset(some)
+                self._operations[key] = Operation(key, handler, schema, partial, right or self._right, *parts)
             return handler
 
         return register

@@ -19,8 +19,8 @@ BODIES = ("cyberdog2", "hermes", "robomaster_ep", "universal")
 @pytest.mark.parametrize(
     ("word", "known", "near"),
     [
-        ("recrod", COMMANDS, "record"),
-        ("conect", COMMANDS, "connect"),
+        ("recrod", COMMANDS, "record"),  # codespell:ignore
+        ("conect", COMMANDS, "connect"),  # codespell:ignore
         ("sotp", COMMANDS, "stop"),
         ("camp", COMMANDS, "campaign"),
         ("MIRROR", COMMANDS, "mirror"),
@@ -65,9 +65,9 @@ def test_word_without_near_name_gets_no_guess(word: str, known: tuple[str, ...])
     [
         ("up --sede 3", "--seed", "--insecure"),
         ("up --lidar", "--lidar", "Possible"),
-        ("record staus", "did you mean 'status'?", "Did you mean"),
+        ("record staus", "did you mean 'status'?", "Did you mean"),  # codespell:ignore
         ("fleet zebra", "there are up,", "id you mean"),
-        ("recrod", "there is no command 'recrod'; did you mean 'record'?", "there are"),
+        ("recrod", "there is no command 'recrod'; did you mean 'record'?", "there are"),  # codespell:ignore
     ],
 )
 def test_command_line_guesses_well(line: str, said: str, unsaid: str) -> None:

@@ -7,7 +7,7 @@ import pytest
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.imu import Imu, ImuConverters
 from roboglot.model.components.system.developer import Developer
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.components.system.system_log import SystemLog
@@ -68,7 +68,7 @@ async def test_raw_imu_values_are_the_reading_in_counts(robot, world, forward):
     for heading in (0.0, 90.0, 200.0):
         world.hands.place("a", Pose(5, 5, math.radians(heading)))
         await forward(seconds=0.5)
-        raw, reading = robot[Imu].raw, robot[Imu].reading
+        raw, reading = robot[ImuConverters].raw, robot[Imu].reading
         assert raw.stamp == reading.stamp
         assert raw.acceleration[2] * raw.acceleration_unit == pytest.approx(
             reading.linear_acceleration.z, abs=raw.acceleration_unit

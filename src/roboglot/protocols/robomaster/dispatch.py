@@ -235,7 +235,7 @@ def _checked(operation: Operation[str], words: Sequence[str], as_robots: bool) -
 
 
 def _unknown(command: Command) -> str:
-    near = nearest_command(command, (operation.key for operation in TABLE))
+    near = nearest_command(command, [operation.key for operation in TABLE])
     return f"no such command; {near}" if near else "no such command"
 
 

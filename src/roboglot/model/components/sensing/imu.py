@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from roboglot.model.components.component import Component
-from roboglot.model.errors import Refused
 from roboglot.model.sensing import ImuReading, RawImu
 
 
@@ -19,7 +18,11 @@ class Imu(Component):
     def reading(self) -> ImuReading:
         """Latest reading."""
 
+
+class ImuConverters(Component):
+    """Output of the converters behind accelerometer, gyro and compass; real robots do not report it by a driver."""
+
     @property
+    @abstractmethod
     def raw(self) -> RawImu:
-        """Return the latest raw reading, before any conversion. Raises Refused where the robot does not report it."""
-        raise Refused("this robot's IMU does not report raw values")
+        """Latest raw reading, before any conversion."""

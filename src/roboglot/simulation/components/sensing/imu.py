@@ -34,7 +34,7 @@ from roboglot.kernels.layouts import (
     TOGETHER,
     USE,
 )
-from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.imu import Imu, ImuConverters
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Orientation, Vector3, wrap_angle
 from roboglot.model.sensing import ImuReading, RawImu
@@ -67,7 +67,7 @@ class ImuSection(Struct, frozen=True, forbid_unknown_fields=True):
     acceleration_bias: NotNegative
 
 
-class SimulatedImu(Imu):
+class SimulatedImu(Imu, ImuConverters):
     """IMU in the torso, above base_link."""
 
     averages = True
@@ -223,6 +223,7 @@ def _fit(fit: Fitting) -> SimulatedImu:
     field = earth_field(fit.world.north)
     imu = SimulatedImu(fit.body[ImuSection], fit.hull, fit.chance("imu"), fit.chance("compass"), field)
     fit.world.chances.on_reseed(imu.forget_noise)
+    fit.robot.add(ImuConverters, imu)
     return imu
 
 

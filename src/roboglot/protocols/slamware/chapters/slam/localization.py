@@ -9,11 +9,10 @@ import msgspec
 
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
-from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.imu import Imu, ImuConverters
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import require_heard
-from roboglot.model.errors import Refused
 from roboglot.model.sensing import ImuReading, RawImu
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.system.raw_imu import in_units
@@ -118,12 +117,8 @@ def set_loop_closure(context: Context, body: Switch) -> bool:
 def get_imu(context: Context) -> ImuData:
     """Return attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
     require_heard(context.robot)
-    imu = context.robot[Imu]
-    try:
-        raw = imu.raw
-    except Refused:
-        raw = None  # this IMU does not report raw values
-    return imu_data(imu.reading, raw)
+    robot = context.robot
+    return imu_data(robot[Imu].reading, robot[ImuConverters].raw if ImuConverters in robot else None)
 
 
 @TABLE.on(f"GET {API}/knownarea", right=Right.SEE, needs=(Mapping,))

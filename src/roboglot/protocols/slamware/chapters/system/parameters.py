@@ -15,7 +15,7 @@ PARAMETER = "/api/core/system/v1/parameter"
 SWITCH = {"on": True, "off": False}
 
 
-@TABLE.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base, Docking))
+@TABLE.on(f"GET {PARAMETER}", right=Right.SEE, needs=(Base,), some=(Docking,))
 def get_system_parameter(context: Context, param: Readable) -> Text:
     """Return a top speed (m/s, rad/s), as text with six decimals, or when touched docks are registered."""
     match param:
@@ -28,7 +28,7 @@ def get_system_parameter(context: Context, param: Readable) -> Text:
             return Text("when_not_exists")  # the actual behaviour: only a robot without a dock learns one by touch
 
 
-@TABLE.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base, EmergencyStop))
+@TABLE.on(f"PUT {PARAMETER}", right=Right.DRIVE, needs=(Base,), some=(EmergencyStop,))
 def set_system_parameter(context: Context, body: Parameter) -> bool:
     """Set a speed limit, the emergency stop or the brake release."""
     match body.param:

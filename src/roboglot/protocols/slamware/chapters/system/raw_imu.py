@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.sensing.imu import Imu
+from roboglot.model.components.sensing.imu import ImuConverters
 from roboglot.model.sensing import RawImu
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
@@ -12,17 +12,17 @@ from roboglot.wire.slamware.chapters.system.system import ImuCounts, ImuValues
 API = "/api/core/system/v1"
 
 
-@TABLE.on(f"GET {API}/rawadcimu", right=Right.SEE, needs=(Imu,))
+@TABLE.on(f"GET {API}/rawadcimu", right=Right.SEE, needs=(ImuConverters,))
 def get_imu_raw_adc_data(context: Context) -> ImuCounts:
     """Return the counts of accelerometer, gyro and compass."""
-    raw = context.robot[Imu].raw
+    raw = context.robot[ImuConverters].raw
     return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
 
 
-@TABLE.on(f"GET {API}/rawimu", right=Right.SEE, needs=(Imu,))
+@TABLE.on(f"GET {API}/rawimu", right=Right.SEE, needs=(ImuConverters,))
 def get_imu_raw_data(context: Context) -> ImuValues:
     """Return the uncorrected readings in m/s2, rad/s and microtesla."""
-    raw = context.robot[Imu].raw
+    raw = context.robot[ImuConverters].raw
     a, r, f = in_units(raw)
     return ImuValues(a[0], a[1], a[2], r[0], r[1], r[2], f[0], f[1], f[2], _milliseconds(raw))
 
