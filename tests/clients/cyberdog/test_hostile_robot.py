@@ -12,11 +12,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from roboglot.clients.cyberdog import CyberDogClient
+from roboglot.clients.cyberdog import CyberDogClient, values
 from roboglot.clients.errors import BadAnswer, ClientError
-from roboglot.wire.cyberdog.channel import SERVICE
+from roboglot.wire.cyberdog.channel import APP_NAME, SERVICE, client_options
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from tests.narrowing import known
 
 ADDRESS = "127.0.0.1"
 PATIENCE = 60.0  # real s
@@ -72,12 +73,12 @@ async def test_bytes_that_are_no_answer_are_bad_ones(caplog: pytest.LogCaptureFi
     assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
 
 
-values = st.recursive(
+anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
     lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=5), inner, max_size=2),
     max_leaves=4,
 )
-fields = st.dictionaries(st.sampled_from(("success", "result", "code", "message", "error_code")), values)
+fields = st.dictionaries(st.sampled_from(("success", "result", "code", "message", "error_code")), anything)
 
 
 @settings(max_examples=25, deadline=None)
@@ -98,3 +99,52 @@ async def test_bytes_that_are_no_push_end_their_call(sent: bytes, caplog: pytest
                 _ = [answer async for answer in channel.unary_stream(f"/{SERVICE}/sendMsg")(sent)]
         assert refused.value.code() is grpc.StatusCode.INTERNAL
     assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
+
+
+async def test_calls_of_another_robot_are_refused() -> None:
+    """A robot that had this app before remembers its address, and would mix its state and pose into this one's."""
+    async with (
+        Robot() as robot,
+        CyberDogClient(ADDRESS, None, port=robot.port, app_port=0) as client,
+        _dial(client) as own,
+        _dial(client) as other,
+        asyncio.timeout(PATIENCE),
+    ):
+        robot.answers = (pb.RecResponse(nameCode=Code.DEVICE_INFO, data='{"sn": "mine"}').SerializeToString(),)
+        await _beat(other, "other")
+        finding = asyncio.ensure_future(client.found())
+        while await _beat(other, "other"):
+            await asyncio.sleep(0)
+        assert not finding.done()
+        assert await _beat(own, "mine")
+        assert (await finding).serial == "mine"
+        assert not await _beat(other, "other")
+        assert known(client.heartbeat).serial == "mine"
+        with client.watch(values.Pose) as poses:
+            with pytest.raises(grpc.aio.AioRpcError, match="another robot"):
+                await _push(other, 1.0)
+            await _push(own, 2.0)
+            async for pose in poses:
+                assert pose.px == 2.0
+                break
+
+
+def _dial(client: CyberDogClient) -> grpc.aio.Channel:
+    where = f"{ADDRESS}:{client.link.app_port}"
+    return grpc.aio.insecure_channel(where, options=client_options(APP_NAME))  # a connection of its own
+
+
+async def _beat(channel: grpc.aio.Channel, serial: str) -> bool:
+    """Send a heartbeat; return whether it was taken."""
+    try:
+        await channel.unary_unary(f"/{SERVICE}/heartbeat")(pb.Ticks(sn=serial, battery_power=50).SerializeToString())
+    except grpc.aio.AioRpcError as error:
+        assert error.code() is grpc.StatusCode.PERMISSION_DENIED
+        return False
+    return True
+
+
+async def _push(channel: grpc.aio.Channel, x: float) -> None:
+    pose = json.dumps({"px": x, "py": 0.0, "pz": 0.0, "qx": 0.0, "qy": 0.0, "qz": 0.0, "qw": 1.0})
+    request = pb.SendRequest(nameCode=Code.POSE, params=pose)
+    _ = [answer async for answer in channel.unary_stream(f"/{SERVICE}/sendMsg")(request.SerializeToString())]

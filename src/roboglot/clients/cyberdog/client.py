@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from roboglot.clients.cyberdog.calls import Calls
+from roboglot.clients.cyberdog.calls import Calls, CyberDogRefused, NoAnswer
 from roboglot.clients.cyberdog.chapters.camera.camera import Camera
 from roboglot.clients.cyberdog.chapters.camera.video import Video
 from roboglot.clients.cyberdog.chapters.mapping.labels import Labels
@@ -36,7 +36,7 @@ from roboglot.clients.cyberdog.chapters.system.status import Status
 from roboglot.clients.cyberdog.chapters.system.upkeep import Upkeep
 from roboglot.clients.cyberdog.link import Certificates, DogLink, Heartbeat
 from roboglot.clients.cyberdog.values import PUSHED, Value
-from roboglot.clients.errors import ClientError
+from roboglot.clients.errors import BadAnswer, ClientError
 from roboglot.misfits import read_answer
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
@@ -107,8 +107,11 @@ class CyberDogClient(
         """Call the robot and wait until it calls back. Raises TimedOut, or ClientError without an ``app_port``."""
         if self.link.app_port is None:
             raise ClientError("this client has no server that the robot could call")
-        await self.status()
-        return await self.link.found(within)
+        try:
+            serial = (await self.information("sn")).get("sn")
+        except (NoAnswer, CyberDogRefused, BadAnswer):
+            serial = None
+        return await self.link.found(within, serial if isinstance(serial, str) else "")
 
     @property
     def heartbeat(self) -> Heartbeat | None:

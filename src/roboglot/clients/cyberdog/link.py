@@ -27,6 +27,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 REDIAL_MAX = 2000  # ms between two attempts to connect
 PUSH_MAX = 5_242_880  # bytes per message
 FOUND_PERIOD = 0.05  # s between two checks whether the robot has called
+CALLERS_MAX = 64  # connections whose robot is remembered
 IN_BAND = re.compile(r'"error_code"\s*:\s*([1-9]\d*)')
 
 
@@ -100,6 +101,7 @@ class DogLink:
     ) -> None:
         self.clock = clock
         self.heartbeat: Heartbeat | None = None
+        self.serial = ""  # of the robot; calls of others are refused as soon as it is known
         self.app_port = app_port
         self.line: Line | None = None  # records requests, answers and pushes
         self._host, self._port, self._certificates, self._pushed = host, port, certificates, pushed
@@ -118,7 +120,7 @@ class DogLink:
         name = f"[{self._host}]" if ":" in self._host else self._host
         options = [*client_options(ROBOT_NAME), ("grpc.max_reconnect_backoff_ms", REDIAL_MAX)]
         where, proof = f"{name}:{self._port}", self._certificates
-        self.heartbeat = None  # one from before the link was lost may be another robot's
+        self.heartbeat, self.serial = None, ""  # one from before the link was lost may be another robot's
         with prompt_wakes():
             if proof:
                 credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
@@ -203,14 +205,23 @@ class DogLink:
         finally:
             call.cancel()
 
-    async def found(self, within: float) -> Heartbeat:
-        """Wait for a heartbeat of the robot and return it. Raises TimedOut after ``within`` s."""
+    async def found(self, within: float, serial: str = "") -> Heartbeat:
+        """Wait for a heartbeat of the robot (of any, without ``serial``) and return it; only its calls count then.
+
+        Raises TimedOut after ``within`` s.
+        """
+        self.serial = serial
         deadline = self.clock.time() + within
-        while self.heartbeat is None or not self.connected:
+        while self.heartbeat is None or not self.connected or self.is_stranger(self.heartbeat.serial):
             if self.clock.time() >= deadline:
                 raise TimedOut(f"the robot did not call port {self.app_port} within {within:g} s")
             await self.clock.sleep(FOUND_PERIOD)
+        self.serial = self.heartbeat.serial
         return self.heartbeat
+
+    def is_stranger(self, serial: str) -> bool:
+        """Return whether that is another robot, which had this app before and remembers its address."""
+        return bool(serial and self.serial) and serial != self.serial
 
 
 class _Calls:
@@ -228,6 +239,7 @@ class _App:
 
     def __init__(self, link: DogLink) -> None:
         self._link, self._beats = link, Beats()
+        self._callers = dict[str, str]()  # serial number by connection, oldest first
         ticks, pushed = reading(pb.Ticks.FromString), reading(pb.SendRequest.FromString)
         self.handlers = grpc.method_handlers_generic_handler(
             SERVICE,
@@ -240,6 +252,10 @@ class _App:
     async def _beat(self, request: pb.Ticks | None, rpc: grpc.aio.ServicerContext) -> pb.Result:
         if request is None:
             await _refuse(rpc)
+        self._callers[rpc.peer()] = request.sn
+        if len(self._callers) > CALLERS_MAX:
+            del self._callers[next(iter(self._callers))]
+        await self._admit(rpc)
         self._link.heartbeat = _heartbeat(request, self._link.clock.time())
         if self._link.line is None or not self._link.line.watched:
             self._beats.forget()
@@ -252,10 +268,16 @@ class _App:
     ) -> AsyncGenerator[pb.RecResponse, None]:
         if request is None:
             await _refuse(rpc)
+        await self._admit(rpc)
         if self._link.line is not None and self._link.line.watched:
             self._link.line.push(str(int(request.nameCode)), request.params)
         self._link._pushed(request.nameCode, request.params)
         yield pb.RecResponse(nameCode=request.nameCode, data="{}")
+
+    async def _admit(self, rpc: grpc.aio.ServicerContext) -> None:
+        """End a call of another robot. Raises what gRPC does."""
+        if self._link.is_stranger(self._callers.get(rpc.peer(), "")):
+            await rpc.abort(grpc.StatusCode.PERMISSION_DENIED, "this app is connected to another robot")
 
 
 async def _refuse(rpc: grpc.aio.ServicerContext) -> NoReturn:
