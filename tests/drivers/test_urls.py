@@ -10,11 +10,13 @@ from roboglot.drivers.urls import Drivers
 from roboglot.fleet import UNKNOWN
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.errors import Unconnected
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.chapters.system.system import device_id
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
@@ -78,10 +80,16 @@ async def test_every_door_opens_for_an_absent_robot(
         await forward(seconds=0.1)
         await settle()
     assert robot[Link].state is LinkState.CONNECTING
+    with pytest.raises(Unconnected):  # clients would remember an invented number
+        device_id(robot)
     for door in doors:
         await door.close()
     await fleet.close()
     database.close()
+
+
+def test_robots_without_a_serial_number_are_told_apart(clock: LockstepClock) -> None:
+    assert device_id(Robot("a", UNKNOWN, clock)) != device_id(Robot("b", UNKNOWN, clock))
 
 
 async def test_own_doors_are_not_discovered_as_robots(clock: LockstepClock, monkeypatch: pytest.MonkeyPatch) -> None:

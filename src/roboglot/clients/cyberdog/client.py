@@ -111,7 +111,7 @@ class CyberDogClient(
             serial = (await self.information("sn")).get("sn")
         except (NoAnswer, CyberDogRefused, BadAnswer):
             serial = None
-        return await self.link.found(within, serial if isinstance(serial, str) else "")
+        return await self.link.found(within, serial if isinstance(serial, str) else None)
 
     @property
     def heartbeat(self) -> Heartbeat | None:

@@ -101,7 +101,7 @@ class DogLink:
     ) -> None:
         self.clock = clock
         self.heartbeat: Heartbeat | None = None
-        self.serial = ""  # of the robot; calls of others are refused as soon as it is known
+        self.serial: str | None = None  # of the robot; calls of others are refused as soon as it is known
         self.app_port = app_port
         self.line: Line | None = None  # records requests, answers and pushes
         self._host, self._port, self._certificates, self._pushed = host, port, certificates, pushed
@@ -120,7 +120,7 @@ class DogLink:
         name = f"[{self._host}]" if ":" in self._host else self._host
         options = [*client_options(ROBOT_NAME), ("grpc.max_reconnect_backoff_ms", REDIAL_MAX)]
         where, proof = f"{name}:{self._port}", self._certificates
-        self.heartbeat, self.serial = None, ""  # one from before the link was lost may be another robot's
+        self.heartbeat, self.serial = None, None  # one from before the link was lost may be another robot's
         with prompt_wakes():
             if proof:
                 credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
@@ -205,7 +205,7 @@ class DogLink:
         finally:
             call.cancel()
 
-    async def found(self, within: float, serial: str = "") -> Heartbeat:
+    async def found(self, within: float, serial: str | None = None) -> Heartbeat:
         """Wait for a heartbeat of the robot (of any, without ``serial``) and return it; only its calls count then.
 
         Raises TimedOut after ``within`` s.
@@ -219,9 +219,9 @@ class DogLink:
         self.serial = self.heartbeat.serial
         return self.heartbeat
 
-    def is_stranger(self, serial: str) -> bool:
+    def is_stranger(self, serial: str | None) -> bool:
         """Return whether that is another robot, which had this app before and remembers its address."""
-        return bool(serial and self.serial) and serial != self.serial
+        return self.serial is not None and serial != self.serial
 
 
 class _Calls:
@@ -276,7 +276,7 @@ class _App:
 
     async def _admit(self, rpc: grpc.aio.ServicerContext) -> None:
         """End a call of another robot. Raises what gRPC does."""
-        if self._link.is_stranger(self._callers.get(rpc.peer(), "")):
+        if self._link.is_stranger(self._callers.get(rpc.peer(), self._link.serial)):
             await rpc.abort(grpc.StatusCode.PERMISSION_DENIED, "this app is connected to another robot")
 
 

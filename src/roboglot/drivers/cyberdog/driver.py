@@ -29,6 +29,7 @@ from roboglot.drivers.cyberdog.vocabulary import battery_of, grid_of, path_of, p
 from roboglot.drivers.driver import Driver
 from roboglot.drivers.entry_sync import EntrySync
 from roboglot.drivers.local_entries import LocalPlaces
+from roboglot.drivers.map_change import continues
 from roboglot.drivers.reported import (
     ReportedBattery,
     ReportedDockContact,
@@ -154,6 +155,8 @@ class CyberDogDriver(Driver):
             if not self.supervisor.touches:
                 return
             await self._places.sync()
+            if self._skills.localized:
+                return
             task = await self._client.relocalise()
         except LinkLost:
             raise
@@ -231,10 +234,12 @@ class CyberDogDriver(Driver):
         assert isinstance(value, values.Grid)
         if (grid := grid_of(value)) is None:
             return
+        grown = continues(self._reported.grid, grid)
         self._reported.grid = grid
         self._reported.revision += 1
         self.link.heard("map")
-        self.robot.events.publish(MapReplaced(stamp=self.robot.clock.time()))
+        if not grown:
+            self.robot.events.publish(MapReplaced(stamp=self.robot.clock.time()))
 
     def _take_path(self, value: values.Value) -> None:
         assert isinstance(value, values.PlannedPath)

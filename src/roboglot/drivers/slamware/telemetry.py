@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from roboglot.clients.errors import BadAnswer, LinkLost
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.linked_base import LATENCY_SMOOTHING
+from roboglot.drivers.map_change import continues
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import battery_of, grid_of, imu_of, pose_of, scan_of
 from roboglot.drivers.supervisor import together
@@ -62,7 +63,7 @@ class TelemetryPoller:
             ("localization", 1.0, self._localization),
             ("loop closure", 5.0, self._loop_closure),
             ("home", 5.0, self._home),
-            ("map", 2.0, self._map),
+            ("map", 2.0, self._watch_map),
             *parts,
         )
 
@@ -203,6 +204,13 @@ class TelemetryPoller:
             return
         self._reported.grid = grid
         self._reported.revision += 1
+
+    async def _watch_map(self) -> None:
+        """Read the map; report one that another client has loaded or begun."""
+        before = self._reported.grid
+        await self._map()
+        if before.log_odds.any() and not continues(before, self._reported.grid):
+            self._robot.events.publish(MapReplaced(stamp=self._clock.time()))
 
     async def read_map(self) -> None:
         """Read the map and the pose after the map was replaced."""

@@ -123,7 +123,7 @@ async def post_task_event(context: Context, body: TaskEvent) -> None:
 def _template(context: Context, template: RoundTemplate) -> TaskTemplate:
     """Return a template in the API's form; its scene is the current map."""
     entries = [TaskOperation(o.place, o.action, o.wait_seconds) for o in template.operations]
-    device = device_id(context.robot.description.serial)
+    device = device_id(context.robot)
     return TaskTemplate(template.key, OWN_MADE, template.name, context.maps.current.map_id, device, entries)
 
 

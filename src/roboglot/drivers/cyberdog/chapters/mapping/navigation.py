@@ -71,5 +71,5 @@ class CyberDogLocalization(Localization):
     def relocalize(self, region: Region | None = None, *, may_move: bool = False, source: str = "") -> Action:
         if region is not None:
             raise Refused("this robot searches the whole map")
-        client = self._skills.client
-        return self._skills.start("relocalize", [client.relocalise], goal=None, source=source, resource=LOCALIZATION)
+        skills = self._skills
+        return skills.start("relocalize", [skills.relocalize], goal=None, source=source, resource=LOCALIZATION)

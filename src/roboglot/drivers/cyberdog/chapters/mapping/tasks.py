@@ -16,9 +16,10 @@ from roboglot.model.components.motion.navigation import NavigationFeedback
 from roboglot.model.components.system.link import Link
 from roboglot.model.errors import Unconnected
 from roboglot.model.robot import Robot
-from roboglot.wire.cyberdog.codes import TaskType
+from roboglot.wire.cyberdog.codes import TaskState, TaskType
 
 PERIOD = 0.1  # s between two polls
+LOCALIZED = (TaskState.LOCALIZED, TaskState.OUTDOOR_LOCALIZED)
 
 log = logging.getLogger(__name__)
 Begin = Callable[[], Awaitable[RunningTask]]
@@ -59,6 +60,22 @@ class Skills:
                         await self._localize()
 
         return self.robot.actions.start(name, run, resources={BASE}, goal=goal, source=source)
+
+    @property
+    def localized(self) -> bool:
+        """True if the dog reports that it knows its place and does nothing else."""
+        beat = self.client.heartbeat
+        return beat is not None and beat.task_status in LOCALIZED
+
+    async def relocalize(self) -> RunningTask:
+        """Begin the dog's search for its place; a localized dog accepts it only after it has left its map."""
+        try:
+            return await self.client.relocalise()
+        except CyberDogRefused:
+            if not self.localized:
+                raise
+        await self._leave_the_map()
+        return await self.client.relocalise()
 
     async def stop_orphan(self) -> bool:
         """Stop the orphaned task after a reconnection; return True if there was one. Raises ClientError."""

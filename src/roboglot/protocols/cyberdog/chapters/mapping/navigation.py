@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.localization import GOOD_FIT, Localization, Region
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
-from roboglot.model.errors import Busy, NotLocalized, RobotError
+from roboglot.model.errors import Busy, NotLocalized, Refused, RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.model.geodesy import GlobeAnchor, sky_over
 from roboglot.model.geometry import Path, Point, Pose
@@ -62,7 +63,8 @@ async def relocalize(context: Context, task: Task, *, outdoor: bool) -> TaskResu
     task.feedback(Feedback.LOCALIZATION_MAP_GOOD)
     task.feedback(Feedback.ACTIVATING)
     localization = robot[Localization]
-    localization.enable(True)
+    with suppress(Refused):  # a real dog is localized by the search alone
+        localization.enable(True)
     task.feedback(Feedback.ACTIVATED)
     task.feedback(Feedback.LOCALIZATION_STARTING)
     task.feedback(Feedback.LOCALIZATION_STARTED)
@@ -91,7 +93,11 @@ async def _still_there(robot: Robot, task: Task, place: GlobeAnchor | None) -> b
     if localization.quality < GOOD_FIT:
         return False
     x, y = localization.pose.x, localization.pose.y
-    action = task.action = localization.relocalize(Region(x - NEAR, y - NEAR, x + NEAR, y + NEAR), source=SOURCE)
+    try:
+        action = localization.relocalize(Region(x - NEAR, y - NEAR, x + NEAR, y + NEAR), source=SOURCE)
+    except Refused:
+        return False  # it can only search the whole map
+    task.action = action
     try:
         await robot.clock.wait_for(action.succeeded(), LOOK_AT_MOST)
     except (RobotError, TimeoutError):
@@ -109,7 +115,11 @@ async def _search(robot: Robot, task: Task, place: GlobeAnchor | None) -> bool:
     deadline = robot.clock.time() + GIVE_UP_AFTER
     while robot.clock.time() < deadline:
         sky = sky_over(place, robot)
-        action = task.action = robot[Localization].relocalize(sky.region if sky else None, source=SOURCE)
+        try:
+            action = task.action = robot[Localization].relocalize(sky.region if sky else None, source=SOURCE)
+        except RobotError as error:  # a lost link
+            task.fail(Feedback.LOCALIZATION_FAILED, error)
+            return False
         try:
             await action.succeeded()
             if sky is None or sky.allows(robot[Localization].pose.point):

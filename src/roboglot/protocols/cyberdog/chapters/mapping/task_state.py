@@ -7,6 +7,7 @@ import logging
 from collections.abc import Awaitable, Callable, Mapping, Set
 
 from roboglot.model.actions import Action
+from roboglot.model.errors import RobotError
 from roboglot.protocols.cyberdog.stream import Stream
 from roboglot.values import dataclass
 from roboglot.wire.cyberdog.codes import Feedback, TaskResult, TaskState, TaskType
@@ -122,6 +123,8 @@ class Tasks:
             except asyncio.CancelledError:
                 result = TaskResult.CANCELED
                 raise
+            except RobotError as error:
+                log.info("task %s failed: %s", kind.name, error)
             except Exception:
                 log.exception("task %s broke", kind.name)
             finally:

@@ -180,9 +180,10 @@ async def set_line_speed(context: Context, body: LineSpeed) -> None:
 @TABLE.on(f"GET {API}/configurations", right=Right.SEE, needs=(Settings,))
 def get_configurations(context: Context) -> Configuration:
     """Return the machine's configuration; it does not relocalize when parked."""
-    plate = context.robot.description
     cargos = all_cargos(context.robot) if Cargo in context.robot else []
-    return Configuration(device_id(plate.serial), software_version(context.robot), context.cloud.managed, False, cargos)
+    return Configuration(
+        device_id(context.robot), software_version(context.robot), context.cloud.managed, False, cargos
+    )
 
 
 @TABLE.on(f"GET {API}/settings", right=Right.SEE, needs=(Delivery,))

@@ -93,7 +93,7 @@ def get_robot_info(context: Context) -> DeviceInfo:
         manufacturer_name=plate.maker,
         model_id=zlib.crc32(plate.model.encode()) & 0xFFFF,
         model_name=plate.model,
-        device_id=device_id(plate.serial),
+        device_id=device_id(context.robot),
         hardware_version=plate.hardware_version,
         software_version=software_version(context.robot),
     )
@@ -104,8 +104,13 @@ def software_version(robot: Robot) -> str:
     return robot[Firmware].version if Firmware in robot else robot.description.software_version
 
 
-def device_id(serial: str) -> str:
-    """Return 32 upper-case hex digits: the serial number if it has that form, otherwise derived from it."""
+def device_id(robot: Robot) -> str:
+    """Return 32 upper-case hex digits: the serial number if it has that form, otherwise derived from it.
+
+    Robots without one (an EP reports none) have their name instead. Raises Unconnected before the first report.
+    """
+    require_heard(robot)
+    serial = robot.description.serial or robot.id
     bare = serial.replace("-", "")
     return (bare if re.fullmatch("[0-9a-fA-F]{32}", bare) else uuid.uuid5(uuid.NAMESPACE_OID, serial).hex).upper()
 
