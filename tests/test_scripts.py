@@ -235,3 +235,17 @@ def test_archive_has_version_of_tag_or_fallback(tmp_path: Path, described: str, 
     fallback, local = settings["fallback_version"], settings["local_scheme"]
     found = setuptools_scm.get_version(str(tmp_path), fallback_version=fallback, local_scheme=local)
     assert found == version
+
+
+def test_libraries_just_written_leave_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linux would map them in pieces of 2 MB: a robot's process took 131 MB instead of 118."""
+    for name in ("numpy/_core/a.cpython-311-x86_64-linux-gnu.so", "mujoco/libmujoco.so.4.0.1", "numpy/a.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"x")
+    forgotten = set[str]()
+    monkeypatch.setattr(bootstrap, "VENV", tmp_path)
+    monkeypatch.setattr(
+        os, "posix_fadvise", lambda file, *_: forgotten.add(Path(f"/proc/self/fd/{file}").readlink().name)
+    )
+    bootstrap.forget_libraries()
+    assert {Path(name).name for name in forgotten} == {"a.cpython-311-x86_64-linux-gnu.so", "libmujoco.so.4.0.1"}
