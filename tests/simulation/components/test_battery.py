@@ -21,7 +21,8 @@ async def test_starts_on_the_dock_and_charges(simulate):
     assert sim.robot[DockContact].docked
     assert state.charging
     assert state.current > 0
-    assert state.percentage == pytest.approx(0.9 + 60 * 10 / 3600 / 100, abs=1e-4)  # 60 W into 100 Wh
+    assert state.current * state.voltage == pytest.approx(60.0, abs=1.5)  # less towards the end
+    assert state.percentage == pytest.approx(0.9 + state.current * 10 / 3600 / state.capacity, abs=3e-5)
     assert sim.robot[Bumper].pressed == frozenset()
 
 
@@ -68,9 +69,9 @@ async def test_pushing_costs_more_than_driving_more_than_standing(simulate):
         sim.world.start()
         sim.robot[Base].set_velocity(twist)
         await sim.clock.advance(1.0)
-        before = sim.robot[Battery].state.percentage
+        before = sim.robot[Battery].state
         await sim.clock.advance(3.0)
-        return (before - sim.robot[Battery].state.percentage) * 100 * 3600 / 3.0
+        return (before.percentage - sim.robot[Battery].state.percentage) * before.capacity * before.voltage * 3600 / 3.0
 
     still = await power(Pose(2, 5), STILL)
     driving = await power(Pose(2, 5), Twist(1.0))
@@ -80,12 +81,47 @@ async def test_pushing_costs_more_than_driving_more_than_standing(simulate):
     assert pushing > 2 * driving
 
 
+@pytest.mark.parametrize("body", ["universal", "hermes", "cyberdog2", "robomaster_ep"])
+@pytest.mark.parametrize("charge", [0.98, 0.5, 0.08])
+async def test_charge_is_the_integral_of_the_current(simulate, body, charge):
+    sim = simulate(body=body, start=Pose(5, 5))
+    battery = sim.robot[Battery]
+    battery.set_charge(charge)
+    sim.world.start()
+    before, drawn, energy = battery.charge, 0.0, 0.0
+    for speed in (0.0, 0.5, -0.3, 0.0):
+        sim.robot[Base].set_velocity(Twist(speed))
+        for _ in range(200):
+            await sim.clock.advance(0.02)
+            state = battery.state
+            drawn -= state.current * 0.02 / 3600.0
+            energy -= state.current * state.voltage * 0.02 / 3600.0
+    fell = before - battery.charge
+    assert fell > 0.0
+    assert fell * state.capacity == pytest.approx(drawn, rel=0.01)
+    assert energy / drawn == pytest.approx(state.voltage, rel=0.1)
+
+
+async def test_a_full_discharge_is_the_capacity(simulate):
+    sim = simulate(start=Pose(5, 5))
+    battery = sim.robot[Battery]
+    sim.world.start()
+    await sim.clock.advance(1.0)
+    energy = 0.0
+    for percent in range(100):
+        battery.set_charge((percent + 0.5) / 100.0)
+        await sim.clock.advance(0.1)
+        state = battery.state
+        energy += state.voltage * state.capacity / 100.0
+    assert energy == pytest.approx(100.0 * state.health, rel=0.01)
+
+
 async def test_every_percent_is_reported(simulate):
     sim = simulate(start=Pose(5, 5))
     sim.robot[Battery].set_charge(0.905)
     events = sim.robot.events.subscribe(BatteryChanged)
     sim.world.start()
-    await sim.clock.advance(160.0)  # 12 W of 100 Wh: a percent in 300 s
+    await sim.clock.advance(180.0)  # 12 W of 100 Wh: a percent in some 320 s
     assert [round(e.percentage, 3) for e in events.drain()] == [0.9]
 
 

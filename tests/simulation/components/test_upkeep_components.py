@@ -13,12 +13,13 @@ from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.components.system.system_log import SystemLog
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.geometry import Pose, Twist
+from roboglot.simulation.components.energy.battery import NOMINAL
 
 
 async def test_an_old_battery_holds_less(robot):
     state = robot[Battery].state
     assert state.health == pytest.approx(1 - 0.2 * state.cycles / 800)
-    assert state.capacity == pytest.approx(100 / (6 * 3.6) * state.health)
+    assert state.capacity == pytest.approx(100 / (6 * NOMINAL) * state.health)
 
 
 @pytest.mark.slow  # minutes of robot time

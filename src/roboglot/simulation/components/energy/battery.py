@@ -26,7 +26,7 @@ HEAT_CAPACITY = 700.0  # J/K
 COOLING = 0.8  # W/K
 FULL, RECHARGE = 0.999, 0.97  # charging ends at the first and resumes below the second
 REVIVED = 0.02  # charge at which an empty battery lets the robot drive again
-NOMINAL = 3.6  # V per cell, on which nominal capacities are based
+NOMINAL = 3.743  # V per cell: mean of VOLTS over the charge, so that Wh and Ah are the same capacity
 AGED = 0.8  # remaining capacity at the end of a battery's life
 BUZZING = 0.05  # charge below which it beeps
 MINUTE = 60.0  # s over which the usual load is averaged
@@ -55,7 +55,7 @@ class BatterySection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedBattery(Battery):
-    """Battery whose charge counts energy; an empty one locks the base."""
+    """Battery whose charge is the integral of its current; an empty one locks the base."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class SimulatedBattery(Battery):
 
     @property
     def state(self) -> BatteryState:
-        supply, capacity = self.supply, self._section.capacity * self._health
+        supply = self.supply
         return BatteryState(
             self._charge,
             self._voltage,
@@ -90,9 +90,9 @@ class SimulatedBattery(Battery):
             self._charging,
             self._cycles,
             supply,
-            capacity=capacity / (NOMINAL * self._section.cells),
+            capacity=self._capacity,
             health=self._health,
-            remaining=self._charge * capacity / max(1e-3, self._usual) * 3600.0 if supply is Supply.NONE else None,
+            remaining=self._remaining if supply is Supply.NONE else None,
             charge_locked=self._locked,
             buzzing=supply is Supply.NONE and self._charge < BUZZING,
         )
@@ -115,6 +115,16 @@ class SimulatedBattery(Battery):
     def _health(self) -> float:
         """Share of the nominal capacity, falling linearly with the cycles."""
         return max(0.3, 1.0 - (1.0 - AGED) * self._cycles / self._section.life)
+
+    @property
+    def _capacity(self) -> float:
+        """Charge of the full battery at its age, Ah."""
+        return self._section.capacity * self._health / (NOMINAL * self._section.cells)
+
+    @property
+    def _remaining(self) -> float:
+        """Time until it is empty at the usual load, s."""
+        return self._charge * self._section.capacity * self._health / max(1e-3, self._usual) * 3600.0
 
     @property
     def _starved(self) -> bool:
@@ -165,11 +175,9 @@ class SimulatedBattery(Battery):
         self._usual += (load - self._usual) * min(1.0, seconds / MINUTE)
         # On the dock the charger also supplies the robot.
         power = -load if not docked or self._starved else self._charger() if self._charging else 0.0
-        self._charge = min(
-            1.0, max(0.0, self._charge + power * seconds / 3600.0 / (self._section.capacity * self._health))
-        )
-        self._drawn += max(0.0, -power) * seconds / 3600.0
         self._feel(power, seconds)
+        self._charge = min(1.0, max(0.0, self._charge + self._current * seconds / 3600.0 / self._capacity))
+        self._drawn += max(0.0, -power) * seconds / 3600.0
         if self._charge == 0.0:
             self._base.locks.lock("battery", "the battery is empty")
         elif self._charge >= REVIVED:
