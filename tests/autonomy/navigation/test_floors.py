@@ -13,7 +13,7 @@ import pytest
 from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
 from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.fleet import Fleet
-from roboglot.model.actions import ActionStatus
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import (
     Annotations,
@@ -30,6 +30,7 @@ from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from tests.autonomy.conftest import Tour, delivering
+from tests.narrowing import known
 
 
 @pytest.fixture
@@ -104,11 +105,45 @@ async def test_unreadable_or_unwritable_floor_on_disk_is_reported(tour: Tour, ca
 
 async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:
     say_where_the_lift_is(tour)
-    assert tour.world.building.lift is not None
-    tour.world.building.lift.take_out_of_service(True)
+    known(tour.world.building.lift).take_out_of_service(True)
     action = await tour.end_of(tour.robot[Floors].ride(2), 400.0)
     assert isinstance(action.error, Refused)
     assert tour.truth.x > 2.4
+
+
+async def leave_the_lift(tour: Tour) -> Action:
+    """Return a ride to floor 1 that begins to leave the car there."""
+    say_where_the_lift_is(tour)
+    await tour.go((2.7, 10.0), deg=180)
+    action = tour.robot[Floors].ride(1)
+    await tour.until(lambda: action.feedback is RideStage.LEAVING, 400.0)
+    return action
+
+
+async def test_ride_succeeds_outside_a_lift_that_has_failed(tour: Tour) -> None:
+    action = await leave_the_lift(tour)
+    await tour.until(lambda: tour.truth.x > 2.2)
+    known(tour.world.building.lift).take_out_of_service(True)
+    await tour.end_of(action)
+    assert tour.world.truth.floor_of("a") == 1
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+
+
+async def test_ride_in_lift_that_leaves_fails(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It does not get out on another floor and call that the goal."""
+    action, lift = await leave_the_lift(tour), known(tour.world.building.lift)
+    with monkeypatch.context() as crowded:
+        crowded.setattr("roboglot.autonomy.building.floors.ROOM", math.inf)
+        await tour.clock.advance(0.1)
+        lift.close_door()
+        lift.call(2)
+        await tour.until(lambda: lift.floor == 2 and lift.rests)
+    await tour.end_of(action)
+    assert isinstance(action.error, Refused), action.reason
+    assert tour.truth.x < 1.2
+    action = await tour.end_of(tour.robot[Floors].ride(1), 400.0)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert tour.world.truth.floor_of("a") == 1
 
 
 class Where(TypedDict, total=False):

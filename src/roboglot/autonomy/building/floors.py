@@ -26,7 +26,7 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
 from roboglot.model.components.sensing.lidar import Lidar
-from roboglot.model.errors import Blocked, Expired, InvalidGoal, Refused, Unreachable
+from roboglot.model.errors import Blocked, Expired, InvalidGoal, Refused, RobotError
 from roboglot.model.events import MapReplaced, PoseJumped
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
@@ -87,13 +87,18 @@ class LiftFloors(Floors):
     async def _ride(self, action: Action, floor: int, redraw: bool) -> None:
         if self._places is None:
             return
-        waiting, inside = self._places
-        aboard = self.belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2  # still there from the last try
+        aboard = self._is_aboard  # still there from the last try
         if aboard or floor != self._current:
             if not aboard:
                 action.report(RideStage.APPROACHING)
             async with turn(self.robot, partial(self._make_way, action), aboard=aboard) as mine:
                 await self._go(action, floor, redraw, mine)
+
+    @property
+    def _is_aboard(self) -> bool:
+        assert self._places is not None
+        waiting, inside = self._places
+        return self.belief.pose.distance_to(inside) < waiting.distance_to(inside) / 2
 
     async def _make_way(self, action: Action) -> None:
         """Leave the way between the car and the floor in front of it, if the robot is in it and there is room."""
@@ -112,7 +117,7 @@ class LiftFloors(Floors):
             planner.observe(self.belief.reader.read(scan), self.belief.pose, self.robot.clock.time())
         place = await self._course.waiting_place(here.point, [(line, reach)])
         if place is not None:
-            with contextlib.suppress(Blocked, Unreachable):
+            with contextlib.suppress(RobotError):  # it is for others: the ride does not depend on it
                 await self.navigation.drive(action, Goal((place,), NavigationOptions(tolerance=0.2)), _unheard)
 
     async def _go(self, action: Action, floor: int, redraw: bool, mine: Turn) -> None:
@@ -140,7 +145,8 @@ class LiftFloors(Floors):
             await self._through(self._places[0], backwards=True)
         finally:
             belief.mapping = mapped
-        lift.close_door()
+        with contextlib.suppress(Refused):  # the robot is where it wanted to be, and a door closes by itself
+            lift.close_door()
         action.report(RideStage.ARRIVED)
 
     async def _comes(self, floor: int) -> None:
@@ -173,8 +179,10 @@ class LiftFloors(Floors):
             if now - closest_at > PATIENCE:
                 raise Blocked("a person stands in the lift's door")
             if now > held_until - DOOR_HELD / 2:
-                robot[LiftClient].hold_door(DOOR_HELD)
+                self._hold_door(needed=not backwards or self._is_aboard)
                 held_until = now + DOOR_HELD
+            if backwards and self._is_aboard and robot[LiftClient].state.floor != self._current:
+                raise Refused("the lift left with the robot in it")
             speed = min(SPEED, GAIN * left) if self._room(way) > ROOM else 0.0
             lean = max(-LEAN_MAX, min(LEAN_MAX, -LEAN * seen.y * way))
             turn = max(-TURN_RATE, min(TURN_RATE, TURN_GAIN * wrap_angle(lean - seen.yaw)))
@@ -182,6 +190,14 @@ class LiftFloors(Floors):
             await clock.sleep(PERIOD)
         base.set_velocity(STILL)
         await stand_still(robot)
+
+    def _hold_door(self, *, needed: bool) -> None:
+        """Hold the door. Raises Refused, if it is ``needed``: a robot outside does not depend on the lift."""
+        try:
+            self.robot[LiftClient].hold_door(DOOR_HELD)
+        except Refused:
+            if needed:
+                raise
 
     def _room(self, way: float) -> float:
         """Return the free distance ahead of the hull (``way`` 1) or behind (-1) by the lidar, m; 0 without a scan."""
