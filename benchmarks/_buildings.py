@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -21,6 +22,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.errors import Refused
 from roboglot.model.geometry import Pose
 from roboglot.model.sensing import LaserScan
 from roboglot.storage.database import Database
@@ -35,6 +37,7 @@ BUILDINGS = {
     "ring": str(HERE / "worlds" / "ring.toml"),
     "twins": str(HERE / "worlds" / "twins.toml"),
 }
+PATIENCE = 20  # s to wait for people to leave a place
 SURVEYED = 1.6  # m between two surveyed places
 MARGIN = 0.1  # m of clearance beside the hull
 
@@ -52,9 +55,20 @@ class Building:
         """base_link in the map's frame."""
         return self.fleet.world.truth.pose_of("a").relative_to(self.start)
 
+    async def put(self, pose: Pose) -> None:
+        """Put the robot there (map frame), once people have left the place. Raises Refused if they stay."""
+        for last in (*[False] * PATIENCE, True):
+            try:
+                self.fleet.world.hands.place("a", self.start.compose(pose))
+                return
+            except Refused:
+                if last:
+                    raise
+            await self.clock.advance(1.0)
+
     async def scan_at(self, pose: Pose) -> LaserScan:
-        """Put the robot there (map frame) and let it scan."""
-        self.fleet.world.hands.place("a", self.start.compose(pose))
+        """Put the robot there (map frame) and let it scan. Raises Refused."""
+        await self.put(pose)
         await self.clock.advance(0.25)
         scan = self.fleet.robots["a"][Lidar].scan
         assert scan is not None
@@ -71,9 +85,10 @@ class Building:
         """A map of all that can be reached without going farther ``east`` (m from the start)."""
         grid, reader, seen, yaw = EvidenceGrid(), ScanReader(), [(0.0, 0.0)], 0.0
         while True:
-            scan = await self.scan_at(Pose(*seen[-1], yaw))
-            for _ in range(3):
-                paint(grid, reader.read(scan), self.truth, fill=True)
+            with contextlib.suppress(Refused):  # a person sits there
+                scan = await self.scan_at(Pose(*seen[-1], yaw))
+                for _ in range(3):
+                    paint(grid, reader.read(scan), self.truth, fill=True)
             floor = self.floor(grid)[::7]
             floor = floor[floor[:, 0] < east]
             away = np.hypot(*(floor[:, None] - np.array(seen)).T).min(axis=0)

@@ -10,6 +10,7 @@ painted at where the robot truly was show none within 15 cm. ``--quick``: one to
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 import sys
 from collections import Counter
@@ -29,6 +30,7 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.sensing.lidar import Lidar
+from roboglot.model.errors import Refused
 from roboglot.model.events import LocalizationLost, RobotDisplaced, ScanTaken
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.maps import OccupancyGrid
@@ -90,7 +92,7 @@ class Trial:
         known = self.house.floor(mapped(self.robot[Mapping].grid))
         away = known[np.hypot(*(known - (self.house.truth.x, self.house.truth.y)).T) > CARRIED_MIN]
         spot = (away if len(away) else known)[self.draw.integers(len(away) or len(known))]
-        self.put(Pose(float(spot[0]), float(spot[1]), float(self.draw.uniform(-math.pi, math.pi))))
+        await self.house.put(Pose(float(spot[0]), float(spot[1]), float(self.draw.uniform(-math.pi, math.pi))))
 
     async def black_out(self) -> None:
         """Push it about while its lidar is silent."""
@@ -107,7 +109,9 @@ class Trial:
         lidar.silent = False  # type: ignore[attr-defined]
 
     def put(self, pose: Pose) -> None:
-        self.house.fleet.world.hands.place("a", self.house.start.compose(pose))
+        """Push it there, unless a person stands in the way."""
+        with contextlib.suppress(Refused):
+            self.house.fleet.world.hands.place("a", self.house.start.compose(pose))
 
     async def suffer(self, name: str) -> None:
         """One event, and what came of it."""
@@ -168,9 +172,9 @@ def doubled(grid: OccupancyGrid, truth: EvidenceGrid) -> int:
 async def tour(name: str, seed: int) -> Counter[str]:
     """One building, driven through with ten events of each kind."""
     async with building(name, seed=seed) as house:
-        robot, start = house.fleet.robots["a"], house.start
+        robot = house.fleet.robots["a"]
         floor = house.floor(await house.survey())
-        house.fleet.world.hands.place("a", start)
+        await house.put(Pose())
         await house.clock.advance(0.5)
         robot[Mapping].clear()
         robot[Localization].set_pose(Pose())
