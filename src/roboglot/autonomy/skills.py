@@ -120,7 +120,7 @@ class Autonomy:
         """Add the skills that need a map."""
         if Vision in robot or UltraWideband in robot:
             robot.add(Following, SightFollowing(robot))
-        belief = Belief(robot[Odometry])
+        belief = driving.belief = Belief(robot[Odometry])
         self._traffic = Traffic(robot, belief)
         self._course = Course(robot, belief, self._traffic)
         self._localization = LidarLocalization(robot, belief)

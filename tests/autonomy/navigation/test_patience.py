@@ -20,7 +20,9 @@ from roboglot.model.geometry import Point, Pose
 
 
 def made(clock: LockstepClock, **belief: Any) -> Patience:
-    believed: Any = SimpleNamespace(**{"localizing": True, "lost": None, "quality": 1.0, **belief})
+    believed: Any = SimpleNamespace(
+        **{"localizing": True, "lost": None, "quality": 1.0, "compared_at": -math.inf, **belief}
+    )
     return Patience(clock, believed, PilotTuning(), 30.0)
 
 

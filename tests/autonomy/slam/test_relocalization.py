@@ -127,6 +127,21 @@ async def test_lost_robot_keeps_saying_that_places_look_alike(tour: Tour) -> Non
 
 
 @pytest.mark.world("office")
+@pytest.mark.parametrize("along", [0.8, -1.0])
+@pytest.mark.parametrize("x", [16.0, pytest.param(25.0, marks=pytest.mark.slow)])
+async def test_place_a_metre_along_corridors_is_found(tour: Tour, x: float, along: float) -> None:
+    await tour.go((26.0, 10.0))
+    await tour.go((x, 10.0), deg=180)
+    await tour.clock.advance(2.0)
+    tour.robot[Localization].set_pose(Pose(x + along, 10.0, math.pi).relative_to(tour.start))
+    await tour.clock.advance(3.0)
+    assert tour.error[0] < 0.05
+    tour.world.hands.place("a", Pose(x + along, 10.0, math.pi))
+    await tour.clock.advance(6.0)
+    assert tour.error[0] < 0.05 or tour.robot[Localization].lost
+
+
+@pytest.mark.world("office")
 async def test_in_a_region_it_looks_only_there(tour: Tour) -> None:
     await tour.go((12.0, 9.8))
     await carried(tour, 20.0, 10.2, 170.0)

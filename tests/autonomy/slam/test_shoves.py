@@ -83,6 +83,35 @@ async def test_move_of_a_carried_robot_does_not_succeed(tour: Tour, carried: Pos
     assert isinstance(action.error, NotLocalized), action.reason
 
 
+CARRIED = [Pose(0.0, -1.0), Pose(0.0, 0.0, 0.6), Pose(0.0, -2.0, 1.5), Pose(0.2, 0.2)]
+
+
+@pytest.mark.world("office")
+@pytest.mark.parametrize("carried", CARRIED, ids=["aside", "turned", "far", "little"])
+@pytest.mark.parametrize("before", [0.06, pytest.param(0.3, marks=pytest.mark.slow), 1.0])
+async def test_move_with_a_carry_at_its_end_fails(tour: Tour, carried: Pose, before: float) -> None:
+    await tour.go((20.0, 10.0), deg=180)
+    goal = tour.truth.compose(Pose(1.0))
+    action = tour.robot[Driving].move_by(Pose(1.0), speed=0.6)
+    await tour.clock.advance(2.13 - before)  # as long as it takes
+    pose = tour.truth
+    tour.world.hands.place("a", Pose(pose.x + carried.x, pose.y + carried.y, pose.yaw + carried.yaw))
+    begun = tour.clock.time()
+    await tour.end_of(action)
+    assert begun + before - 0.1 < tour.clock.time() < begun + before + 4.0
+    assert tour.truth.distance_to(goal) > 0.08 or abs(tour.truth.yaw - goal.yaw) > 0.1
+    assert isinstance(action.error, NotLocalized | Blocked), action.reason
+
+
+@pytest.mark.world("office")
+async def test_move_on_its_own_ends_soon(tour: Tour) -> None:
+    await tour.go((20.0, 10.0), deg=180)
+    action, begun = tour.robot[Driving].move_by(Pose(1.0), speed=0.6), tour.clock.time()
+    await tour.end_of(action)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert tour.clock.time() - begun < 2.5
+
+
 @pytest.mark.world("office")
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 async def test_driving_and_turning_are_no_shoves(tour: Tour, seed: int) -> None:

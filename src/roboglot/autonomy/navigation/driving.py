@@ -16,12 +16,13 @@ from roboglot.autonomy.navigation.speed_profile import (
     cruise_speed,
     trapezoid_time,
 )
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.displacement import Carried
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.errors import Blocked, InvalidGoal, NotLocalized
-from roboglot.model.events import LocalizationLost, LostReason, RobotDisplaced
+from roboglot.model.errors import Blocked, InvalidGoal
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
@@ -95,6 +96,8 @@ class _Moving:
 class OdometryDriving(Driving):
     """Driving over any Base with Odometry."""
 
+    belief: Belief | None = None  # set if the robot has a map
+
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._action: Action | None = None  # the newest drive action
@@ -138,14 +141,7 @@ class OdometryDriving(Driving):
 
         async def run(action: Action) -> None:
             moving.begun = True
-            lost: list[LocalizationLost] = []
-            stop = self._robot.events.listen(LocalizationLost, lost.append)
-            try:
-                await self.move(action, offset, top, top_yaw, moving)
-            finally:
-                stop()
-            if any(event.reason is LostReason.NO_FIT for event in lost):
-                raise NotLocalized("the scans no longer fit the map: something may have moved the robot")
+            await self.move(action, offset, top, top_yaw, moving)
 
         moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source)
         if before is not None:  # it was cancelled just now and stops nothing
@@ -211,7 +207,8 @@ class OdometryDriving(Driving):
     async def move(
         self, action: Action, offset: Pose, top: float, top_yaw: float, moving: _Moving | None = None
     ) -> None:
-        """Make a short move within an action that holds the base; ``top``: m/s, ``top_yaw``: rad/s. Raises Blocked.
+        """Make a short move within an action that holds the base; ``top``: m/s, ``top_yaw``: rad/s. Raises Blocked,
+        NotLocalized.
 
         ``moving``: holds the move to take over from, with its speed; this move replaces it there.
         """
@@ -235,9 +232,7 @@ class OdometryDriving(Driving):
             if moving.move is not None:
                 move.go_on_from(moving.move, start, top, top_yaw)
             moving.move = move
-        displaced: list[RobotDisplaced] = []
-        stop = self._robot.events.listen(RobotDisplaced, displaced.append)
-        try:
+        with Carried(self._robot, self.belief) as carried:
             for _ in range(CORRECTIONS_MAX):
                 await self._approach(action, move)
                 await stand_still(self._robot)
@@ -246,10 +241,7 @@ class OdometryDriving(Driving):
                     break
             else:
                 raise Blocked(f"cannot settle: {distance:.3f} m and {math.degrees(angle):.1f} degrees off")
-        finally:
-            stop()
-        if displaced:
-            raise Blocked(f"something displaced the robot by {sum(event.distance for event in displaced):.2f} m")
+            await carried.check()
 
     async def _approach(self, action: Action, move: _Move) -> None:
         """Drive until close enough to brake. Raises Blocked without progress."""

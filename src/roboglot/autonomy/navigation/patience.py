@@ -7,6 +7,7 @@ import math
 from roboglot.autonomy.navigation.follower import Follower
 from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
 from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.displacement import fresh_look
 from roboglot.model.clock import Clock
 from roboglot.model.errors import Blocked, NotLocalized
 
@@ -52,6 +53,7 @@ class Patience:
     async def be_certain(self) -> None:
         """Wait until the pose is certain, while the robot stands. Raises NotLocalized after a timeout."""
         belief, begun = self._belief, self._clock.time()
+        await fresh_look(self._clock, belief)
         while not belief.is_certain:
             self.check_place()
             if self._clock.time() - begun > self._tuning.found_seconds:

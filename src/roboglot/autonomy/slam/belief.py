@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import field
 
@@ -38,7 +39,10 @@ class Belief:
     closing_loops: bool = True
     lost: LostReason | None = None  # why the pose in the map is unknown
     confirmed: bool = True  # whether scans have confirmed a pose that was set, or found after a displacement
-    contradicted: bool = False  # whether the map, or odometry that is believed, contradicts the newest scan
+    contradicted: bool = False  # whether odometry that is believed contradicts the newest scan
+    denied: bool = False  # whether the map contradicts it
+    compared_at: float = -math.inf  # robot time at which the newest scan that was compared with the map began
+    asked: bool = False  # compare the next scan, even if the robot stands
     search: bool = False  # match the next scan in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map
@@ -57,7 +61,7 @@ class Belief:
     @property
     def is_certain(self) -> bool:
         """True if nothing contradicts the pose now; drives check it before they report success."""
-        return not self.localizing or not (self.in_doubt or self.contradicted)
+        return not self.localizing or not (self.in_doubt or self.contradicted or self.denied)
 
     @property
     def pose(self) -> Pose:

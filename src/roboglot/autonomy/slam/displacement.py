@@ -7,16 +7,26 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from types import TracebackType
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.model.clock import Clock
+from roboglot.model.errors import Blocked, NotLocalized
+from roboglot.model.events import Event, LocalizationLost, LoopClosed, LostReason, PoseJumped, RobotDisplaced
 from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
 
 WINDOW = 1.0  # s that a displacement takes
 SHOVED, SHOVED_PER_METRE = 0.05, 0.05  # m, and m per m driven, of odometry error beyond which the robot was displaced
 SIGMAS = 3.0  # standard deviations of the prior that explain a correction
 QUIET = 1.0  # s after a pose was set in which corrections are ignored
+LOOK = 0.02  # s between two looks at what scans say
+LOOK_MAX = 0.5  # s to wait for a scan
+RESOLVED_MAX = 3.0  # s in which a place that a scan denied is confirmed, lost or found elsewhere
 
 
 class DisplacementWatch:
@@ -53,3 +63,58 @@ class DisplacementWatch:
             return None
         self.forget(stamp)
         return shoved
+
+
+async def fresh_look(clock: Clock, belief: Belief) -> None:
+    """Return once a scan begun from now on has been compared with the map, or none comes."""
+    begun = clock.time()
+    if not belief.localizing or not math.isfinite(belief.compared_at):
+        return
+    belief.asked = True
+    while belief.compared_at <= begun and clock.time() - begun < LOOK_MAX:
+        await clock.sleep(LOOK)
+
+
+class Carried:
+    """Watch over one short move, which goes by odometry alone, as a context; ``belief`` is None without a map."""
+
+    def __init__(self, robot: Robot, belief: Belief | None) -> None:
+        self._robot, self._belief = robot, belief
+        self._knew = belief is not None and belief.localizing and belief.is_certain
+        self._shoved, self._strayed, self._closed_at = 0.0, False, -math.inf
+
+    def __enter__(self) -> Self:
+        kinds = RobotDisplaced, LocalizationLost, LoopClosed, PoseJumped
+        self._stops = [self._robot.events.listen(kind, self._hear) for kind in kinds]
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        for stop in self._stops:
+            stop()
+
+    def _hear(self, event: Event) -> None:
+        match event:
+            case RobotDisplaced():
+                self._shoved += event.distance
+            case LocalizationLost():
+                self._strayed |= event.reason is LostReason.NO_FIT
+            case LoopClosed():
+                self._closed_at = event.stamp
+            case PoseJumped():  # the place was found elsewhere; no news if it was in doubt, set, or straightened
+                self._knew &= not event.given
+                self._strayed |= self._knew and event.stamp != self._closed_at
+            case _:
+                pass
+
+    async def check(self) -> None:
+        """Compare a newer scan with the map. Raises Blocked, NotLocalized if the robot was moved."""
+        if self._belief is not None and self._knew:
+            await fresh_look(self._robot.clock, self._belief)
+            deadline = self._robot.clock.time() + RESOLVED_MAX
+            while self._belief.denied and not self._strayed and self._robot.clock.time() < deadline:
+                await self._robot.clock.sleep(LOOK)
+            self._strayed |= self._belief.denied
+        if self._strayed:
+            raise NotLocalized("the scans no longer fit the map: something may have moved the robot")
+        if self._shoved:
+            raise Blocked(f"something displaced the robot by {self._shoved:.2f} m")

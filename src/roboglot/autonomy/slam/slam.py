@@ -64,6 +64,7 @@ SILENCE_PERIOD = 0.5  # s between two checks for silence of the lidar
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less motion than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
 LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # quality below which to search around, and s between searches
+FELL_PERIOD_MAX = 16.0  # s between searches, which become rarer, while the fit stays worse than it was
 NARROW = (0.2, math.radians(5.0))  # m, rad searched around the believed pose after a doubtful step
 DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a fit worse than usual, or a pose far from odometry's: match without it
 DISPLACED_QUALITY = 0.15  # of a displaced robot, until the next scans
@@ -85,6 +86,8 @@ class Slam:
         self._witness = WheelWitness(self.odometry)
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking, self._given_at = -math.inf, False, -math.inf
+        self._pause, self._missed = LOST_PERIOD, 0.0  # s between searches; the fit before it fell
+        self._unseen = False  # whether a pose was given, and no scan was searched for since
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
         self._slip, self._displacement = SlipWatch(robot.description.radius), DisplacementWatch()
@@ -146,7 +149,7 @@ class Slam:
         self._displacement.forget(event.stamp)
         if event.given:
             self._turns.forget()
-            self._given_at = event.stamp
+            self._given_at, self._unseen, self._missed = event.stamp, True, 0.0
             self._witness.forget()
             self.whereabouts.be_given(event.stamp)
 
@@ -175,7 +178,8 @@ class Slam:
             self.whereabouts.lose(LostReason.NO_SCANS, event.stamp)
         last = self._matched_odometry or odometry
         way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
-        if way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD and not self._is_unsure:
+        stands = way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD
+        if stands and not (self._is_unsure or belief.asked):
             return
         # What is known to stand there says nothing about the map.
         scan = belief.reader.read(event.scan).beside(belief.map_to_odom.compose(odometry), belief.others)
@@ -188,6 +192,7 @@ class Slam:
         self._step = odometry.relative_to(last)
         moved = self._step if 0.0 < seconds < GAP_MAX else None
         self._matched_odometry, self._matched_at = odometry, event.stamp
+        belief.compared_at, belief.asked = event.scan.stamp, False
         self._way += way
         belief.covariance = self.odometry.spread(belief.covariance, way, turn, moved, seconds)
         searches = False
@@ -240,7 +245,7 @@ class Slam:
         if belief.localizing:
             best = self._doubted(best, scan, before, stamp)
             driven = self._contested(best, scan, before, prior)
-        best, belief.contradicted = driven or best, driven is not None
+        best, belief.contradicted, belief.denied = driven or best, driven is not None, False
         self._agreement, self._known = best.agreement, best.known / max(1, best.points)
         usual = belief.quality
         belief.quality += (1.0 if belief.search else QUALITY_GAIN) * (best.quality - belief.quality)
@@ -296,13 +301,20 @@ class Slam:
             self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
         else:
             self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
-        fell = best.agreement < DOUBT_SHARE * usual and best.known >= KNOWN_SURE * best.points
-        return (belief.lost is not None or fell) and not self._looking and stamp - self._looked_at >= LOST_PERIOD
+        if belief.lost is None and not self._unseen:
+            self._missed = max(self._missed, usual)
+            fell = best.agreement < DOUBT_SHARE * self._missed and best.known >= KNOWN_SURE * best.points
+            if not fell:
+                self._pause, self._missed = LOST_PERIOD, 0.0
+                return False
+        pause = self._pause if belief.lost is None else LOST_PERIOD
+        return not self._looking and stamp - self._looked_at >= pause
 
     def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
         """Search the whole map for the place of ``scan``; a known one is given up only for a much better."""
         belief, grid, agreement = self._belief, self._belief.map, self._agreement
-        self._looked_at, self._looking = stamp, True
+        given, self._unseen = self._unseen and self._belief.lost is None, False
+        self._looked_at, self._looking, self._pause = stamp, True, min(2.0 * self._pause, FELL_PERIOD_MAX)
 
         def then(found: list[Match]) -> None:
             self._looking = False
@@ -310,11 +322,15 @@ class Slam:
                 belief.lost = LostReason.NO_FIT
             if not found or belief.map is not grid or not belief.localizing or self._given_at > stamp:
                 return
-            near = found[0].pose.distance_to(belief.map_to_odom.compose(odometry)) < NEAR
+            pose = belief.map_to_odom.compose(odometry)
+            if given:  # of places that look alike, it is at the one that was meant
+                found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
+            near = found[0].pose.distance_to(pose) < NEAR
             if belief.lost is None:
-                if near or found[0].agreement < agreement + BETTER:
+                if (given and not near) or found[0].agreement < agreement + BETTER:
                     return
-                self.whereabouts.lose(LostReason.NO_FIT, stamp)
+                if not given or len(found) > 1:
+                    self.whereabouts.lose(LostReason.NO_FIT, stamp)
             if len(found) > 1:
                 belief.lost = LostReason.AMBIGUOUS
                 return

@@ -63,10 +63,11 @@ class Whereabouts:
         )
         good = support.agreement >= GOOD_AGREEMENT and support.fitting >= GOOD_SHARE * support.points
         self._good = self._good + 1 if good else 0
+        self._belief.denied = denied
         if denied:
             self._doubted_at = min(self._doubted_at, stamp)
             self._doubts += 1
-            self.sure, self._belief.contradicted = False, True
+            self.sure = False
             if self._doubts >= DOUBTS_MAX and stamp - self._doubted_at >= DOUBT_SECONDS:
                 ambiguous = self._belief.lost is LostReason.AMBIGUOUS
                 self.lose(LostReason.AMBIGUOUS if ambiguous else LostReason.NO_FIT, stamp)
