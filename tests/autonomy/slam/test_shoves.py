@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import pytest
@@ -120,3 +121,17 @@ async def test_driving_and_turning_are_no_shoves(tour: Tour, seed: int) -> None:
         assert (await tour.go(spot)).status is ActionStatus.SUCCEEDED
     await tour.end_of(tour.robot[Driving].move_by(Pose(1.0, 0.5, 3.0)))
     assert not shoves.drain()
+
+
+@pytest.mark.world("obstacle_course")
+async def test_slipping_wheels_are_no_displacement(tour: Tour) -> None:
+    """Against the side of a ramp, which the lidar does not see."""
+    tour.world.hands.place("a", Pose(3.9, 2.9, math.pi / 2))
+    tour.robot[Localization].set_pose(tour.truth.relative_to(tour.start))
+    await tour.clock.advance(3.0)
+    shoves = tour.robot.events.subscribe(RobotDisplaced)
+    action = await tour.end_of(tour.robot[Driving].move_by(Pose(2.0), speed=0.4))
+    assert tour.truth.y < 3.2
+    assert isinstance(action.error, Blocked)
+    assert not shoves.drain()
+    assert tour.error[0] < 0.05

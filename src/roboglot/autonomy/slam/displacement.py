@@ -33,8 +33,9 @@ class DisplacementWatch:
     """Watch over the corrections of all trusted matches."""
 
     def __init__(self) -> None:
-        # stamp; x, y in map; m driven; m, the prior's standard deviation
-        self._corrections: deque[tuple[float, float, float, float, float]] = deque()
+        # stamp; x, y in map; x, y driven by odometry in map; m, the prior's standard deviation
+        self._corrections: deque[tuple[float, float, float, float, float, float]] = deque()
+        self.slips = False  # whether wheels that turned in vain explain the newest displacement
         self._quiet_until = -math.inf
 
     def forget(self, stamp: float) -> None:
@@ -42,11 +43,11 @@ class DisplacementWatch:
         self._corrections.clear()
         self._quiet_until = stamp + QUIET
 
-    def check(self, stamp: float, before: Pose, seen: Pose, prior: NDArray[np.float64], way: float) -> float | None:
+    def check(self, stamp: float, before: Pose, seen: Pose, prior: NDArray[np.float64], step: Pose) -> float | None:
         """Return a recent displacement (m), once; None: there was none.
 
-        ``before``: pose by odometry, ``seen``: by the scan (map); ``prior``: covariance before the match; ``way``: m
-        driven since the last one.
+        ``before``: pose by odometry, ``seen``: by the scan (map); ``prior``: covariance before the match; ``step``:
+        driven since the last one by odometry, in base_link at that time.
         """
         if stamp < self._quiet_until:
             return None
@@ -54,13 +55,20 @@ class DisplacementWatch:
         while corrections and stamp - corrections[0][0] > WINDOW:
             corrections.popleft()
         sigma = math.sqrt(float(prior[0, 0] + prior[1, 1]))
-        corrections.append((stamp, seen.x - before.x, seen.y - before.y, way, sigma))
-        x = y = driven = widest = 0.0
-        for _, along, up, some, sigma in corrections:
-            x, y, driven, widest = x + along, y + up, driven + some, max(widest, sigma)
-        shoved = math.hypot(x, y)
-        if shoved <= SHOVED + SHOVED_PER_METRE * driven + SIGMAS * widest:
+        heading = before.yaw - step.yaw
+        cos, sin = math.cos(heading), math.sin(heading)
+        ahead, aside = cos * step.x - sin * step.y, sin * step.x + cos * step.y
+        corrections.append((stamp, seen.x - before.x, seen.y - before.y, ahead, aside, sigma))
+        x = y = ahead = aside = driven = widest = 0.0
+        for _, along, up, east, north, sigma in corrections:
+            x, y, ahead, aside = x + along, y + up, ahead + east, aside + north
+            driven, widest = driven + math.hypot(east, north), max(widest, sigma)
+        shoved, slack = math.hypot(x, y), SHOVED + SHOVED_PER_METRE * driven + SIGMAS * widest
+        if shoved <= slack:
             return None
+        way = math.hypot(ahead, aside)
+        lag, off = (-(x * ahead + y * aside) / way, abs(x * aside - y * ahead) / way) if way > 0.0 else (0.0, shoved)
+        self.slips = 0.0 < lag <= way + slack and off <= slack  # it fell short of the way that its wheels measured
         self.forget(stamp)
         return shoved
 
@@ -82,6 +90,7 @@ class Carried:
         self._robot, self._belief = robot, belief
         self._knew = belief is not None and belief.localizing and belief.is_certain
         self._shoved, self._strayed, self._closed_at = 0.0, False, -math.inf
+        self._slipped = belief.slipped if belief is not None else 0.0
 
     def __enter__(self) -> Self:
         kinds = RobotDisplaced, LocalizationLost, LoopClosed, PoseJumped
@@ -116,5 +125,7 @@ class Carried:
             self._strayed |= self._belief.denied
         if self._strayed:
             raise NotLocalized("the scans no longer fit the map: something may have moved the robot")
+        if self._belief is not None and self._belief.slipped > self._slipped:
+            raise Blocked("the wheels turned in vain: the robot did not get as far as they say")
         if self._shoved:
             raise Blocked(f"something displaced the robot by {self._shoved:.2f} m")

@@ -264,7 +264,9 @@ class Slam:
             self.odometry.learn(correction, self._way, lambda: is_long(step) or is_well_painted(belief.map, scan, pose))
         belief.covariance = prior if driven else best.covariance
         belief.move_to(best.pose, odometry)
-        if shoved is not None:
+        if shoved is not None and self._displacement.slips:
+            belief.slipped += shoved
+        elif shoved is not None:
             self._doubt(shoved, stamp)
         if best.pose.distance_to(before) > JUMP or abs(wrap_angle(best.pose.yaw - before.yaw)) > JUMP_YAW:
             self._robot.events.publish(PoseJumped(stamp=stamp, pose=best.pose))
@@ -285,7 +287,7 @@ class Slam:
         if self._belief.in_doubt or not _is_sure(best):
             self._displacement.forget(stamp)
             return None
-        return self._displacement.check(stamp, before, best.pose, prior, math.hypot(self._step.x, self._step.y))
+        return self._displacement.check(stamp, before, best.pose, prior, self._step)
 
     def _doubt(self, shoved: float, stamp: float) -> None:
         """Report a displacement, search around, and doubt the pose until scans confirm it."""
@@ -303,8 +305,7 @@ class Slam:
             self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
         if belief.lost is None and not self._unseen:
             self._missed = max(self._missed, usual)
-            fell = best.agreement < DOUBT_SHARE * self._missed and best.known >= KNOWN_SURE * best.points
-            if not fell:
+            if best.agreement >= DOUBT_SHARE * self._missed or best.known < KNOWN_SURE * best.points:
                 self._pause, self._missed = LOST_PERIOD, 0.0
                 return False
         pause = self._pause if belief.lost is None else LOST_PERIOD
