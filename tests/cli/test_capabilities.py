@@ -36,7 +36,11 @@ def test_refused_requests_are_listed_with_their_reason(text: str) -> None:
     assert row.endswith("| no Blaster |  | no Blaster |")
     for protocol in (door.name for door in DOORS):
         chapters, _, refused = text.partition(f"\n## {protocol}\n")[2].partition("\n## ")[0].partition("### Requests")
-        rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in refused.splitlines()[4:] if line]
+        rows = [
+            [cell.strip() for cell in line.split("|")[1:-1]]
+            for line in refused.splitlines()[4:]
+            if line.startswith("|")
+        ]
         for column, name in enumerate(DRIVERS, 1):
             listed = sum(row[0].count("`") // 2 for row in rows if row[column])
             cells = [line.split("|")[-5 + column].split()[0].split("/") for line in chapters.splitlines()[3:] if line]

@@ -361,8 +361,11 @@ def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:
 def _print(answer: Answer, name: str) -> None:
     """Print the row of a shard or robot; all rows if ``name`` is empty."""
     for row in answer.shards:
-        if name in ("", row.name, *(robot.name for robot in row.robots)):
-            print(f"{row.name:6} {row.state:9} {', '.join(robot.name for robot in row.robots)} {_why(row)}".rstrip())
+        robots = [robot.name for robot in row.robots]
+        if name in ("", row.name, *robots):
+            if name not in ("", row.name) and len(robots) > 1:
+                print(f"robot {name} shares shard {row.name} with others; this is the whole shard:")
+            print(f"{row.name:6} {row.state:9} {', '.join(robots)} {_why(row)}".rstrip())
 
 
 def _why(row: Row) -> str:

@@ -82,7 +82,7 @@ class ReportedNetwork(Network):
         raise _refused()
 
     async def set_apn(self, apn: str) -> None:
-        raise ComponentMissing(Network)
+        raise ComponentMissing(MobileState)
 
 
 def _refused() -> Refused:

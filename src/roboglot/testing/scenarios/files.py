@@ -257,7 +257,8 @@ def find(paths: Sequence[Path]) -> Sequence[Found]:
     """
     files: list[Path] = []
     for path in paths:
-        files += sorted(file for file in shown_below(path) if file.suffix in (".yaml", ".yml"))
+        found = shown_below(path)
+        files += sorted(file for file in found if file == path or file.suffix in (".yaml", ".yml"))
     if not files:
         raise BadScenario(f"no scenario in {', '.join(map(str, paths))}")
     return [read(file) for file in files]

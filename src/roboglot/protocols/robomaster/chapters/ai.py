@@ -155,7 +155,7 @@ def set_attribute(
     ai.marker_distance = marker_dist or ai.marker_distance
 
 
-@TABLE.on("AI push", right=Right.SEE)
+@TABLE.on("AI push", right=Right.SEE, needs=(Vision,))
 def push(
     context: Context,
     *,
@@ -174,4 +174,5 @@ def push(
     words = {"person": person or people, "gesture": gesture or pose, "marker": marker, "robot": robot, "line": line}
     if {person, people} == {"on", "off"} or {gesture, pose} == {"on", "off"}:
         raise InvalidGoal("the same attribute is on and off")
+    _ = context.robot[Vision]
     context.part(Ai).switch({name: word == "on" for name, word in words.items() if word})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from roboglot.media.audio import AudioStream
+from roboglot.media.video import VideoStream
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.operations import Right
 from roboglot.protocols.robomaster.context import Context
@@ -18,9 +20,10 @@ def expose(context: Context, ev_level: Exposure) -> None:
     context.at_end("camera exposure", lambda: camera.set_exposure(EXPOSURES["default"]))
 
 
-@TABLE.on("stream on", right=Right.SEE)
+@TABLE.on("stream on", right=Right.SEE, needs=(VideoStream,))
 def stream_on(context: Context) -> None:
     """Start H.264 to all clients of the video port (3.2.17.1); no effect if started."""
+    _ = context.robot[VideoStream]
     context.outlets.video.switch(True)
     context.at_end("stream", lambda: context.outlets.video.switch(False))
 
@@ -31,9 +34,10 @@ def stream_off(context: Context) -> None:
     context.outlets.video.switch(False)
 
 
-@TABLE.on("audio on", right=Right.SEE)
+@TABLE.on("audio on", right=Right.SEE, needs=(AudioStream,))
 def audio_on(context: Context) -> None:
     """Start Opus to all clients of the audio port (3.2.18.1); no effect if started."""
+    _ = context.robot[AudioStream]
     context.outlets.audio.switch(True)
     context.at_end("audio", lambda: context.outlets.audio.switch(False))
 

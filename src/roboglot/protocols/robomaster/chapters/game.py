@@ -59,9 +59,10 @@ class GamePushes:
             self._send(self._robot[InputDevice].state)
 
 
-@TABLE.on("game_msg on", right=Right.SEE)
+@TABLE.on("game_msg on", right=Right.SEE, needs=(InputDevice,))
 def game_on(context: Context) -> None:
     """Push keys and mouse (3.2.20.1)."""
+    _ = context.robot[InputDevice]
     context.part(GamePushes).switch(True)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from roboglot.model.components.system.network import Network, NetworkMode, Uplink
+from roboglot.model.components.system.network import MobileState, Network, NetworkMode, Uplink
 from roboglot.model.errors import ComponentMissing, InvalidGoal
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
@@ -71,7 +71,7 @@ async def set_network_route(context: Context, body: RouteStatus) -> None:
 def get_cmlink_apn(context: Context) -> ApnStatus:
     """Return the modem's access point name."""
     if (mobile := context.robot[Network].mobile) is None:
-        raise ComponentMissing(Network)
+        raise ComponentMissing(MobileState)
     return ApnStatus(mobile.apn)
 
 
