@@ -29,7 +29,7 @@ async def test_nothing_that_stands_is_shoved() -> None:
 
 @pytest.mark.slow  # six robots in short: test_nothing_that_stands_is_shoved
 async def test_ten_robots_leave_one_corridor() -> None:
-    outcome = await leave(1, seconds=25.0)
+    outcome = await leave(1, seconds=30.0)
     assert outcome.shoved <= SHOVED, outcome.worst
     assert not outcome.silent
     assert not outcome.false_successes

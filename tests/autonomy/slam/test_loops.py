@@ -67,15 +67,12 @@ async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing
     database.close()
     assert max(errors) > 0.3  # otherwise the test proves nothing
     assert bool(closed) is closing
-    settled = float(np.mean(errors[-10:]))
-    if closing:
+    if closing:  # without it a robot may find its place again, in a map that stays bent
         assert closed[0].shift > 0.1
-        assert settled < 0.08
+        assert float(np.mean(errors[-10:])) < 0.08
         kept = [believed.distance_to(true) for believed, true in visited]
         moved = [_moved(believed, closed[0].moved).distance_to(true) for believed, true in visited]
         assert float(np.mean(moved)) < 0.85 * float(np.mean(kept))  # the map is truer all over, and it tells how
-    else:
-        assert settled > 0.1
 
 
 def _moved(pose: Pose, moved: Sequence[tuple[Pose, Pose]]) -> Pose:

@@ -31,6 +31,7 @@ TELLING, GAP_MIN, GAP_MAX = 0.3, 0.01, 0.2  # share of the contradiction, m, by 
 MAD, NOISES = 1.48, 1.5  # standard deviation from a median; the number of them that a contradiction needs
 FITS = 0.04  # m from a surface within which a point votes
 ONE_VOICE, STOOD_VOICE = 0.9, 0.97  # share of the votes that the scan's pose needs; of a robot that stood, far from it
+FIRM = 500  # evidence from which a surface is known well: some five scans
 VOTES_MIN = 4  # votes for odometry below which it is ignored, as far as the lidar's noise explains them
 NOISE_MAX = 0.1  # m between both poses from which no noise makes a point prefer the wrong one
 STOOD = 0.02  # m driven up to which a robot stood, and its wheels cannot be that wrong
@@ -148,13 +149,27 @@ def contested(
         return None
     least = max(GAP_MIN, TELLING * apart)
     for_wheels = np.count_nonzero((off_scan - off_wheels > least) & (off_wheels < FITS))
-    for_scan = np.count_nonzero((off_wheels - off_scan > least) & (off_scan < FITS))
+    for_scan = np.count_nonzero(votes := (off_wheels - off_scan > least) & (off_scan < FITS))
+    if way > STOOD and for_scan:
+        fresh = _fresh(grid, scan.in_frame(best.pose, points[votes & ~on_walls(points)]))
+        for_wheels, for_scan = for_wheels + fresh, for_scan - fresh
     jumped = apart >= NOISE_MAX and way <= STOOD
     if for_wheels < VOTES_MIN and not jumped:
         return None
     if for_scan >= (STOOD_VOICE if jumped else ONE_VOICE) * (for_scan + for_wheels):
         return None
     return driven
+
+
+def _fresh(grid: EvidenceGrid, places: NDArray[np.float64]) -> int:
+    """Return at how many ``places`` (n, 2; map, m) surfaces are hardly known: of things that may have moved there.
+
+    Of what stands still, they would fit the wheels.
+    """
+    columns, rows = np.floor((places - (grid.corner.x, grid.corner.y)) / RESOLUTION).astype(np.int64).T
+    beside = [(rows + down, columns + across) for down in (-1, 0, 1) for across in (-1, 0, 1)]
+    most = np.max([grid.evidence.take(row * grid.evidence.shape[1] + column, mode="clip") for row, column in beside], 0)
+    return int(np.count_nonzero(most < FIRM))
 
 
 def _by_walls(grid: EvidenceGrid, scan: ScanPoints, before: Pose, tight: NDArray[np.float64]) -> Match:

@@ -17,7 +17,7 @@ from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.slam.adding import Adding
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, is_well_painted, supported
-from roboglot.autonomy.slam.contest import WheelWitness, is_long
+from roboglot.autonomy.slam.contest import STOOD, WheelWitness, is_long
 from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.excursion import Excursions
 from roboglot.autonomy.slam.loops import LoopCloser
@@ -87,6 +87,7 @@ class Slam:
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking, self._given_at = -math.inf, False, -math.inf
         self._pause, self._missed = LOST_PERIOD, 0.0  # s between searches; the fit before it fell
+        self._fell_at = 0.0  # m driven then
         self._unseen = False  # whether a pose was given, and no scan was searched for since
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
@@ -304,6 +305,7 @@ class Slam:
         else:
             self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
         if belief.lost is None and not self._unseen:
+            self._fell_at = self._fell_at if self._missed else self._way - math.hypot(self._step.x, self._step.y)
             self._missed = max(self._missed, usual)
             if best.agreement >= DOUBT_SHARE * self._missed or best.known < KNOWN_SURE * best.points:
                 self._pause, self._missed = LOST_PERIOD, 0.0
@@ -328,7 +330,9 @@ class Slam:
                 found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
             near = found[0].pose.distance_to(pose) < NEAR
             if belief.lost is None:
-                if (given and not near) or found[0].agreement < agreement + BETTER:
+                # On its way nearby places do not count: amid robots that move along, scans fit best where it was.
+                stood = self._way - self._fell_at <= STOOD
+                if not (near if given else stood or not near) or found[0].agreement < agreement + BETTER:
                     return
                 if not given or len(found) > 1:
                     self.whereabouts.lose(LostReason.NO_FIT, stamp)
