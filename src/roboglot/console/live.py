@@ -100,7 +100,7 @@ class Page:
         self.person = identity()
         self._anew = True
 
-    # -- out -----------------------------------------------------------------------------------------------------------
+    # -- out --
 
     async def run(self) -> None:
         """Send until cancelled."""
@@ -194,7 +194,7 @@ class Page:
     async def _send_message(self, message: Mapping[str, object]) -> None:
         await self._send(msgspec.json.encode(message).decode())
 
-    # -- in ------------------------------------------------------------------------------------------------------------
+    # -- in --
 
     def receive(self, text: str | bytes) -> None:
         """Handle a message of the page. Raises ValueError for a bad message, or for too many."""

@@ -150,7 +150,7 @@ class Stage(ABC):
     def reseed(self, seed: int) -> None:
         """Restart random numbers from ``seed``; bodies keep the errors (scale, bias) they were built with."""
 
-    # -- what is there -------------------------------------------------------------------------------------------------
+    # -- what is there --
 
     @property
     @abstractmethod
@@ -186,7 +186,7 @@ class Stage(ABC):
     def world_file(self) -> str:
         """Return the world as it stands now, as a world file (TOML): boxes, people and things where they are."""
 
-    # -- robots --------------------------------------------------------------------------------------------------------
+    # -- robots --
 
     @abstractmethod
     def place(self, name: str, pose: Pose, floor: int | None = None) -> None:
@@ -241,7 +241,7 @@ class Stage(ABC):
     def apply_voltage(self, name: str, adapter: int, port: int, voltage: float) -> None:
         """Put so many volts on a sensor adapter's input. Raises NotFound, InvalidGoal beyond the full scale."""
 
-    # -- people, things, sounds ----------------------------------------------------------------------------------------
+    # -- people, things, sounds --
 
     @abstractmethod
     def person(self, name: str) -> StagePerson:
@@ -302,7 +302,7 @@ class Stage(ABC):
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
         """Have ``sound`` be heard from there, from now on. Raises ValueError when too much is to be heard already."""
 
-    # -- faults --------------------------------------------------------------------------------------------------------
+    # -- faults --
 
     @property
     @abstractmethod

@@ -119,7 +119,7 @@ class Playback(StandIn):
         for door in self._doors.values():
             door.timeline.close()
 
-    # -- matching requests to recorded ones ----------------------------------------------------------------------------
+    # -- matching requests to recorded ones --
 
     def _find(self, door: _Door, operation: str, live: Normal, *, reads: bool) -> int | None:
         key = f"{operation}\n{live.text}"
@@ -185,7 +185,7 @@ class Playback(StandIn):
             self.missing.append((door, operation or live.text[:80]))
             log.warning("%s: not in the recording: %s %s", door, operation, live.text[:200])
 
-    # -- pushes --------------------------------------------------------------------------------------------------------
+    # -- pushes --
 
     def _schedule(self, door: _Door, place: int, since: float, now: float) -> None:
         """Schedule the pushes between this command and the next one; ``since``: recorded time of ``now``."""

@@ -81,7 +81,7 @@ class Recorder:
         self._leave: list[Callable[[], None]] = []
         self._warned = 0.0
 
-    # -- files ---------------------------------------------------------------------------------------------------------
+    # -- files --
 
     @property
     def status(self) -> Status:
@@ -165,7 +165,7 @@ class Recorder:
             return _free(path / f"roboglot-{now:%Y%m%d-%H%M%S}{SUFFIX}")
         return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
 
-    # -- the ring ------------------------------------------------------------------------------------------------------
+    # -- the ring --
 
     def keep_ring(self, folder: Path) -> None:
         """Keep the last minutes in memory from now on.
@@ -228,7 +228,7 @@ class Recorder:
         except (OSError, NotRecording) as error:
             log.error("cannot write the last minutes before %s: %s", why, error)
 
-    # -- sampling ------------------------------------------------------------------------------------------------------
+    # -- sampling --
 
     def _look_at_robots(self) -> None:
         if self._samplers:

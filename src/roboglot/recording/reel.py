@@ -106,7 +106,7 @@ class Reel:
                         found[shot.topic] = shot if known is None or known.at <= shot.at else known
         return sorted(found.values(), key=_time)
 
-    # -- files ---------------------------------------------------------------------------------------------------------
+    # -- files --
 
     def _part(self, path: Path) -> Iterator[_Chunk]:
         with path.open("rb") as file:

@@ -108,7 +108,7 @@ class Replay:
             Exchange(now, "replay", door, connection, "", direction, operation, payload, status, refusal, seconds)
         )
 
-    # -- ids given by the robot ----------------------------------------------------------------------------------------
+    # -- ids given by the robot --
 
     def _learn(self, recorded: bytes, live: bytes) -> None:
         """Remember the robot's new ids for the recorded ones."""

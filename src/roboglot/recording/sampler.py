@@ -99,7 +99,7 @@ class Sampler:
     def _send(self, topic: str, kind: str, value: object, at: int, wall: int) -> None:
         self._put(Entry(f"{self._topic}/{topic}", kind, at, wall, value))
 
-    # -- events --------------------------------------------------------------------------------------------------------
+    # -- events --
 
     def _note_exchange(self, exchange: Exchange) -> None:
         if not self._photos and exchange.operation in FILES and Link in self._robot:  # it is a real one
@@ -135,7 +135,7 @@ class Sampler:
                 at, wall = self._stamps.now()
                 self._send("camera", "video", (frame, packet.data), at, wall)
 
-    # -- readings ------------------------------------------------------------------------------------------------------
+    # -- readings --
 
     def _note_places(self, at: int, wall: int, put: Put) -> None:
         robot = self._robot

@@ -163,7 +163,7 @@ def _wanted(request: pytest.FixtureRequest) -> Wanted:
         raise pytest.UsageError(f"{request.node.nodeid}: a marker of roboglot: {error}") from None
 
 
-# -- on real ports -----------------------------------------------------------------------------------------------------
+# -- on real ports --
 
 
 @pytest.fixture
@@ -226,7 +226,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         server.close()
 
 
-# -- files left by failed tests --------------------------------------------------------------------------------------
+# -- files left by failed tests --
 
 
 @pytest.hookimpl(tryfirst=True)

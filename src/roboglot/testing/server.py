@@ -59,7 +59,7 @@ class RobotServer:
         self._ways = Ways()
         self.tracks = self._ways.tracks
 
-    # -- lifecycle -----------------------------------------------------------------------------------------------------
+    # -- lifecycle --
 
     def __enter__(self) -> RobotServer:
         return self.start()
@@ -133,7 +133,7 @@ class RobotServer:
             await self._ways.wait_for_places()
         self._break_things()
 
-    # -- contents ------------------------------------------------------------------------------------------------------
+    # -- contents --
 
     @property
     def runtime(self) -> Runtime:
@@ -205,7 +205,7 @@ class RobotServer:
         """Robot time, s since the start."""
         return self.runtime.clock.time()
 
-    # -- time ----------------------------------------------------------------------------------------------------------
+    # -- time --
 
     def forward(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass: in lockstep as fast as possible, else at the clock's speed."""
@@ -219,7 +219,7 @@ class RobotServer:
                 raise NotInTime(f"{what or 'the condition'} does not hold after {within:g} s")
             self.forward(LOOK_AGAIN)
 
-    # -- between tests -------------------------------------------------------------------------------------------------
+    # -- between tests --
 
     def reset(self) -> None:
         """Restore the start: actions end; robots are charged, in place and localised; no faults, no boxes."""

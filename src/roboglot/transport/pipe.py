@@ -54,7 +54,7 @@ class PipeEnd(asyncio.Transport):
         if not self._closing:
             self.resume_reading()
 
-    # -- asyncio.WriteTransport ----------------------------------------------------------------------------------------
+    # -- asyncio.WriteTransport --
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
         """Pass bytes to the other end, at once unless it has paused reading."""
@@ -106,7 +106,7 @@ class PipeEnd(asyncio.Transport):
         self._high = high if high is not None else (4 * low if low is not None else HIGH)
         self._low = low if low is not None else self._high // 4
 
-    # -- asyncio.ReadTransport -----------------------------------------------------------------------------------------
+    # -- asyncio.ReadTransport --
 
     def is_reading(self) -> bool:
         """Return True unless reading is paused."""
@@ -135,7 +135,7 @@ class PipeEnd(asyncio.Transport):
         """Return ``hung_up``, the addresses, or the default, as there is no socket."""
         return self._other.ended if name == "hung_up" else super().get_extra_info(name, default)
 
-    # -- called by the other end ---------------------------------------------------------------------------------------
+    # -- called by the other end --
 
     @property
     def waiting(self) -> int:
@@ -191,7 +191,7 @@ class PipeEnd(asyncio.Transport):
         if self._closing:
             self._end_soon()
 
-    # -- this end ------------------------------------------------------------------------------------------------------
+    # -- this end --
 
     def _drain(self) -> None:
         while self._inbox and self._reading and not self._lost:

@@ -31,7 +31,7 @@ class Stream(asyncio.Protocol):
         """Bytes that the local client has not taken, as far as is known."""
         self._ended_here = self._ended_there = self._over = False
 
-    # -- this end ------------------------------------------------------------------------------------------------------
+    # -- this end --
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start with the local connection, and deliver earlier data."""
@@ -83,7 +83,7 @@ class Stream(asyncio.Protocol):
         if self._owed >= CREDIT_STEP:
             self._pay()
 
-    # -- the other end -------------------------------------------------------------------------------------------------
+    # -- the other end --
 
     def deliver(self, data: bytes) -> None:
         """Deliver data to the local client, or keep it until that is connected."""

@@ -91,7 +91,7 @@ class Pilot:
         while state is not State.DONE:
             state = await steps[state](follower)
 
-    # -- the states ----------------------------------------------------------------------------------------------------
+    # -- the states --
 
     async def _set_out(self) -> Follower:
         """Wait for a scan and a route. Raises Blocked, Unreachable, NotLocalized."""
@@ -246,7 +246,7 @@ class Pilot:
             self._patience.begin_anew()
             self._replanner.distrust()
 
-    # -- feedback ------------------------------------------------------------------------------------------------------
+    # -- feedback --
 
     def _report_progress(self, follower: Follower, pose: Pose, stage: str) -> None:
         """Report progress periodically, and whenever the stage changes."""

@@ -79,7 +79,7 @@ class Traffic:
         """Stop announcing."""
         self._announcer.close()
 
-    # -- others --------------------------------------------------------------------------------------------------------
+    # -- others --
 
     def observe(self, echoes: Points, pose: Pose, stamp: float) -> None:
         """Track the motion of others; ``echoes`` (n, 2; map) in the order of the scan."""
@@ -267,7 +267,7 @@ class Traffic:
         ways = [way for way in self._ways if way.outranks or not ruled]
         return not any((way.distances(path) < mine + way.radius)[:, way.seconds < SOON].any() for way in ways)
 
-    # -- itself --------------------------------------------------------------------------------------------------------
+    # -- itself --
 
     def follow(self, path: Points) -> None:
         """Announce a drive along ``path`` (dense), up to the place to wait for others."""

@@ -169,7 +169,7 @@ class RoboMasterClient:
             raise LinkLost(f"{self.host} is not connected")
         await self._link.ask("robot battery ?", ANSWER_SECONDS, numbered=False)
 
-    # -- commands ------------------------------------------------------------------------------------------------------
+    # -- commands --
 
     async def ask(self, command: str, timeout: float = ANSWER_SECONDS) -> str:
         """Send the text of any command (without ``;``) and return the raw answer, even a refusal."""
@@ -195,7 +195,7 @@ class RoboMasterClient:
             raise RoboMasterRefused(command, answer)
         return answer
 
-    # -- pushes and events ---------------------------------------------------------------------------------------------
+    # -- pushes and events --
 
     def listen(self, heard: Callable[[Telemetry], object], *kinds: type[Telemetry]) -> Callable[[], None]:
         """Call ``heard`` with pushes and events of ``kinds`` (none: all); return a function to stop. Raises LinkLost.
@@ -219,7 +219,7 @@ class RoboMasterClient:
         """Yield Opus packets of 20 ms while ``audio.on()``. Ends with LinkLost."""
         return opus_packets(self.clock, self.host, self._ports.audio)
 
-    # -- the link ------------------------------------------------------------------------------------------------------
+    # -- the link --
 
     def at_connect(self, hook: Callable[[], Awaitable[object]]) -> None:
         """Await ``hook`` after every reconnection: a new session begins with everything off."""

@@ -90,7 +90,7 @@ class ControlLink(asyncio.Protocol):
         if self._transport:
             self._transport.abort() if self._transport.get_write_buffer_size() else self._transport.close()
 
-    # -- callbacks of asyncio ------------------------------------------------------------------------------------------
+    # -- callbacks of asyncio --
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it

@@ -84,7 +84,7 @@ class _Connection(asyncio.Protocol):
         if self._waiting is not None and not self._waiting.done():
             self._waiting.set_exception(error)
 
-    # -- called by the parser ------------------------------------------------------------------------------------------
+    # -- called by the parser --
 
     def on_status(self, status: bytes) -> None:
         self._measure(status)

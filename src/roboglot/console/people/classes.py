@@ -94,7 +94,7 @@ class Classes:
         self._lesson = self._restored()
         self._studio: dict[str, Lesson] = {}  # classes opened in the studio, in this world or another
 
-    # -- pupils --------------------------------------------------------------------------------------------------------
+    # -- pupils --
 
     async def join(self, code: str, name: str) -> Seat | Elsewhere:
         """Give a pupil a robot: the same as before, else a free one, else the least shared one.
@@ -187,7 +187,7 @@ class Classes:
             for seat in list(lesson.seats.values()):
                 await self._give_back(lesson, seat)
 
-    # -- the teacher ---------------------------------------------------------------------------------------------------
+    # -- the teacher --
 
     def look(self) -> dict[str, object]:
         """Return the class for its teacher; empty if none is open. Raises Forbidden."""

@@ -172,7 +172,7 @@ class Session:
         self._waiting.append(message)
         self._due.set()
 
-    # -- a front end of the frames -------------------------------------------------------------------------------------
+    # -- a front end of the frames --
 
     def answer(self, text: str) -> None:
         """Send an answer to a frame; lists requested by other pages are dropped."""
@@ -194,7 +194,7 @@ class Session:
     async def room(self) -> None:
         """Return at once: programs wait for no page."""
 
-    # -- in ------------------------------------------------------------------------------------------------------------
+    # -- in --
 
     def receive(self, text: str | bytes) -> None:
         """Handle a message of the page. Raises ValueError for a bad message, or for too many."""
@@ -304,7 +304,7 @@ class Session:
             }
         )
 
-    # -- out -----------------------------------------------------------------------------------------------------------
+    # -- out --
 
     def _logged(self, task: str, entry: LogEntry) -> None:
         if self._shown in ("", task):

@@ -91,7 +91,7 @@ class Outside:
         finally:
             _carried_out.reset(before)
 
-    # -- answers from outside ------------------------------------------------------------------------------------------
+    # -- answers from outside --
 
     async def ask(self, name: str, work: Callable[[], Awaitable[str]]) -> str:
         """Return what ``work`` hears from someone out there, in a word; its end is an input.

@@ -103,7 +103,7 @@ class Context:
         self._following.add(task)
         task.add_done_callback(self._following.discard)
 
-    # -- called by topics ----------------------------------------------------------------------------------------------
+    # -- called by topics --
 
     def advertise(self, channels: Sequence[Channel]) -> None:
         """Announce further topics."""

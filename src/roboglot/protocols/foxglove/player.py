@@ -56,7 +56,7 @@ class Player:
         self._broken = ""  # why the file can no longer be read
         self._rewind()
 
-    # -- clients -------------------------------------------------------------------------------------------------------
+    # -- clients --
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -97,7 +97,7 @@ class Player:
         if self._showing is None or self._showing.done():
             self._showing = self._begin(self._show_newcomers(), "foxglove newcomers")
 
-    # -- their requests ------------------------------------------------------------------------------------------------
+    # -- their requests --
 
     def control(self, listener: Listener, wish: Wish) -> None:
         """Play, pause or seek. Raises NotReady if the file has become unreadable."""
@@ -115,7 +115,7 @@ class Player:
         for other in tuple(self._listeners):
             other.played(replace(state, request=wish.request) if other is listener else state)
 
-    # -- playing -------------------------------------------------------------------------------------------------------
+    # -- playing --
 
     def _rewind(self) -> None:
         self._status, self._speed, self._broken = PlayStatus.PAUSED, 1.0, ""
@@ -191,7 +191,7 @@ class Player:
                 if (subscription := listener.wants(channel.id)) is not None:
                     listener.deliver(subscription, shot.at, shot.data)
 
-    # -- the state at a moment -----------------------------------------------------------------------------------------
+    # -- the state at a moment --
 
     async def _show(self, at: int) -> None:
         """Send all clients the state just before a moment."""

@@ -139,7 +139,7 @@ class RoboMasterDoor:
             listed.append(Endpoint("RoboMaster serial line", str(self._serial_link)))
         return (*listed, Endpoint("RoboMaster pushes", f"udp to the client's port {self._config.push_port}"))
 
-    # -- output of the session -----------------------------------------------------------------------------------------
+    # -- output of the session --
 
     def push(self, datagram: bytes, host: str) -> None:
         """A datagram to the client's host, from the robot's own address; or down the serial line."""
@@ -165,7 +165,7 @@ class RoboMasterDoor:
             for host in {connection.host for connection in self._connections}:
                 self.push(message, host)
 
-    # -- connections ---------------------------------------------------------------------------------------------------
+    # -- connections --
 
     def _control_connection(self) -> asyncio.Protocol:
         self._vigil.begin()

@@ -156,7 +156,7 @@ class Ros2Door:
         if not task.cancelled() and (error := task.exception()) is not None:
             log.error("robot %s: the ROS 2 door: %s", self._robot.id, error, exc_info=error)
 
-    # -- listening -----------------------------------------------------------------------------------------------------
+    # -- listening --
 
     def _subscribe(self, key: str, type: str) -> None:
         from roboglot.recording.ros2.translation import STORE
@@ -216,7 +216,7 @@ class Ros2Door:
 
         self._follow(wait())
 
-    # -- publishing ----------------------------------------------------------------------------------------------------
+    # -- publishing --
 
     async def _sample(self, sampler: Sampler) -> None:
         from roboglot.recording.sampler import POSE_PERIOD, STATE_BEATS

@@ -141,7 +141,7 @@ class Hull(HullState):
         """The geoms that collide."""
         return self._solid
 
-    # -- where it is ---------------------------------------------------------------------------------------------------
+    # -- where it is --
 
     def place(self, pose: Pose, floor: int) -> None:
         """Place the robot at ``pose`` (world), at rest."""
@@ -241,7 +241,7 @@ class Hull(HullState):
         """True if the robot's body is at ``height`` m above the floor."""
         return self.clearance <= height - self.rise < self.belly + self.body.hull.torso_height
 
-    # -- how it moves --------------------------------------------------------------------------------------------------
+    # -- how it moves --
 
     def turn_wheels(self, seconds: float) -> None:
         """Turn the wheels as commanded for the next ``seconds``; a kernel does the same for all on level ground."""
@@ -281,7 +281,7 @@ class Hull(HullState):
         self._share = ROLLING if free else 1.0
         self._model.actuator_forcerange[self._drive] = self._forces * self._share
 
-    # -- hands ---------------------------------------------------------------------------------------------------------
+    # -- hands --
 
     def lift(self, height: float | None) -> None:
         """Hold the robot ``height`` m above its present place, or let go (None)."""
@@ -325,7 +325,7 @@ class Hull(HullState):
         forces, speeds = self._servos
         return max(0.0, forces[0] * speeds[0] + forces[1] * speeds[1] + forces[2] * speeds[2])
 
-    # -- leaps ---------------------------------------------------------------------------------------------------------
+    # -- leaps --
 
     def leap(self, x: float, y: float, turn: float, airtime: float) -> None:
         """Take off at this velocity (base_link, m/s, rad/s), and fly for ``airtime`` s over level ground."""

@@ -78,7 +78,7 @@ class LiftCar:
         load = self.passengers.load(self) / self.section.capacity
         return LiftState(self.floor, self._target, self._door, load, self.in_service, bool(self._failure))
 
-    # -- status --------------------------------------------------------------------------------------------------------
+    # -- status --
 
     def call(self, floor: int) -> None:
         """Call the car to a floor. Raises InvalidGoal; Refused if out of service or called too often."""
@@ -120,7 +120,7 @@ class LiftCar:
         if not self.in_service:
             raise Refused("the lift is out of service")
 
-    # -- time ----------------------------------------------------------------------------------------------------------
+    # -- time --
 
     def step(self, stamp: float, seconds: float) -> None:
         """Let ``seconds`` pass, until ``stamp``."""

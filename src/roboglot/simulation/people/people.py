@@ -68,7 +68,7 @@ class Walker(PersonState):
             facing = math.radians(person.facing)
         self.pose = Pose(path[0].x, path[0].y, facing)
 
-    # -- appearance ----------------------------------------------------------------------------------------------------
+    # -- appearance --
 
     @cached_property
     def face(self) -> bytes:
@@ -102,7 +102,7 @@ class Walker(PersonState):
         aloud, self.aloud = self.aloud, []
         return aloud
 
-    # -- orders --------------------------------------------------------------------------------------------------------
+    # -- orders --
 
     def order(self, step: Step) -> None:
         """Leave the script, and queue a step after earlier orders. Raises ValueError for too many."""
@@ -134,7 +134,7 @@ class Walker(PersonState):
         """True while the person follows the world's file and not an order."""
         return self._orders is None
 
-    # -- time ----------------------------------------------------------------------------------------------------------
+    # -- time --
 
     def walk(self, seconds: float, robots: Spots, free: Free) -> bool:
         """Continue for ``seconds`` among the ``robots`` of the floor; return whether the pose changed.

@@ -96,7 +96,7 @@ class Link(Component):
         await self._stop_others()
         self.held_by("")
 
-    # -- for the driver ------------------------------------------------------------------------------------------------
+    # -- for the driver --
 
     def heard(self, what: str) -> None:
         """Record an update of ``what`` now."""

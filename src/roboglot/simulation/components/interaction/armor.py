@@ -82,7 +82,7 @@ class SimulatedArmor(Armor):
             raise NotFound(f"there is no plate {place}")
         self._note(place, HitKind.HAND)
 
-    # -- beads ---------------------------------------------------------------------------------------------------------
+    # -- beads --
 
     def meet(self, origin: Floats, way: Floats) -> tuple[float, str] | None:
         """Return the share of a bead's way (world, 0 to 1) to the first plate hit from outside, and its name."""
@@ -125,7 +125,7 @@ class SimulatedArmor(Armor):
         axes = turned @ rotation((0.0, 0.0), side * math.pi / 2)
         return self._gimbal.pivot + axes[:, 0] * section.gimbal_side, axes, section.gimbal_size
 
-    # -- pushes --------------------------------------------------------------------------------------------------------
+    # -- pushes --
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Check the hull's touches, and publish all hits since the last time."""

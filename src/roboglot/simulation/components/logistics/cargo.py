@@ -91,7 +91,7 @@ class SimulatedCargo(Cargo):
     def close_box(self, id: int, *, source: str = "") -> Action:
         return self._start(self._get(id), -1, source)
 
-    # -- people's actions ----------------------------------------------------------------------------------------------
+    # -- people's actions --
 
     def put(self, id: int, fill: float) -> None:
         """Set the fill level of a box (0..1). Raises Refused unless its door is open, ValueError out of range."""

@@ -145,7 +145,7 @@ class SimulatedGimbal(Gimbal):
         """Rotation from the gimbal's frame to base_link."""
         return rotation((0.0, self.axes.pitch.position), self.axes.yaw.position)
 
-    # -- actions -------------------------------------------------------------------------------------------------------
+    # -- actions --
 
     def _move_to(
         self,

@@ -97,7 +97,7 @@ class SimulatedLegs(Legs):
         feet = self._steps.feet
         return feet.states(self._hull.pose) if feet else {}
 
-    # -- postures ----------------------------------------------------------------------------------------------------
+    # -- postures --
 
     def stand(self, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
@@ -169,7 +169,7 @@ class SimulatedLegs(Legs):
             self._base.locks.lock(LEGS, f"the robot cannot drive while {posture}")
         self._robot.events.publish(PostureChanged(stamp=self._clock.time(), posture=posture))
 
-    # -- pose and gait of the body -------------------------------------------------------------------------------------
+    # -- pose and gait of the body --
 
     def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
         if not 0.0 <= duration <= STEP_SECONDS_MAX:
@@ -197,7 +197,7 @@ class SimulatedLegs(Legs):
             self._base.walk(GAITS[gait].clamp if gait else None)
             self._steps.walk(gait, lift)
 
-    # -- motions -----------------------------------------------------------------------------------------------------
+    # -- motions --
 
     def perform(self, motion: Motion, *, source: str = "") -> Action:
         spec = MOTIONS[motion]
@@ -251,7 +251,7 @@ class SimulatedLegs(Legs):
         if performance.hit or (spec and strayed(self._hull.pose, begin.compose(spec.way))):
             raise Collided("an obstacle was in the way")
 
-    # -- every tick ----------------------------------------------------------------------------------------------------
+    # -- every tick --
 
     def control(self, seconds: float) -> None:
         """Move torso and feet, and base_link while performing; before the physics."""

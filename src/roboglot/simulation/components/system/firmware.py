@@ -69,7 +69,7 @@ class SimulatedFirmware(Firmware):
         self._next_look = LOOK_EVERY
         self._module: Module | None = None
 
-    # -- versions ------------------------------------------------------------------------------------------------------
+    # -- versions --
 
     @property
     def version(self) -> str:
@@ -117,7 +117,7 @@ class SimulatedFirmware(Firmware):
                 return progress.package.size * (1.0 - progress.share) / section.install_rate
         return None
 
-    # -- updates -----------------------------------------------------------------------------------------------------
+    # -- updates --
 
     def download(self, package: FirmwarePackage, *, source: str = "") -> Action:
         if not 0 < package.size <= PACKAGE_BYTES_MAX or len(package.modules) > MODULES_MAX or not package.version:

@@ -106,7 +106,7 @@ class UpdateJobs:
             self.stream = self._running = None
         stream.end({**named, "code": code, "message": message, "data": data})
 
-    # -- goals; each returns the result's data -------------------------------------------------------------------------
+    # -- goals; each returns the result's data --
 
     async def inquire(self, _: Goal) -> dict[str, object]:
         """Return the running, the downloaded and the offered version."""
