@@ -86,8 +86,7 @@ class Slam:
         self._witness = WheelWitness(self.odometry)
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking, self._given_at = -math.inf, False, -math.inf
-        self._pause, self._missed = LOST_PERIOD, 0.0  # s between searches; the fit before it fell
-        self._fell_at = 0.0  # m driven then
+        self._pause, self._missed, self._fell_at = LOST_PERIOD, 0.0, 0.0  # s to the next search; fit before its fall; m
         self._unseen = False  # whether a pose was given, and no scan was searched for since
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
@@ -226,9 +225,7 @@ class Slam:
         return self._slip.slips and belief.localizing
 
     def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, moved: Pose | None, seconds: float) -> bool:
-        """Match the scan, judge the fit, and move the belief if localization is enabled.
-
-        Return whether to search the whole map.
+        """Match the scan, judge the fit, and move the belief if it localizes. Return whether to search the whole map.
 
         ``moved``: odometry's step (in the last base_link) in the ``seconds`` since the last match; None if unusable.
         """
@@ -330,8 +327,7 @@ class Slam:
                 found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
             near = found[0].pose.distance_to(pose) < NEAR
             if belief.lost is None:
-                # On its way nearby places do not count: amid robots that move along, scans fit best where it was.
-                stood = self._way - self._fell_at <= STOOD
+                stood = self._way - self._fell_at <= STOOD  # else, in a moving crowd, a scan fits best where it was
                 if not (near if given else stood or not near) or found[0].agreement < agreement + BETTER:
                     return
                 if not given or len(found) > 1:
@@ -383,8 +379,7 @@ class Slam:
     def _straighten(self, odometry: Pose, stamp: float) -> None:
         """Continue straightening after a closed loop; at the end, move the belief to the corrected pose."""
         belief, pose = self._belief, self._belief.map_to_odom.compose(odometry)
-        straightened = self._loops.advance(pose)
-        if straightened is None:
+        if (straightened := self._loops.advance(pose)) is None:
             return
         belief.move_to(straightened, odometry)
         self._witness.forget()
