@@ -43,7 +43,7 @@ async def test_reasons_of_worlds_down_are_chinese(open_console: OpenConsole) -> 
         {"foxglove": {"dead_man": "x"}},
         {"access": {"tls": {"certificate": "x"}}},
         {"console": {"otlp": "x"}},
-        {"robots": [{"bodyy": 1}]},
+        {"robots": [{"colour": 1}]},
         {"robots": []},
         {"cyberdog": {"app": "x"}},
     ]
@@ -52,7 +52,7 @@ async def test_reasons_of_worlds_down_are_chinese(open_console: OpenConsole) -> 
         "配置：foxglove.dead_man 应当是数字，不能是文字",
         "配置：[access.tls] 要么同时给出 certificate 和 key，要么都不给",
         "配置：console.otlp 是收集器的 http:// 或 https:// 地址，不能是 'x'",
-        "配置：robots.bodyy 不是设置；有 name, body, address, start, priority, serial",
+        "配置：robots.colour 不是设置；有 name, body, address, start, priority, serial",
         "机器人有 1 到 100 个，不能是 0",
         "配置：cyberdog.app 是 HOST:PORT，不能是 'x'",
     ]

@@ -22,6 +22,7 @@ PLACES = (
 KINDS = {"RobotError", "ProgramError", "BadParameters", "BadCondition", "Problem"}
 # Pages show their ValueError and RuntimeError, too.
 OUTSIDE = ("config.py", "console/", "model/", "rehearsal.py", "runtime.py", "simulation/", *CONFIGS)
+TAILS = "spelling.py"  # what it returns is added to sentences
 NAMED = {"why", "reason", "words", "wrong"}  # variables and arguments that hold such a sentence
 # Position of the argument, where not the first.
 LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1, "state": 1, "_answer": 1}
@@ -35,10 +36,14 @@ def sentences(root: Path = ROOT) -> dict[str, str]:
     errors = _errors(trees)
     found: dict[str, str] = {}
     for path, tree in trees.items():
-        if path.as_posix().startswith(PLACES):
-            for text, line in _said(tree, errors, path.as_posix().startswith(OUTSIDE)):
-                if re.search("[a-z]{2}", text.replace(HOLE, "")):
-                    found.setdefault(text.strip(), f"{path}:{line}")
+        said: Iterator[tuple[str, int]] = iter(())
+        if path.as_posix() == TAILS:
+            said = _returned(tree)
+        elif path.as_posix().startswith(PLACES):
+            said = _said(tree, errors, path.as_posix().startswith(OUTSIDE))
+        for text, line in said:
+            if re.search("[a-z]{2}", text.replace(HOLE, "")):
+                found.setdefault(text.strip(), f"{path}:{line}")
     return found
 
 
@@ -61,6 +66,12 @@ def _name(node: ast.expr) -> str:
         case ast.Name(id=name) | ast.Attribute(attr=name):
             return name
     return ast.unparse(node).rpartition(".")[2]
+
+
+def _returned(tree: ast.Module) -> Iterator[tuple[str, int]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Return) and node.value is not None:
+            yield from ((text, node.lineno) for text in _texts(node.value))
 
 
 def _said(tree: ast.Module, errors: set[str], outside: bool) -> Iterator[tuple[str, int]]:

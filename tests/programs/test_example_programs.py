@@ -176,7 +176,7 @@ CASES = {
         ends_at=(1.26, 5.0),
         then=lambda _scene, played: {"dancer.dance", "cyberdog.motion.bow"} < set(played.calls) and played.seconds > 30,
     ),
-    "battery_watch": Case("charge 90 %\non battery\n30 W for 5 s\n", said=()),
+    "battery_watch": Case("charge 90 %\non battery\n22 W for 5 s\n", said=()),
     "gesture_control": Case("down\nup\ncoming\n", anna_gestures, "playground", ends_at=(2.4, 5.0)),
     "greet_family": Case(
         "greeted: Anna, Ben\n", anna_then_ben, "playground", ("Hello, young Anna!", "Hello, dear Ben!")

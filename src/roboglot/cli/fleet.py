@@ -177,7 +177,7 @@ def move(
     data: Data = None,
 ) -> None:
     """Move a robot to another shard, with its address and stored data; both shards restart."""
-    _print(_ask("move", data, robot=robot, to=to), robot)
+    _print(_ask("move", data, robot=robot, to=to), to)
 
 
 @app.command()
