@@ -87,6 +87,7 @@ class Slam:
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking, self._given_at = -math.inf, False, -math.inf
         self._pause, self._missed, self._fell_at = LOST_PERIOD, 0.0, 0.0  # s to the next search; fit before its fall; m
+        self._compared = belief.map  # with the newest scan
         self._unseen = False  # whether a pose was given, and no scan was searched for since
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
@@ -149,7 +150,8 @@ class Slam:
         self._displacement.forget(event.stamp)
         if event.given:
             self._turns.forget()
-            self._given_at, self._unseen, self._missed = event.stamp, True, 0.0
+            self._given_at, self._missed = event.stamp, 0.0
+            self._unseen = self._compared is self._belief.map  # on a map just loaded it may be anywhere
             self._witness.forget()
             self.whereabouts.be_given(event.stamp)
 
@@ -192,7 +194,7 @@ class Slam:
         self._step = odometry.relative_to(last)
         moved = self._step if 0.0 < seconds < GAP_MAX else None
         self._matched_odometry, self._matched_at = odometry, event.stamp
-        belief.compared_at, belief.asked = event.scan.stamp, False
+        belief.compared_at, belief.asked, self._compared = event.scan.stamp, False, belief.map
         self._way += way
         belief.covariance = self.odometry.spread(belief.covariance, way, turn, moved, seconds)
         searches = False
@@ -307,8 +309,7 @@ class Slam:
             if best.agreement >= DOUBT_SHARE * self._missed or best.known < KNOWN_SURE * best.points:
                 self._pause, self._missed = LOST_PERIOD, 0.0
                 return False
-        pause = self._pause if belief.lost is None else LOST_PERIOD
-        return not self._looking and stamp - self._looked_at >= pause
+        return not self._looking and stamp - self._looked_at >= (LOST_PERIOD if belief.lost else self._pause)
 
     def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
         """Search the whole map for the place of ``scan``; a known one is given up only for a much better."""
