@@ -109,6 +109,24 @@ def test_robot_that_leaves_moves_none_that_stands(left: EvidenceGrid, far: float
     assert found.pose.distance_to(Pose()) < 0.01
 
 
+@pytest.mark.parametrize(("scans", "believes_wheels"), [(6, True), (10, False)], ids=["just seen", "known well"])
+def test_what_was_just_seen_does_not_overrule_wheels(scans: int, believes_wheels: bool) -> None:
+    """Six scans hardly outweigh ten that saw free floor there. A thing known well shows that the wheels slip."""
+    from roboglot.autonomy.slam.contest import contested
+    from roboglot.autonomy.slam.matcher import FREE, fit
+    from roboglot.autonomy.slam.painting import paint
+
+    grid, walls = EvidenceGrid(), np.concatenate([line((-REACH, y), (REACH, y)) for y in (-HALF, HALF)])
+    for _ in range(10):
+        paint(grid, ScanPoints(walls, np.ones(len(walls), np.uint8), walls, Point()), Pose(), fill=False)
+    for _ in range(scans):
+        paint(grid, seen(0.0, REACH), Pose(), fill=False)
+    scan = seen(LEFT)
+    misled = fit(grid, scan, Pose(-LEFT), FREE, iterations=0)
+    found = contested(grid, scan, Pose(), misled, TIGHT, 0.5, 0.01)
+    assert (found is not None) is believes_wheels
+
+
 def test_past_that_was_overruled_does_not_testify(left: EvidenceGrid) -> None:
     """A standing robot that was misled for a moment returns to its place, and stays there."""
     from roboglot.autonomy.slam.contest import WheelWitness

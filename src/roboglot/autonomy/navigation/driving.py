@@ -207,10 +207,10 @@ class OdometryDriving(Driving):
     async def move(
         self, action: Action, offset: Pose, top: float, top_yaw: float, moving: _Moving | None = None
     ) -> None:
-        """Make a short move within an action that holds the base; ``top``: m/s, ``top_yaw``: rad/s. Raises Blocked,
-        NotLocalized.
+        """Make a short move within an action that holds the base. Raises Blocked, NotLocalized.
 
-        ``moving``: holds the move to take over from, with its speed; this move replaces it there.
+        ``top``: m/s, ``top_yaw``: rad/s. ``moving``: holds the move to take over from, with its speed; this move
+        replaces it there.
         """
         base, odometry = self._robot[Base], self._robot[Odometry]
         start = odometry.reading.pose

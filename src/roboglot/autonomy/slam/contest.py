@@ -1,7 +1,8 @@
 """Decides between contradicting odometry and scan: in a crowd moving along, most points suggest that the robot stands.
 
 In a static world, all points that distinguish both poses agree. If they disagree, some are on moving things, and the
-wheels are believed: their pose, matched to walls alone. Robots driving ahead drag matches back by millimetres per step,
+wheels are believed: their pose, matched to walls alone. So they are if what speaks for the scan was painted just now,
+and is no wall. Robots driving ahead drag matches back by millimetres per step,
 too little for a single step: so the last seconds are judged too. Needs the kernels.
 """
 
@@ -162,9 +163,10 @@ def contested(
 
 
 def _fresh(grid: EvidenceGrid, places: NDArray[np.float64]) -> int:
-    """Return at how many ``places`` (n, 2; map, m) surfaces are hardly known: of things that may have moved there.
+    """Return how many of ``places`` (n, 2; map, m) lie on surfaces that few scans have seen.
 
-    Of what stands still, they would fit the wheels.
+    Such a surface that fits the scan's pose alone belongs to a thing that moves along: if it stood still, the surface
+    painted a moment ago would fit the wheels.
     """
     columns, rows = np.floor((places - (grid.corner.x, grid.corner.y)) / RESOLUTION).astype(np.int64).T
     beside = [(rows + down, columns + across) for down in (-1, 0, 1) for across in (-1, 0, 1)]

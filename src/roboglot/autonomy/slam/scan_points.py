@@ -122,6 +122,11 @@ class ScanReader:
         return ScanPoints(ends, hit.astype(np.uint8), points, sensor)
 
 
+def is_covered(ranges: NDArray[np.float32]) -> bool:
+    """Return whether nearly all rays are NaN."""
+    return bool(np.count_nonzero(np.isnan(ranges)) > (1.0 - ECHO_SHARE_MIN) * len(ranges))
+
+
 def _deskewed(ends: NDArray[np.float64], velocity: Twist, increment: float) -> NDArray[np.float64]:
     """Return ``ends`` (n, 2), taken ``increment`` s apart, in base_link at the time of the first."""
     seconds = increment * np.arange(len(ends))

@@ -33,7 +33,7 @@ from roboglot.autonomy.slam.matcher import (
     search,
 )
 from roboglot.autonomy.slam.odometry.learner import Correction, OdometryLearner
-from roboglot.autonomy.slam.scan_points import ECHO_SHARE_MIN, ScanPoints
+from roboglot.autonomy.slam.scan_points import ScanPoints, is_covered
 from roboglot.autonomy.slam.slip import SlipWatch
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
 from roboglot.autonomy.slam.turns import Turns
@@ -86,9 +86,10 @@ class Slam:
         self._witness = WheelWitness(self.odometry)
         self.whereabouts = Whereabouts(belief, robot.events)
         self._looked_at, self._looking, self._given_at = -math.inf, False, -math.inf
-        self._pause, self._missed, self._fell_at = LOST_PERIOD, 0.0, 0.0  # s to the next search; fit before its fall; m
-        self._compared = belief.map  # with the newest scan
-        self._unseen = False  # whether a pose was given, and no scan was searched for since
+        self._pause = LOST_PERIOD  # s from a search of the whole map to the next
+        self._missed, self._fell_at = 0.0, 0.0  # agreement before it fell, and m driven then; 0: it did not fall
+        self._compared = belief.map  # the map with which the newest scan was compared
+        self._unseen = False  # whether a pose was given, and not yet compared with the whole map
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
         self._slip, self._displacement = SlipWatch(robot.description.radius), DisplacementWatch()
@@ -171,7 +172,7 @@ class Slam:
     def _take(self, event: ScanTaken) -> None:
         belief, odometry, self._newest = self._belief, event.odometry, event
         self._straighten(odometry, event.stamp)
-        if not len(belief.reader.read(event.scan).ends) and _is_covered(event.scan.ranges):
+        if not len(belief.reader.read(event.scan).ends) and is_covered(event.scan.ranges):
             belief.quality *= 1.0 - QUALITY_GAIN
             return  # a covered lidar sends empty scans: treat it as silent
         if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
@@ -328,8 +329,9 @@ class Slam:
                 found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
             near = found[0].pose.distance_to(pose) < NEAR
             if belief.lost is None:
-                stood = self._way - self._fell_at <= STOOD  # else, in a moving crowd, a scan fits best where it was
-                if not (near if given else stood or not near) or found[0].agreement < agreement + BETTER:
+                # A robot on its way amid others that move along fits best where it was: nearby places do not count.
+                counts = near if given else not near or self._way - self._fell_at <= STOOD
+                if not counts or found[0].agreement < agreement + BETTER:
                     return
                 if not given or len(found) > 1:
                     self.whereabouts.lose(LostReason.NO_FIT, stamp)
@@ -388,11 +390,6 @@ class Slam:
         shift = straightened.distance_to(pose)
         self._robot.events.publish(LoopClosed(stamp=stamp, shift=shift, moved=self._loops.moved))
         self._robot.events.publish(PoseJumped(stamp=stamp, pose=straightened))
-
-
-def _is_covered(ranges: NDArray[np.float32]) -> bool:
-    """Return whether nearly all rays are NaN."""
-    return bool(np.count_nonzero(np.isnan(ranges)) > (1.0 - ECHO_SHARE_MIN) * len(ranges))
 
 
 def _is_sure(best: Match) -> bool:
