@@ -11,7 +11,7 @@ STDERR = 2
 def hold_standard_files() -> None:
     """Open those that are closed, before a library's file or a socket gets such a number, and is read as our input.
 
-    uvloop aborts on its own among them.
+    uvloop aborts if one of its own descriptors has such a number.
     """
     while (null := os.open(os.devnull, os.O_RDWR)) <= STDERR:
         pass

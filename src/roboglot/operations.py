@@ -22,7 +22,7 @@ from roboglot.values import dataclass
 
 K = TypeVar("K", bound=Hashable)
 Handler = TypeVar("Handler", bound=Callable[..., object])
-_zeros = re.compile(r"(?<=^-)0+(?=\d)|^0+(?=\d)")  # of the first number, which JSON would not allow
+_ZEROS = re.compile(r"(?<=^-)0+(?=\d)|^0+(?=\d)")  # of the first number, which JSON would not allow
 
 
 class Right(StrEnum):
@@ -65,7 +65,7 @@ class Schema:
         fields = found.fields if isinstance(found, msgspec.inspect.StructType) else ()
         numbers = {field.name for field in fields if _is_number(field.type)}
         return {
-            name: _zeros.sub("", value) if isinstance(value, str) and name in numbers else value
+            name: _ZEROS.sub("", value) if isinstance(value, str) and name in numbers else value
             for name, value in values.items()
         }
 

@@ -63,7 +63,7 @@ else:
 
         def decorate(plain: C) -> C:
             own = {*vars(plain)} - ({"__hash__"} if _is_unhashable_by_eq(plain) else set())
-            plain.__doc__ = plain.__doc__ or f"{plain.__name__}()"  # the library would word the same, slowly
+            plain.__doc__ = plain.__doc__ or f"{plain.__name__}()"  # the library's own takes long to word
             made = dataclasses.dataclass(init=False, repr=False, eq=False, slots=slots, kw_only=kw_only)(plain)
             _check(made, frozen=frozen)
             _give_methods(made, own, frozen=frozen, eq=eq)

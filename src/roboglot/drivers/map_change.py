@@ -1,4 +1,4 @@
-"""Tells a map that has grown from another map: robots send both in the same way."""
+"""Distinguishes a map that has grown from another map: robots send both in the same way."""
 
 from __future__ import annotations
 

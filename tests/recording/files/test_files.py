@@ -126,7 +126,7 @@ def test_cut_file_is_read_until_the_cut(tmp_path: Path) -> None:
         (0.5, r"cut.mcap is cut off: it is read until \d+\.0 s \(1970-01-01 00:00:\d\d UTC\); \d+ bytes after"),
     ],
 )
-def test_cut_file_is_told_with_its_end(
+def test_cut_file_is_named_with_its_end(
     lost: float, said: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     part = PartWriter(tmp_path / "x.mcap", ORIGIN, Redaction(), 0)

@@ -17,7 +17,6 @@ from roboglot.values import dataclass
 log = logging.getLogger(__name__)
 APPS = "apps"
 CLIENT_FILES = (CA_CERT, "client-cert.pem", "client-key.pem")
-MONTHS = "JanFebMarAprMayJunJulAugSepOctNovDec"  # and no ``ssl.cert_time_to_seconds``: it loads for a millisecond
 ROUNDS = 4  # of a handshake's messages, at most
 
 
@@ -150,8 +149,8 @@ def _proven(tls: Path) -> datetime | None:
         for _ in range(ROUNDS):
             proven = _is_through(caller)
             if _is_through(answerer) and proven:
-                month, day, clock, year, _ = str((caller.getpeercert() or {})["notAfter"]).split()
-                return datetime.fromisoformat(f"{year}-{MONTHS.index(month) // 3 + 1:02}-{day:0>2}T{clock}+00:00")
+                until = (caller.getpeercert() or {})["notAfter"]
+                return datetime.fromtimestamp(ssl.cert_time_to_seconds(str(until)), UTC)
     except (OSError, ValueError, LookupError):  # OSError: an SSLError, too
         return None
     return None

@@ -70,10 +70,10 @@ RESETS = {7: 14, 8: 1, 11: 8, 12: 7}  # from HTTP/2's errors: unavailable, cance
 
 
 class OneWay:
-    """One direction of a connection: ``feed`` it; ``heard`` gets each whole message of a call, ``ended`` the status
-    with which the called side ended it.
+    """One direction of a connection: ``feed`` it; ``heard`` gets each whole message of a call.
 
-    Raises ValueError, IndexError or hpack's HPACKError for bytes that are not HTTP/2.
+    ``ended`` gets the status with which the called side ended a call. Raises ValueError, IndexError or hpack's
+    HPACKError for bytes that are not HTTP/2.
     """
 
     def __init__(self, name: str, calls: dict[int, Call], heard: Heard, ended: Ended, preface: bytes = b"") -> None:

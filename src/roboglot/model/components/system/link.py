@@ -13,8 +13,18 @@ from roboglot.model.errors import Busy, Refused, Unconnected
 from roboglot.model.events import EventStream, LinkChanged
 from roboglot.model.robot import Robot
 
-__all__ = ["FAULT", "OTHERS", "STALE_AFTER", "US", "Link", "LinkState"]
-__all__ += ["is_current", "require_current", "require_heard", "was_heard"]
+__all__ = [
+    "FAULT",
+    "OTHERS",
+    "STALE_AFTER",
+    "US",
+    "Link",
+    "LinkState",
+    "is_current",
+    "require_current",
+    "require_heard",
+    "was_heard",
+]
 
 FAULT = "link lost"
 US, OTHERS = "us", "another client"
