@@ -13,7 +13,7 @@ import pytest
 import pytest_asyncio
 import typer
 
-from roboglot.cli.lesson import command
+from roboglot.cli.programs.lesson import command
 from roboglot.console.studio.checks import Check, Work, failure
 from roboglot.console.studio.lessons import Grade, Lesson, grade, load, read
 from roboglot.console.studio.mistakes import explain

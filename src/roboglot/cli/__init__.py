@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
     import typer
-    from typer._click import Command
 
 COMMANDS = {
     "up": "start the robots with all their doors",
@@ -52,8 +51,10 @@ COMMANDS = {
 }
 FLUSH_FAILED = 120  # Python's own exit status for it
 # Commands whose files have a folder of their own.
-FOLDERS = dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings") | dict.fromkeys(
-    ("lease", "stop", "reset"), "control"
+FOLDERS = (
+    dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings")
+    | dict.fromkeys(("lease", "stop", "reset"), "control")
+    | dict.fromkeys(("program", "lesson"), "programs")
 )
 # The extra to install for a command whose modules are missing, if that brings them.
 EXTRAS = (
@@ -161,44 +162,14 @@ def built(name: str) -> Callable[..., object]:
     """Return one of COMMANDS, to be called."""
     from typer.main import get_command
 
-    return _guessing(get_command(loaded(name)))
-
-
-def _guessing(command: Command) -> Callable[..., object]:
-    """Let a command and its subcommands name what was probably meant, or nothing; Typer's own guesses are far off."""
-    from typer.exceptions import TyperException
-
-    from roboglot.spelling import instead, nearest
-
-    parse, resolve = command.parse_args, getattr(command, "resolve_command", None)
-    commands: dict[str, Command] = getattr(command, "commands", {})
-
-    def parse_args(context: typer.Context, words: list[str]) -> list[str]:
-        try:
-            return parse(context, words)
-        except TyperException as error:
-            if option := getattr(error, "option_name", ""):
-                known = [name for part in command.params for name in (*part.opts, *part.secondary_opts)]
-                vars(error)["possibilities"] = [near] if (near := nearest(option, known)) else []
-            raise
-
-    def resolve_command(context: typer.Context, words: list[str]) -> object:
-        try:
-            return resolve(context, words) if resolve else None
-        except TyperException as error:
-            if words[0] not in commands:
-                vars(error)["message"] = f"No such command {words[0]!r}{instead(words[0], commands)}"
-            raise
-
-    vars(command).update(parse_args=parse_args, resolve_command=resolve_command)
-    for each in commands.values():
-        _guessing(each)
-    return command
+    return get_command(loaded(name))
 
 
 def loaded(name: str) -> typer.Typer:
     """Import and return the application of one of COMMANDS."""
     import typer
+
+    from roboglot.cli.suggestions import Command
 
     folder = f".{FOLDERS[name]}" if name in FOLDERS else ""
     module = importlib.import_module(f"roboglot.cli{folder}.{name}")
@@ -206,4 +177,6 @@ def loaded(name: str) -> typer.Typer:
     if app is None:
         app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
         app.command(context_settings=getattr(module, "SETTINGS", None))(module.command)
+    for command in app.registered_commands:
+        command.cls = Command
     return app

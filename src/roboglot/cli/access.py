@@ -16,10 +16,12 @@ import typer
 
 from roboglot.access.rights import ALL_ROBOTS, parse_rights, write_rights
 from roboglot.access.store import AccessStore, Grant, IdentityKind, open_store
+from roboglot.cli.suggestions import Group
 from roboglot.config import Config
 from roboglot.storage.transactions import DatabaseError
 
 app = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

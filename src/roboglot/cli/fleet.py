@@ -19,6 +19,7 @@ import msgspec
 import typer
 
 from roboglot.cli.control import running
+from roboglot.cli.suggestions import Group
 from roboglot.config import default_data_folder
 from roboglot.extras import MissingExtra, refuse_without
 from roboglot.hosting.reasons import in_words
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from roboglot.shards.plan import FleetPlan
     from roboglot.shards.wishes import Answer, Row, Verb
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
+app = typer.Typer(cls=Group, add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
 PATIENCE = 120.0  # s for a request; stopping and starting 100 shards takes a while
 MEGABYTE = 1 << 20
 LINES_MAX = 100_000

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from typer.core import TyperGroup
 
 from roboglot.cli.control import running
+from roboglot.cli.suggestions import Group
 from roboglot.config import default_data_folder
 from roboglot.hosting.event_loop import run
 from roboglot.hosting.reasons import in_words
@@ -28,7 +28,7 @@ PATIENCE = 30.0  # s: a long ring takes a while to write
 EPILOG = "A URL instead of a command records a real robot: roboglot record slamware://192.168.11.1 --listen 127.0.0.9"
 
 
-class _Commands(TyperGroup):
+class _Commands(Group):
     """Group in which a URL in place of a command means ``proxy``."""
 
     def parse_args(self, ctx: Context, args: list[str]) -> list[str]:

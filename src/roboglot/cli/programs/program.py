@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 import typer
 
-from roboglot.cli.stepping import Stepper
+from roboglot.cli.programs.stepping import Stepper
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.visual import TextLink
 from roboglot.config import RobotConfig

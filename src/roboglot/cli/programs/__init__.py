@@ -1,0 +1,1 @@
+"""Commands for block programs and lessons."""
