@@ -19,7 +19,7 @@ from roboglot.access.guard import Guard
 from roboglot.access.store import Grant, open_store
 from roboglot.config import AccessConfig
 from roboglot.model.admission import Proof, ProofKind
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
@@ -49,10 +49,10 @@ async def asking(claims: Claims, folder: Path) -> None:
     for proof in proofs:
         await admission.admit("10.0.0.7:40312", proof)
     new = (time.perf_counter() - began) / NEW
-    ask_for("slamware cell0", "10.0.0.7:40312", "cell0")
+    set_client("slamware cell0", "10.0.0.7:40312", "cell0")
 
     def ask() -> None:
-        admission.known("10.0.0.7:40312", proofs[0])
+        admission.cached_identity("10.0.0.7:40312", proofs[0])
         admission.check("slamware", POSE, Right.SEE)
 
     best = min(timeit.repeat(ask, number=TIMES, repeat=100)) / TIMES  # other load can only add time

@@ -63,7 +63,7 @@ async def opened(door: str, address: str, certificates: str) -> Line:
         line.options = {"certs": certificates}
     await line.open()
     if door == "robomaster":
-        await line.ask("command", b"command;", [b"ok;"])
+        await line.request("command", b"command;", [b"ok;"])
     return line
 
 
@@ -73,7 +73,7 @@ async def timed(line: Line, door: str) -> float:
     if door == "visual":  # every front end gets all answers, and counts its own
         payload = payload.replace(b'"b"', b'"b%d"' % next(NUMBERS))
     began = time.perf_counter()
-    assert await line.ask(operation, payload, [b"{}"])
+    assert await line.request(operation, payload, [b"{}"])
     return 1000.0 * (time.perf_counter() - began)
 
 

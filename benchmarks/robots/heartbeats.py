@@ -92,7 +92,7 @@ class Listening(Supervisor):
         for shard, link in zip(self.shards.values(), links, strict=True):
             link.setblocking(False)
             shard.link = link
-            self._loop.add_reader(link, self._hear, shard)
+            self._loop.add_reader(link, self._receive, shard)
             self._turn_to(shard, State.STARTING)
         self._look_after()
 

@@ -77,7 +77,7 @@ def timed_scans(fleet: Fleet, lap: Lap) -> None:
     """Measure what localization and mapping make of each scan, where the events are handed over."""
     stream = fleet.robots["a"].events
     for number, (kind, listener) in enumerate(stream._listeners):
-        if kind is ScanTaken and listener.__qualname__ == "Turns.hear":  # in lockstep the scan is handled synchronously
+        if kind is ScanTaken and listener.__qualname__ == "Turns.put":  # in lockstep the scan is handled synchronously
 
             def measured(event: ScanTaken, inner=listener) -> None:  # type: ignore[no-untyped-def]
                 began = time.thread_time()

@@ -17,7 +17,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from roboglot.misfits import KINDS, misfit
+from roboglot.validation import KINDS, why_invalid
 from roboglot.values import dataclass
 
 K = TypeVar("K", bound=Hashable)
@@ -122,7 +122,7 @@ class Operation(Generic[K]):
         except msgspec.ValidationError as error:
             if (plain := self.schema.without_zeros(values)) != values:
                 return self.parse(plain, kinds)
-            raise BadParameters(misfit(error, kinds=kinds)) from None
+            raise BadParameters(why_invalid(error, kinds=kinds)) from None
         return {name: getattr(checked, name) for name in self.names}
 
     async def call(self, context: object, values: Mapping[str, object]) -> Any:

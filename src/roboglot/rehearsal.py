@@ -84,12 +84,12 @@ class Rehearsals:
         """
         here = asyncio.get_running_loop()
 
-        def tell(news: dict[str, object]) -> None:
+        def notify(news: dict[str, object]) -> None:
             if notice is not None:
                 here.call_soon_threadsafe(notice, news)
 
         async def program(fleet: Fleet, clock: LockstepClock, engine: Engine) -> Played:
-            return await _Play(fleet, clock, scene, speed, tell).run(engine, source, dict(modules or {}))
+            return await _Play(fleet, clock, scene, speed, notify).run(engine, source, dict(modules or {}))
 
         return await self._in_turn(scene, program)
 
@@ -165,7 +165,7 @@ class _Play:
     clock: LockstepClock
     scene: Scene
     speed: float
-    tell: Notice
+    notify: Notice
     played: Played = field(default_factory=Played)
     _coming: list[Act] = field(default_factory=list)
     _began: float = 0.0
@@ -175,7 +175,7 @@ class _Play:
     def begin_block(self, id: str) -> None:
         """Record and report the beginning of a block."""
         self.played.blocks.append(id)
-        self.tell({"what": "block", "id": id})
+        self.notify({"what": "block", "id": id})
 
     async def breakpoint(self) -> None:
         """Return at once: a rehearsal has no breakpoints."""
@@ -210,7 +210,7 @@ class _Play:
         match event:
             case Output(text=text):
                 self.played.printed += text
-                self.tell({"what": "print", "text": text})
+                self.notify({"what": "print", "text": text})
             case Call():
                 self.played.calls.append((event.name, tuple(event.args)))
                 await self._answer(event, run, session)
@@ -266,7 +266,7 @@ class _Play:
         spot = Spot(round(self.clock.time() - self._began, 2), pose.x, pose.y, pose.yaw)
         self.played.path.append(spot)
         self.played.seconds = spot.at
-        self.tell({"what": "spot", "at": spot.at, "x": spot.x, "y": spot.y, "yaw": spot.yaw})
+        self.notify({"what": "spot", "at": spot.at, "x": spot.x, "y": spot.y, "yaw": spot.yaw})
         self._note_lights()
 
     def _note_lights(self) -> None:

@@ -84,7 +84,7 @@ async def test_address_is_allowed_in_each_of_its_forms(runtime: Runtime, store: 
     ):
         name = store.allow(given, [Grant("a", SEE)])
         guard_of(runtime).reload()
-        assert [guard_of(runtime).known(peer, NO_PROOF) for peer in peers] == [name] * len(peers)
+        assert [guard_of(runtime).cached_identity(peer, NO_PROOF) for peer in peers] == [name] * len(peers)
 
 
 async def test_guessing_is_stopped_and_costs_nothing(

@@ -47,7 +47,7 @@ def test_silence_is_noticed_at_its_time(last_heard: float, drives: bool) -> None
     heart, now = Heartbeat(0.0), 0.0
     while now < last_heard:
         now += heart.look(now, drives).pause + LATE
-        heart.hear(now)
+        heart.note_life(now)
     quiet, _ = looks(heart, now, now + 1.0, drives)
     assert quiet is not None
     assert QUIET_AFTER <= quiet - heart.heard + 1e-9 <= QUIET_AFTER + 6 * LATE
@@ -57,7 +57,7 @@ def test_beats_come_often_only_while_someone_drives() -> None:
     assert looks(Heartbeat(0.0), 0.0, 1.0, drives=True)[1] >= 1 / (QUICK_PERIOD + 2 * LATE)
     assert looks(Heartbeat(0.0), 0.0, 1.0, drives=False)[1] <= 11
     asked = Heartbeat(0.0)
-    asked.hear(0.0, quick=True)
+    asked.note_life(0.0, quick=True)
     assert looks(asked, 0.0, 0.4, drives=False)[1] >= 0.4 / (QUICK_PERIOD + 2 * LATE)
 
 
@@ -70,14 +70,14 @@ def test_delayed_end_reads_earlier_beats_before_judging() -> None:
     for _ in range(5):  # several turns of the loop in a row decide nothing
         assert not heart.look(woken, drives=True).quiet
     assert not heart.look(woken + QUICK_PERIOD, drives=True).quiet  # now it may; the loop reads its sockets first
-    heart.hear(woken + QUICK_PERIOD)
+    heart.note_life(woken + QUICK_PERIOD)
     assert looks(heart, woken + QUICK_PERIOD, woken + 0.2)[0] is None
 
 
 def test_only_long_silence_is_a_loss() -> None:
     heart = Heartbeat(0.0)
     assert looks(heart, 0.0, 1.0)[0] is not None
-    heart.hear(1.0)
+    heart.note_life(1.0)
     assert looks(heart, 1.0, 1.2)[0] is None
     heart.look(LOST_AFTER + 1.0, drives=True)
     assert heart.look(LOST_AFTER + 1.0, drives=True).lost
@@ -87,7 +87,7 @@ def test_beats_beside_tunnel_excuse_its_silence_for_while() -> None:
     heart, now, quiet = Heartbeat(0.0), 0.0, list[float]()
     while now < 1.5:
         now += QUICK_PERIOD
-        heart.hear_beside(now)
+        heart.note_life_beside(now)
         if heart.look(now, drives=True).quiet:
             quiet.append(now)
     assert quiet
@@ -96,7 +96,7 @@ def test_beats_beside_tunnel_excuse_its_silence_for_while() -> None:
 
 def test_beats_beside_do_not_keep_a_dead_tunnel() -> None:
     heart = Heartbeat(0.0)
-    heart.hear_beside(LOST_AFTER)
+    heart.note_life_beside(LOST_AFTER)
     assert heart.look(LOST_AFTER, drives=False).lost
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from roboglot.access.store import AccessStore, Grant
 from roboglot.model.admission import Forbidden
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest, OrderStatus
 from roboglot.model.components.mapping.places import Places
@@ -65,7 +65,7 @@ async def test_no_motion_begins_without_right_to_drive(runtime: Runtime, store: 
     store.add_machine("cell", [Grant("a", MAY_ALL)])
     assert runtime.guard is not None
     runtime.guard.reload()
-    ask_for("slamware cell", identity="cell")
+    set_client("slamware cell", identity="cell")
     robot[Driving].move_by(Pose(0.1)).cancel("")
     store.revoke("cell")
     runtime.guard.reload()
@@ -123,9 +123,9 @@ async def test_orders_end_with_their_own_clients_right(runtime: Runtime, store: 
     for name, x in (("near", 1.0), ("far", 2.5)):
         await robot[Places].put(PointOfInterest(name, Pose(x, 0.0), {"display_name": name}))
     for who in ("anna", "ben", "anna"):  # the first client's identity must not count for the others
-        ask_for(f"slamware {who}", identity=who)
+        set_client(f"slamware {who}", identity=who)
         await delivery.accept(OrderRequest(OrderKind.GUIDE, "far" if who == "anna" else "near"))
-    ask_for("")
+    set_client("")
     await clock.advance(2.0)
     assert [action.identity for action in robot.actions.running()] == ["anna"]
     store.revoke("anna")

@@ -16,7 +16,7 @@ from roboglot.console.verbs.robots import VERBS
 from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.console.wire_log import rows
 from roboglot.model.admission import Forbidden
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.operations import OperationTable, Right
 from roboglot.programs.functions import prelude  # noqa: F401 - it fills the table
 from roboglot.programs.functions import table as functions
@@ -205,7 +205,7 @@ async def test_functions_of_programs_need_rights(runtime: Runtime, monkeypatch: 
 
 
 async def _call_all(caller: Caller, session: Session, refused: set[str]) -> None:
-    ask_for("visual t", identity=caller.address)
+    set_client("visual t", identity=caller.address)
     for key in functions.ABILITIES._operations:
         try:
             await functions.call(session, key, (), {})

@@ -15,9 +15,9 @@ from tests.statements import parsed, statements
 ROOT = Path(roboglot.__file__).parent
 CONFIGS = tuple(f"protocols/{name}/config.py" for name in sections())
 PLACES = (
-    "access/", "autonomy/", "conditions.py", "config.py", "console/", "drivers/", "media/", "model/", "operations.py",
+    "access/", "autonomy/", "config.py", "console/", "drivers/", "media/", "model/", "operations.py",
     "programs/", "protocols/visual/", "recording/", "rehearsal.py", "runtime.py", "shards/", "simulation/", "storage/",
-    "transport/", "wire/visual/", *CONFIGS,
+    "task_conditions.py", "transport/", "wire/visual/", *CONFIGS,
 )  # fmt: skip
 KINDS = {"RobotError", "ProgramError", "BadParameters", "BadCondition", "Problem"}
 # Pages show their ValueError and RuntimeError, too.

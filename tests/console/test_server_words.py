@@ -10,8 +10,8 @@ import pytest
 
 from roboglot.config import REMEDY
 from roboglot.console.assets import FOLDER
-from roboglot.misfits import FORMS, KINDS, PYTHON
 from roboglot.simulation.world.placing import EDGE, GAP, IN_THE_WAY, ROBOT
+from roboglot.validation import FORMS, KINDS, PYTHON
 from tests.console.server_sentences import sentences
 
 KNOWN: dict[str, str] = json.loads((FOLDER / "words" / "server.zh.json").read_text("utf-8"))
@@ -34,7 +34,7 @@ WORDS = {
 
 def test_each_sentence_of_the_server_has_its_chinese() -> None:
     missing = {text: place for text, place in sentences().items() if text not in KNOWN}
-    missing |= dict.fromkeys((FORMS | WORDS) - KNOWN.keys(), "misfits.py")
+    missing |= dict.fromkeys((FORMS | WORDS) - KNOWN.keys(), "validation.py")
     assert missing == {}, "add their Chinese to console/web/words/server.zh.json, sorted"
 
 

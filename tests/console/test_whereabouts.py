@@ -58,7 +58,7 @@ async def test_nothing_is_made_up_of_an_unheard_robot(fleet: Fleet, forward: For
     assert position(robot, V3, "map") == velocity(robot) == {}
 
     link.move_to(LinkState.UP)
-    link.heard("pose")
+    link.note_update("pose")
     sampler.beat(0)
     assert {"battery", "pose", "transforms"} <= {entry.kind for entry in sent}
     assert None not in view.motion

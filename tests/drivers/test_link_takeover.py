@@ -5,7 +5,7 @@ import math
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.client_context import asking_for
+from roboglot.model.client_context import acting_for
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
@@ -144,5 +144,5 @@ async def test_dog_walked_by_another_app_is_left_alone(
             await driven[Lease].take("robomaster")
             assert driven[Lease].holder is None
             await until(driven.clock, lambda: task.ended, 2)
-            with asking_for("robomaster"):
+            with acting_for("robomaster"):
                 await succeeds(driven)

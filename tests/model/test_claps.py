@@ -14,7 +14,7 @@ BLOCK = 960
 def counted(samples):
     counter = ClapCounter()
     blocks = (SoundBlock(i / SAMPLE_RATE, samples[i : i + BLOCK]) for i in range(0, len(samples) - BLOCK, BLOCK))
-    return [heard.count for block in blocks if (heard := counter.hear(block)) is not None]
+    return [heard.count for block in blocks if (heard := counter.feed(block)) is not None]
 
 
 def played(*parts, noise=33.0):

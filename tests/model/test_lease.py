@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from roboglot.model.actions import ActionStatus
-from roboglot.model.client_context import asking_for
+from roboglot.model.client_context import acting_for
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.gimbal import Gimbal
@@ -36,12 +36,12 @@ async def test_newest_command_has_the_robot_visibly(robot: Robot, forward: Forwa
     lease = robot[Lease]
     assert lease.holder is None
     with robot.events.subscribe(ControlChanged) as reported:
-        with asking_for(SCRIPT):
+        with acting_for(SCRIPT):
             first = robot[Driving].drive(Twist(x=0.2), source="one")
         await forward(seconds=0.5)
         assert lease.holder
         assert (lease.holder.who, lease.holder.doing) == (SCRIPT, "drive")
-        with asking_for(DASHBOARD):
+        with acting_for(DASHBOARD):
             second = robot[Driving].move_by(Pose(x=0.1), source="two")
         await forward(seconds=4)
         assert first.status is ActionStatus.CANCELED
@@ -52,11 +52,11 @@ async def test_newest_command_has_the_robot_visibly(robot: Robot, forward: Forwa
 
 
 async def test_two_clients_of_one_door_are_distinguished(robot: Robot, forward: Forward) -> None:
-    with asking_for(DASHBOARD):
+    with acting_for(DASHBOARD):
         one = robot[Driving].drive(Twist(x=0.2), source="slamware")
         assert robot[Driving].drive(Twist(x=0.1), source="slamware") is one
     await forward(seconds=0.1)
-    with asking_for("slamware 10.0.0.8"):
+    with acting_for("slamware 10.0.0.8"):
         other = robot[Driving].drive(Twist(x=0.2), source="slamware")
     await forward(seconds=1)
     assert one.status is ActionStatus.CANCELED
@@ -68,7 +68,7 @@ async def test_two_clients_of_one_door_are_distinguished(robot: Robot, forward: 
 
 async def test_exclusive_control_lasts_until_it_is_released(robot: Robot, forward: Forward) -> None:
     lease = robot[Lease]
-    with asking_for(SCRIPT):
+    with acting_for(SCRIPT):
         driving = robot[Driving].drive(Twist(x=0.2), source="one")
     await forward(seconds=0.5)
     taking = asyncio.ensure_future(lease.take())
@@ -79,20 +79,20 @@ async def test_exclusive_control_lasts_until_it_is_released(robot: Robot, forwar
     assert lease.taken_by == PERSON
     assert faults(robot) == {TAKEN: FaultLevel.WARNING}
     for who in (SCRIPT, DASHBOARD, ""):
-        with asking_for(who):
+        with acting_for(who):
             with pytest.raises(Busy, match="control is taken by a person"):
                 robot[Driving].drive(Twist(x=0.2), source="one")
             with pytest.raises(Busy, match="control is taken by a person"):
                 robot[Gimbal].set_speed(0.1, 0.1, source="one")
     robot[Driving].drive(STILL, lifetime=0.1, source="one")  # stopping is always allowed
     await lease.take("robomaster 10.0.0.5")  # handed over
-    with asking_for(DASHBOARD), pytest.raises(Busy, match=r"taken by robomaster 10\.0\.0\.5"):
+    with acting_for(DASHBOARD), pytest.raises(Busy, match=r"taken by robomaster 10\.0\.0\.5"):
         robot[Driving].move_by(Pose(x=0.1), source="two")
-    with asking_for(SCRIPT):
+    with acting_for(SCRIPT):
         moving = robot[Driving].move_by(Pose(x=0.1), source="one")
     await lease.release()
     assert faults(robot) == {}
-    with asking_for(DASHBOARD):
+    with acting_for(DASHBOARD):
         robot[Driving].move_by(Pose(x=0.1), source="two")
     await forward(seconds=4)
     assert moving.status is ActionStatus.CANCELED
@@ -126,7 +126,7 @@ async def test_a_name_is_a_line(robot: Robot, name: str) -> None:
 
 async def test_what_moves_nothing_needs_no_control(robot: Robot) -> None:
     await robot[Lease].take()
-    with asking_for(SCRIPT):
+    with acting_for(SCRIPT):
         robot[Speaker].say("hello", source="one")
 
 
@@ -139,7 +139,7 @@ async def test_robot_moved_by_someone_else_is_left_alone(robot: Robot, forward: 
     assert lease.holder.who == OTHERS
     assert faults(robot) == {OUTSIDE: FaultLevel.WARNING}
     for goal in (Twist(x=0.2), STILL):  # stopping another's action would be only a claim
-        with asking_for(SCRIPT), pytest.raises(Busy, match="another client moves the robot"):
+        with acting_for(SCRIPT), pytest.raises(Busy, match="another client moves the robot"):
             robot[Driving].drive(goal, source="one")
     with pytest.raises(Refused, match="cannot cancel"):
         await lease.take("robomaster")
@@ -152,11 +152,11 @@ async def test_robot_moved_by_someone_else_is_left_alone(robot: Robot, forward: 
     await lease.take("robomaster")
     assert stopped == [True]
     assert lease.holder is None
-    with asking_for(SCRIPT):
+    with acting_for(SCRIPT):
         robot[Driving].drive(Twist(x=0.2), lifetime=0.1, source="one")
     await forward(seconds=1)
     link.held_by(OTHERS)  # he starts over: the lease does not fight that
-    with asking_for(SCRIPT), pytest.raises(Busy, match="another client"):
+    with acting_for(SCRIPT), pytest.raises(Busy, match="another client"):
         robot[Driving].drive(Twist(x=0.2), source="one")
     link.held_by("")
     await lease.release()

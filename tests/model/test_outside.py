@@ -29,7 +29,7 @@ async def test_time_waits_for_an_answer(clock: LockstepClock) -> None:
         return "ok"
 
     async def ask() -> float:
-        assert await outside.ask("heartbeat", answered) == "ok"
+        assert await outside.call_out("heartbeat", answered) == "ok"
         return clock.time()
 
     await clock.advance(1.0)
@@ -44,7 +44,7 @@ async def test_time_waits_for_an_answer(clock: LockstepClock) -> None:
 async def test_no_one_is_asked_in_a_rerun(clock: LockstepClock) -> None:
     outside = Outside("a", clock)
     outside.play()
-    asking = asyncio.ensure_future(outside.ask("push", never))
+    asking = asyncio.ensure_future(outside.call_out("push", never))
     await clock.advance(1.0)
     assert (outside.waits("push", 1), outside.waits("push", 2), outside.waits("close", 1)) == (True, False, False)
     outside.answer("push", 1, "unavailable")
@@ -55,7 +55,7 @@ async def test_given_up_call_is_answered_no_more(clock: LockstepClock) -> None:
     outside = Outside("a", clock)
     outside.play()
     with pytest.raises(TimeoutError):
-        await asyncio.gather(clock.wait_for(outside.ask("push", never), 2.0), clock.advance(3.0))
+        await asyncio.gather(clock.wait_for(outside.call_out("push", never), 2.0), clock.advance(3.0))
     assert not outside.waits("push", 1)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.clock import LockstepClock
 from roboglot.model.tap import PAYLOAD_MAX, QUEUE_MAX, Direction, Exchange, Tap
 
@@ -10,7 +10,7 @@ from roboglot.model.tap import PAYLOAD_MAX, QUEUE_MAX, Direction, Exchange, Tap
 async def test_a_request_and_its_reply_belong_together(clock: LockstepClock) -> None:
     tap = Tap("a", clock)
     with tap.subscribe() as viewer:
-        ask_for("slamware 10.0.0.7", "10.0.0.7:5000")
+        set_client("slamware 10.0.0.7", "10.0.0.7:5000")
         began = tap.request("slamware", "GET /x", b"GET /x\n\n")
         await clock.advance(0.25)
         tap.reply("slamware", "GET /x", "no", "403", "not now", began)

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.conditions import BadCondition, parse_cycle, parse_moment
 from roboglot.model.clock import LockstepClock
 from roboglot.programs.tasks.calendar import due_next, due_of, due_once
 from roboglot.programs.tasks.schedule import STALE_MAX, Schedule
+from roboglot.task_conditions import BadCondition, parse_cycle, parse_moment
 
 SHANGHAI, BERLIN = ZoneInfo("Asia/Shanghai"), ZoneInfo("Europe/Berlin")
 

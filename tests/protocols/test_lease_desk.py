@@ -14,7 +14,7 @@ from roboglot.cli.control import running
 from roboglot.cli.control.lease import command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.hosting.local_socket import CALLERS_MAX, LINE_MAX
-from roboglot.model.client_context import asking_for
+from roboglot.model.client_context import acting_for
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.base import Base
@@ -199,7 +199,7 @@ async def test_control_survives_a_restart(tmp_path: Path) -> None:
         assert (await _ask(socket, Request("give", "a", "robomaster"))).robots[0].taken_by == "robomaster"
     async with server() as (robot, socket):
         assert robot[Health].has(TAKEN)
-        with asking_for("slamware 10.0.0.7"), pytest.raises(Busy, match="control is taken by robomaster"):
+        with acting_for("slamware 10.0.0.7"), pytest.raises(Busy, match="control is taken by robomaster"):
             robot.actions.start("drive", lambda _: asyncio.sleep(0), resources={BASE})
         assert (await _ask(socket, Request("release", "a"))).robots[0].taken_by == ""
     async with server() as (robot, _):

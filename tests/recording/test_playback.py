@@ -219,9 +219,9 @@ async def test_calls_end_with_the_status_of_the_recording(tmp_path: Path) -> Non
         line = Target(f"cyberdog://{host}?certs={tmp_path / 'certificates'}").line(RealClock(), lambda *_: None)
         await line.open()
         try:
-            said = [status for _, status in await line.ask("8013", b"ok", [b""])]
+            said = [status for _, status in await line.request("8013", b"ok", [b""])]
             with pytest.raises(LinkLost) as ended:
-                await line.ask("8013", b"error RESOURCE_EXHAUSTED", [b""])
+                await line.request("8013", b"error RESOURCE_EXHAUSTED", [b""])
         finally:
             await line.close()
         return [*said, ended.value.status]

@@ -86,7 +86,7 @@ async def test_answer_to_what_is_no_frame_is_found() -> None:
         line = Target(f"visual://{ADDRESS}:{port}").line(RealClock(), lambda *_: None)
         await line.open()
         for payload in (b"garbage", b'{"type": "module"}', b"[]"):
-            assert await line.ask("", payload, [said]) == [(said, "state 1")]
+            assert await line.request("", payload, [said]) == [(said, "state 1")]
         await line.close()
 
 

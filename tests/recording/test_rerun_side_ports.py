@@ -21,7 +21,7 @@ from tests.recording.test_rerun_clients import identical, until_gone
 CLIENT = free_addresses(1)  # an address of its own, to which pushes go
 
 
-class Ears(asyncio.DatagramProtocol):
+class Signals(asyncio.DatagramProtocol):
     """Hears pushes."""
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ async def test_what_goes_out_needs_no_repeat(tmp_path: Path) -> None:
     """Video, sound, events and pushes: whether one takes them changes nothing of what a robot does."""
     loop = asyncio.get_running_loop()
     async with begun(tmp_path, robomaster={"push_port": (port := free_port())}) as session:
-        hearing, ears = await loop.create_datagram_endpoint(Ears, local_addr=(CLIENT, port))
+        hearing, signals = await loop.create_datagram_endpoint(Signals, local_addr=(CLIENT, port))
         await session.clock.advance(1.037)
         reader, writer = await asyncio.open_connection(ADDRESS, 40923, local_addr=(CLIENT, 0))
         streams = [await swallow(number) for number in (40921, 40922, 40925)]
@@ -73,7 +73,7 @@ async def test_what_goes_out_needs_no_repeat(tmp_path: Path) -> None:
         sizes = await asyncio.gather(*(task for task, _ in streams))
         hearing.close()
         await session.clock.advance(1.0)
-    assert ears.heard
+    assert signals.heard
     assert sizes[0] > 1000
     pushed = {e.operation for e in (await identical(tmp_path)).of(door="robomaster") if e.direction is Direction.PUSH}
     assert "> chassis push" in pushed

@@ -134,8 +134,8 @@ class Guard:
         for admission in self._admissions:
             admission.renew(self._book, replaced)
 
-    def known(self, address: str, proof: Proof) -> str | None:
-        """See ``Admission.known``."""
+    def cached_identity(self, address: str, proof: Proof) -> str | None:
+        """See ``Admission.cached_identity``."""
         if proof is not NO_PROOF:
             return self._proofs.known(proof)
         host = host_of(address)
@@ -151,7 +151,7 @@ class Guard:
 
     async def admit(self, address: str, proof: Proof) -> str:
         """See ``Admission.admit``."""
-        if (who := self.known(address, proof)) is not None:
+        if (who := self.cached_identity(address, proof)) is not None:
             return who
         before = self._list.version
         try:
@@ -159,7 +159,7 @@ class Guard:
         except Unknown:
             if proof is NO_PROOF or not await self._is_newer(before):
                 raise
-        return self.known(address, proof) or await self._proofs.find(proof, host_of(address))
+        return self.cached_identity(address, proof) or await self._proofs.find(proof, host_of(address))
 
     async def _is_newer(self, version: int) -> bool:
         """Read the list at once; return whether it has changed since ``version``."""
@@ -218,7 +218,7 @@ class Guard:
 class RobotAdmission(Admission):
     """The guard at one robot's doors."""
 
-    asks = True
+    enforced = True
 
     def __init__(self, guard: Guard, name: str, robot: Robot) -> None:
         self._guard, self._name, self._robot = guard, name, robot
@@ -235,9 +235,9 @@ class RobotAdmission(Admission):
         robot.actions.guard(self._check_mover)
         robot.tap.listen(self._note_reply)
 
-    def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
+    def cached_identity(self, address: str, proof: Proof = NO_PROOF) -> str | None:
         """Return the client's identity if it is known without work, else None."""
-        return self._guard.known(address, proof)
+        return self._guard.cached_identity(address, proof)
 
     async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
         """Return the client's identity. Raises Unknown."""

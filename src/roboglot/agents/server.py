@@ -94,7 +94,7 @@ def make_server(console: ConsoleClient) -> MCPServer:
     return server
 
 
-async def _asked(answer: Awaitable[T]) -> T:
+async def _answer_of(answer: Awaitable[T]) -> T:
     """Return the console's answer; its refusal becomes the tool's error."""
     try:
         return await answer
@@ -110,22 +110,22 @@ class Tools:
 
     async def robots(self) -> list[dict[str, object]]:
         """List the robots with pose [x m, y m, yaw rad] and velocity."""
-        found: list[dict[str, object]] = await _asked(self._console.get(list, "robots"))
+        found: list[dict[str, object]] = await _answer_of(self._console.get(list, "robots"))
         return found
 
     async def where_am_i(self, robot: Robot = DEFAULT) -> dict[str, object]:
         """Return a robot's pose, actions, battery and faults, and who controls it."""
-        state: dict[str, object] = await _asked(self._console.get(dict, "robots", robot))
+        state: dict[str, object] = await _answer_of(self._console.get(dict, "robots", robot))
         keys = ("name", "pose", "velocity", "actions", "control", "faults", "battery", "place", "safety")
         return {key: state[key] for key in keys if key in state}
 
     async def look(self, robot: Robot = DEFAULT) -> Image:
         """Take a picture with the robot's camera."""
-        return Image(data=await _asked(self._console.fetch("robots", robot, "camera.jpg")), format="jpeg")
+        return Image(data=await _answer_of(self._console.fetch("robots", robot, "camera.jpg")), format="jpeg")
 
     async def map_picture(self, robot: Robot = DEFAULT) -> Image:
         """The robot's map from above, with the robot on it."""
-        return Image(data=await _asked(self._console.fetch("robots", robot, "map.png")), format="png")
+        return Image(data=await _answer_of(self._console.fetch("robots", robot, "map.png")), format="png")
 
     async def go_to(self, x: Meters, y: Meters, robot: Robot = DEFAULT, wait: Wait = 60.0) -> dict[str, object]:
         """Drive to a point of the map around obstacles; tells how it ended."""
@@ -145,14 +145,14 @@ class Tools:
 
     async def stop(self, robot: Robot = DEFAULT) -> str:
         """Stop everything that moves the robot, no matter who began it."""
-        await _asked(self._console.post(dict, "robots", robot, "stop", values={}))
+        await _answer_of(self._console.post(dict, "robots", robot, "stop", values={}))
         return "it stands"
 
     async def rehearse(self, plan: Plan, robot: Robot = DEFAULT) -> dict[str, object]:
         """Try a plan in a copy of the simulated world first: how each step ends, what the robot would hit, where it
         would go. The robot itself does not move. `safe` is true if all succeeds and nothing is touched."""
         steps = [step.model_dump() for step in plan]
-        found: dict[str, object] = await _asked(
+        found: dict[str, object] = await _answer_of(
             self._console.post(dict, "robots", robot, "rehearse", values={"steps": steps})
         )
         return found
@@ -164,11 +164,11 @@ class Tools:
         wait: Wait = 60.0,
     ) -> dict[str, object]:
         """Run a block program (restricted Python, docs/programs/language.md); its state and the lines it printed."""
-        run: dict[str, object] = await _asked(
+        run: dict[str, object] = await _answer_of(
             self._console.post(dict, "robots", robot, "program", values={"source": source})
         )
         async for _ in _beats(wait):
-            run = await _asked(self._console.get(dict, "robots", robot, "program"))
+            run = await _answer_of(self._console.get(dict, "robots", robot, "program"))
             if run["state"] not in ("run", "run_wait"):
                 break
         return run
@@ -181,25 +181,25 @@ class Tools:
     ) -> list[int]:
         """Break something of the simulation on purpose (needs the right to administer); the faults' numbers."""
         values = {"kind": kind, "robot": robot, "duration": seconds}
-        return (await _asked(self._console.post(_Faults, "world", "inject_fault", values=values))).result
+        return (await _answer_of(self._console.post(_Faults, "world", "inject_fault", values=values))).result
 
     async def clear_faults(self) -> str:
         """Mend everything that was broken on purpose."""
-        await _asked(self._console.post(dict, "world", "clear_fault", values={}))
+        await _answer_of(self._console.post(dict, "world", "clear_fault", values={}))
         return "mended"
 
     async def _act(self, robot: str, verb: str, values: Mapping[str, object], wait: float) -> dict[str, object]:
         """Start an action and wait for its end, at most ``wait`` s."""
-        begun = await _asked(self._console.post(_Begun, "robots", robot, verb, values=values))
+        begun = await _answer_of(self._console.post(_Begun, "robots", robot, verb, values=values))
         number = begun.result.action
         seen: dict[str, object] = {"id": number, "status": "ACCEPTED"}
         async for _ in _beats(wait):
-            state = await _asked(self._console.get(_State, "robots", robot))
+            state = await _answer_of(self._console.get(_State, "robots", robot))
             listed = [*state.actions, *state.history]
             seen = next((action for action in listed if action["id"] == number), seen)
             if seen["status"] in ("SUCCEEDED", "CANCELED", "ABORTED"):
                 break
-        pose = (await _asked(self._console.get(_State, "robots", robot))).pose
+        pose = (await _answer_of(self._console.get(_State, "robots", robot))).pose
         known = {key: seen[key] for key in ("id", "status", "reason") if key in seen}
         return known | {"pose": [None if value is None else round(value, 3) for value in pose]}
 

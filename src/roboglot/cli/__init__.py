@@ -100,7 +100,7 @@ def main() -> None:
     arguments = sys.argv[1:] or ["--help"]
     name = arguments[0]
     try:
-        _obey(name)
+        _run(name)
     except ModuleNotFoundError as missing:
         from roboglot.extras import explained
 
@@ -116,7 +116,7 @@ def main() -> None:
         sys.exit(1)
 
 
-def _obey(name: str) -> None:
+def _run(name: str) -> None:
     if name in ("--help", "-h"):
         _print_usage()
     elif name == "--version":

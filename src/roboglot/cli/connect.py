@@ -93,7 +93,9 @@ async def _keep_all(places: AbstractContextManager[Places], robots: dict[str, st
     """Keep each robot's ports on its address."""
     with places as known:
         tasks = [
-            asyncio.ensure_future(Dialling(known, name, token, address, partial(_ready, address), _say).keep(once=once))
+            asyncio.ensure_future(
+                Dialling(known, name, token, address, partial(_ready, address), _print).keep(once=once)
+            )
             for name, address in robots.items()
         ]
         try:
@@ -110,7 +112,7 @@ def _ready(address: str, robot: str, ports: list[int], fingerprint: str, new: bo
     print(f"ready: robot {robot} on {address}, ports {', '.join(map(str, ports))}", flush=True)
 
 
-def _say(line: str) -> None:
+def _print(line: str) -> None:
     print(f"roboglot connect: {visible(line)}", file=sys.stderr)
 
 

@@ -34,8 +34,8 @@ def warn_if_open(config: Config) -> None:
 def _open_doors(config: Config) -> str:
     """Name the doors that obey all clients, and those that demand something by themselves."""
     listening = [door for door in DOORS if door.listens(config)]
-    asking = [f"{door.title} asks for {door.asks}" for door in listening if door.asks]
-    return "; ".join([", ".join(door.title for door in listening if not door.asks), *asking])
+    asking = [f"{door.title} asks for {door.credentials}" for door in listening if door.credentials]
+    return "; ".join([", ".join(door.title for door in listening if not door.credentials), *asking])
 
 
 def announce(config: Config, endpoints: Mapping[str, Sequence[Endpoint]], page: str = "") -> None:

@@ -23,7 +23,6 @@ from roboglot.console.studio.plans import rehearse
 from roboglot.console.thumbnails import thumbnail
 from roboglot.console.verbs.maps import map_archive
 from roboglot.console.wire_log import readable
-from roboglot.misfits import misfit
 from roboglot.model.admission import Right, Unknown
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
@@ -42,6 +41,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
 from roboglot.programs.errors import ProgramError
 from roboglot.protocols.door import Endpoint
+from roboglot.validation import why_invalid
 
 T = TypeVar("T")
 STATUSES: list[tuple[type[Exception], int]] = [
@@ -91,7 +91,7 @@ class Api:
             case "GET", ["class"]:
                 await answer_json(send, self._classes.look())
             case "POST", ["class"]:
-                await answer_json(send, await self._classes.do(_wish(await read_json(receive), Wish)))
+                await answer_json(send, await self._classes.do(_decoded(await read_json(receive), Wish)))
             case "GET" | "POST", ["recording"]:
                 await answer_json(send, await self._serve_recording(method, receive))
             case _, ["robots", *_]:
@@ -137,7 +137,7 @@ class Api:
             self._desk.view(name, "look at the recording")
         if method == "GET":
             return recordings.look()
-        wish = _wish(await read_json(receive), RecordingWish)
+        wish = _decoded(await read_json(receive), RecordingWish)
         for robot in self._desk.robots.values():
             robot.admission.check(CLIENT, "record", Right.ADMIN)
         with self._desk.noting(f"record {wish.do}"):
@@ -224,11 +224,11 @@ class Api:
         return endpoint
 
 
-def _wish(values: Values[str, object], kind: type[T]) -> T:
+def _decoded(values: Values[str, object], kind: type[T]) -> T:
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
-        raise BadParameters(misfit(error, "the body")) from None
+        raise BadParameters(why_invalid(error, "the body")) from None
 
 
 def _nothing_here() -> Problem:

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from roboglot.console.settings import BODY_MAX, BODY_SECONDS_MAX
-from roboglot.misfits import misfit
+from roboglot.validation import why_invalid
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
@@ -53,7 +53,7 @@ async def read_json(receive: Receive) -> Mapping[str, object]:
     try:
         return msgspec.json.decode(body, type=dict) if body else {}
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise Problem(400, f"the body is not a JSON object: {misfit(error)}") from None
+        raise Problem(400, f"the body is not a JSON object: {why_invalid(error)}") from None
 
 
 async def answer(send: Send, status: int, content_type: bytes, body: bytes, more: Rows | None = None) -> None:

@@ -26,7 +26,7 @@ from roboglot.console.settings import (
 from roboglot.console.teleop import Pad, Velocity
 from roboglot.console.views import RobotView
 from roboglot.console.wire_log import rows
-from roboglot.model.client_context import ask_for, client, connection, identity
+from roboglot.model.client_context import client, connection, identity, set_client
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Right
 
@@ -219,7 +219,7 @@ class Page:
         name = name.strip()
         if not self._named and name.isprintable() and 0 < len(name) <= NAME_MAX:
             self._client = f"{CLIENT} {name}"
-            ask_for(self._client, connection(), identity())
+            set_client(self._client, connection(), identity())
         self._reply({"type": "you", "client": self._client})
 
     def _look_at(self, watch: Watch) -> None:

@@ -52,8 +52,8 @@ async def resend(exchange: Exchange, endpoint: Endpoint) -> Sequence[tuple[str, 
 
 async def _ask(line: Line, exchange: Exchange) -> Answers:
     if exchange.door == "robomaster" and not exchange.payload.startswith(SDK_MODE):
-        await line.ask("command", SDK_MODE, [b"ok;"])
-    return await line.ask(exchange.operation, exchange.payload, [b"{}"])
+        await line.request("command", SDK_MODE, [b"ok;"])
+    return await line.request(exchange.operation, exchange.payload, [b"{}"])
 
 
 async def _hold(line: Line) -> None:

@@ -109,7 +109,7 @@ class Console:
         state = ServerState()
         self._connections = state.connections
         loop = asyncio.get_running_loop()
-        asking = (robot.admission for robot in self._desk.robots.values() if robot.admission.asks)
+        asking = (robot.admission for robot in self._desk.robots.values() if robot.admission.enforced)
         self._gate = Gate(next(asking, Admission()), self._tls)
         end_vanished(listening)
         gated = self._gate.before(lambda: BoundedConnection(config, state, {}, loop), "console pages")

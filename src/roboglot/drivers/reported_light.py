@@ -32,7 +32,7 @@ class ReportedLight(ShownLight):
     async def send_zone(self, zone: str, state: ZoneState, lamp: int | None) -> None:
         """Set a zone, or one of its lamps (from 0), to ``state``. Raises ClientError."""
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Send the state of every zone. Raises RefusedByRobot if the robot has none of them."""
         refusal: RefusedByRobot | None = None
         for zone, count in tuple(self.zones.items()):

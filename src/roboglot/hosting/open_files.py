@@ -68,7 +68,7 @@ class OpenFiles:
     def explain(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """Handle exceptions of the loop: a shortage of files here, others as usual."""
         if ran_out(context.get("exception")):
-            self._say(full=True)
+            self._log(full=True)
         else:
             loop.default_exception_handler(context)
 
@@ -79,10 +79,10 @@ class OpenFiles:
             full = limit != resource.RLIM_INFINITY and len(os.listdir("/proc/self/fd")) >= limit - SPARE
         except OSError as error:
             full = ran_out(error)
-        self._say(full=full)
+        self._log(full=full)
         loop.call_later(PERIOD, self._look, loop)
 
-    def _say(self, *, full: bool) -> None:
+    def _log(self, *, full: bool) -> None:
         if full and not self._full:
             log.error("dropping new connections: %s", in_words())
         self._full = full

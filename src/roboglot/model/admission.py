@@ -1,6 +1,6 @@
 """Access control: every door asks it when a client connects and before each operation.
 
-Without access control, ``asks`` is false, and doors check nothing.
+Without access control, ``enforced`` is false, and doors check nothing.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ class LockedOut(Unknown):
 class Admission:
     """Admission to one robot. This base class admits every client, with all rights."""
 
-    asks = False
-    connections_max = 0  # per address, where ``asks``
+    enforced = False
+    connections_max = 0  # per address, where ``enforced``
 
-    def known(self, address: str, proof: Proof = NO_PROOF) -> str | None:
+    def cached_identity(self, address: str, proof: Proof = NO_PROOF) -> str | None:
         """Return the identity of the client at ``address`` ("10.0.0.7:40312") if it is cached; None: call ``admit``."""
         return ""
 

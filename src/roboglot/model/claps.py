@@ -30,7 +30,7 @@ class ClapCounter:
         self._count = 0
         self._last = -np.inf
 
-    def hear(self, block: SoundBlock) -> ClapsHeard | None:
+    def feed(self, block: SoundBlock) -> ClapsHeard | None:
         """Listen to the next block."""
         samples = block.samples[: len(block.samples) // WINDOW * WINDOW].reshape(-1, WINDOW)
         levels = np.sqrt(np.mean(np.square(samples, dtype=np.float64), axis=1))

@@ -16,7 +16,7 @@ _robot: ContextVar[str] = ContextVar("robot", default="")
 _identity: ContextVar[str] = ContextVar("identity", default="")
 
 
-def ask_for(client: str, connection: str = "", identity: str = "") -> None:
+def set_client(client: str, connection: str = "", identity: str = "") -> None:
     """Set the client ("slamware 10.0.0.7") of this task and of all that it starts.
 
     ``connection``: the client's address and port; ``identity``: the one that it proved.
@@ -42,8 +42,8 @@ def identity() -> str:
 
 
 @contextmanager
-def asking_for(client: str) -> Iterator[None]:
-    """``ask_for`` inside ``with``: for programs that drive robots in Python."""
+def acting_for(client: str) -> Iterator[None]:
+    """``set_client`` inside ``with``: for programs that drive robots in Python."""
     token = _client.set(client.strip()[:NAME_MAX])
     try:
         yield

@@ -2,7 +2,7 @@
 
 A door calls ``request`` when it has understood what a client asks, ``reply`` when it answers, ``push`` for what it
 sends by itself, each behind ``if tap.watched``: without followers that is the whole cost. The client's name is the one
-that the door gave with ``ask_for``. The driver of a real robot notes through a ``Line`` what it asks that robot and
+that the door gave with ``set_client``. The driver of a real robot notes through a ``Line`` what it asks that robot and
 hears from it, as the door ``driver/NAME``.
 """
 

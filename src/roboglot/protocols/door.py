@@ -185,8 +185,8 @@ class DoorType:
 
     ``config`` is the type of its section in the configuration, a dataclass whose defaults suffice. ``contracts`` are
     the yardsticks of coverage; the first one's keys are those of ``table``, the operations that clients may ask for.
-    ``provides``: it leaves something at the site for the other doors, so it is opened before them. ``asks``: what it
-    demands of every client by itself; empty: nothing.
+    ``provides``: it sets parts of the site that other doors use, so it is opened first. ``credentials``: those that it
+    demands of every client by itself; empty: none.
     """
 
     name: str
@@ -198,7 +198,7 @@ class DoorType:
     open: Callable[[Any, Site], Door]
     options: tuple[Option, ...] = ()
     provides: bool = False
-    asks: str = ""
+    credentials: str = ""
 
     def section(self, config: Config) -> object:
         """Return the door's own settings, the defaults where the configuration has no such section."""

@@ -1,6 +1,6 @@
 """Gate in front of a robot's ports: counts and meters connections, admits by address, and disconnects on revocation.
 
-With open access (``admission.asks`` is false), only TLS, if configured, stands in front of a port.
+With open access (``admission.enforced`` is false), only TLS, if configured, stands in front of a port.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import partial
 from typing import NamedTuple, cast
 
 from roboglot.model.admission import Admission, Forbidden, Right
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.transport.connections import Connections
 from roboglot.transport.listening import listen
 from roboglot.transport.metered import Metered
@@ -51,7 +51,7 @@ class Gate:
         """
         if self._tls is not None:
             factory = partial(TlsPort, factory, self._tls, self._admission.may_shake_hands)
-        if not self._admission.asks:
+        if not self._admission.enforced:
             return factory
         if self._leave is None:
             self._leave = self._admission.on_lost(self._cut_off)
@@ -86,11 +86,11 @@ class Gate:
         """Return the client's identity, or its host if unknown; None if it is not admitted."""
         peer = transport.get_extra_info("peername") or ("", 0)
         address, admission = f"{peer[0]}:{peer[1]}", self._admission
-        who = admission.known(address)
+        who = admission.cached_identity(address)
         door = port.name.partition(" ")[0]
 
         def check(right: Right) -> None:
-            ask_for(f"{door} {who or peer[0]}", address, who or "")
+            set_client(f"{door} {who or peer[0]}", address, who or "")
             admission.check(door, f"connect to {port.name}", right)
 
         if port.right is not None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, cast
 
 from roboglot.model.admission import Admission
 from roboglot.model.background import load
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.channels import Channel, Session
 from roboglot.protocols.gate import Gate
@@ -198,7 +198,7 @@ class Connection(asyncio.Protocol):
             self._read(opened.protocol, opened.early)
 
     def _open_session(self, channel: Channel) -> Session:
-        ask_for(self.who, self._name, self.identity)
+        set_client(self.who, self._name, self.identity)
         return channel.open(self)
 
     def _read(self, protocol: ServerProtocol, data: bytes) -> None:
@@ -233,7 +233,7 @@ class Connection(asyncio.Protocol):
             self._transport.pause_reading()
 
     async def _receive(self, session: Session, message: str | bytes) -> None:
-        ask_for(self.who, self._name, self.identity)
+        set_client(self.who, self._name, self.identity)
         await session.receive(message)
 
     def _wait_for(self, work: Awaitable[None]) -> None:

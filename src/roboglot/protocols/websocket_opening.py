@@ -10,7 +10,7 @@ from http import HTTPStatus
 from typing import TYPE_CHECKING
 
 from roboglot.model.admission import NO_PROOF, Admission, Forbidden, Proof, ProofKind, Unknown
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.protocols.browsers import Browsers, of_texts
 from roboglot.protocols.channels import Channel
 from roboglot.protocols.websocket_writer import Writer
@@ -117,7 +117,7 @@ class Opening:
             self._writer.flush(protocol)
         elif refusal := entrance.browsers.refusal(of_texts(headers, "GET")):
             self._refuse(protocol, HTTPStatus.FORBIDDEN, refusal)
-        elif not entrance.admission.asks:
+        elif not entrance.admission.enforced:
             self._accept(protocol, request, channel)
         else:
             self._authenticate(protocol, request, channel, headers.get("authorization", ""))
@@ -125,7 +125,7 @@ class Opening:
     def _authenticate(self, protocol: ServerProtocol, request: Request, channel: Channel, authorization: str) -> None:
         """Identify the client, in the background if that takes time."""
         proof = Proof(ProofKind.HTTP, authorization) if authorization else NO_PROOF
-        who = self._entrance.admission.known(self._name, proof)
+        who = self._entrance.admission.cached_identity(self._name, proof)
         if who is not None:
             self._authorize(protocol, request, channel, who)
         else:
@@ -152,7 +152,7 @@ class Opening:
     def _check_right(self, operation: str, channel: Channel, who: str) -> None:
         """Raise Forbidden if the client may not open the channel."""
         door = self._entrance.door
-        ask_for(f"{door} {who or self._host}", self._name, who)
+        set_client(f"{door} {who or self._host}", self._name, who)
         self._entrance.admission.check(door, operation, channel.right)
 
     def _accept(self, protocol: ServerProtocol, request: Request, channel: Channel, who: str = "") -> None:

@@ -63,7 +63,7 @@ class Inputs:
         self._patience = HEARD_SECONDS_MAX
         self.unheard: list[str] = []  # inputs without effect, described
 
-    def hear(self, exchange: Exchange) -> None:
+    def count(self, exchange: Exchange) -> None:
         """Count an exchange; a listener for the robots' taps."""
         self._heard[exchange.robot, exchange.door, exchange.direction] += 1
 
@@ -145,7 +145,7 @@ class Inputs:
         if line is None:
             return
         answers = () if isinstance(line, DRAINED) else [reply.payload for reply in asked.replies]
-        call = self._follow(line.ask(request.operation, request.payload, answers))
+        call = self._follow(line.request(request.operation, request.payload, answers))
         self._calls[place, request.operation, request.stamp] = call
         wanted: dict[Key, int] = {(robot, door, Direction.REQUEST): requests + 1}
         wanted[robot, door, Direction.REPLY] = replies + at_once

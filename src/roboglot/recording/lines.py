@@ -64,7 +64,7 @@ class Line(ABC):
         """Connect."""
 
     @abstractmethod
-    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
         """Send one request; ``answers``: the recorded ones, for the number and kind to expect."""
 
     @abstractmethod
@@ -80,7 +80,7 @@ class RestLine(Line):
 
         self._link = HttpLink(self.host, self.port, self.clock)
 
-    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
         head, _, body = payload.partition(b"\n\n")
         method, _, path = head.decode("latin-1").partition(" ")
         kind = "application/json" if body[:1] in (b"{", b"[", b"") else "application/octet-stream"
@@ -102,7 +102,7 @@ class TextLine(Line):
         except (OSError, TimeoutError) as error:
             raise LinkLost(f"{self.host}:{self.port} cannot be reached: {error}") from None
 
-    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
         self._writer.write(payload.rstrip(b" ;") + b";")
         if not answers:
             return []
@@ -144,7 +144,7 @@ class DogLine(Line):
         )
         await self._link.open()
 
-    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
         found: Answers = []
         if not operation.isdigit():
             return found
@@ -174,7 +174,7 @@ class FrameLine(Line):
         self._draining: list[asyncio.Task[None]] | None = None
         await self._socket(self.path)
 
-    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
         path = operation if operation.startswith("/") else FRAMES
         socket = await self._socket(path)
         await socket.send(payload.decode("utf-8", "replace"))
@@ -264,7 +264,7 @@ class FoxgloveLine(Line):
         message = await self.clock.wait_for(self._socket.recv(), PATIENCE)
         return message if isinstance(message, str) else ""
 
-    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
         from websockets.exceptions import WebSocketException
 
         binary = payload[:1] in BINARY

@@ -79,7 +79,7 @@ class Replay:
         began = self._clock.time()
         try:
             recorded = [reply.payload for reply in asked.replies]
-            answers = await line.ask(request.operation, self._renamed(request.payload), recorded)
+            answers = await line.request(request.operation, self._renamed(request.payload), recorded)
         except ClientError as error:
             if isinstance(error, LinkLost):
                 self._lost = self._lost or error

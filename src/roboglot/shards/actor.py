@@ -94,7 +94,7 @@ class ShardActor:
     def look(self, known: int) -> bytes:
         """Return the encoded Condition. ``known``: the run whose ``ready`` the client has."""
         with self._turn:
-            self._hear()
+            self._receive()
             lines = [self._lines.kept.popleft() for _ in range(len(self._lines.kept))]
             serving, up = self._serving.is_alive(), self._ready is not None
             told = (None if known == self._run else self._ready, self._beat, self._refusal)
@@ -117,12 +117,12 @@ class ShardActor:
             logging.getLogger(__name__).exception("the shard ended")
         finally:
             with self._turn:
-                self._hear()
+                self._receive()
             if not self._stopping and not (self._refusal and self._refusal.lasting):
                 time.sleep(AGAIN_SECONDS)
                 os._exit(EXIT_ENDED)  # Ray restarts the actor
 
-    def _hear(self) -> None:
+    def _receive(self) -> None:
         """Read the messages that the shard has sent since the last call."""
         while not self._stopping:
             try:

@@ -108,7 +108,7 @@ class _Link:
             self._world = hello.world
             mine = self._room.worlds[hello.world] = World(hello.world, hello.page, self._stop, self._end)
             while text := await reader.readline():
-                await self._hear(_decode(text))
+                await self._on_message(_decode(text))
         except (OSError, ValueError, msgspec.MsgspecError, RecursionError) as error:
             log.warning("disconnected world %s: %s", self._world, error)
         finally:
@@ -122,7 +122,7 @@ class _Link:
                 task.cancel()
             self._writer.transport.abort()
 
-    async def _hear(self, message: ToRoom) -> None:
+    async def _on_message(self, message: ToRoom) -> None:
         match message:
             case Opened() | Closed():
                 await self._change(message)
@@ -167,14 +167,14 @@ class _Link:
 
     def _take(self, seat: Seat, wished: Wished) -> None:
         if len(self._pending) >= PENDING_MAX:
-            seat.tell({"type": "refused", "id": wished.wish.id, "why": "too much is being answered"})
+            seat.post({"type": "refused", "id": wished.wish.id, "why": "too much is being answered"})
             return
 
         async def take() -> None:
             try:
                 await seat.take(wished.wish, may_teach=wished.may_teach)
             except (RobotError, ValueError) as error:
-                seat.tell({"type": "refused", "id": wished.wish.id, "why": str(error)})
+                seat.post({"type": "refused", "id": wished.wish.id, "why": str(error)})
 
         self._begin(take(), f"class {wished.wish.do}")
 

@@ -91,7 +91,7 @@ class Forks:
         nursery, self._launched = self._launched or launch(), None
         self._process, self._control = nursery
         self._control.setblocking(False)
-        asyncio.get_running_loop().add_reader(self._control, self._hear)
+        asyncio.get_running_loop().add_reader(self._control, self._receive)
 
     async def warm(self) -> float:
         """Wait until the nursery can fork; return its loading time, s. Raises NotWarm."""
@@ -127,7 +127,7 @@ class Forks:
         if self._process is not None:
             await asyncio.to_thread(self._process.wait)
 
-    def _hear(self) -> None:
+    def _receive(self) -> None:
         assert self._control is not None
         try:
             packet = self._control.recv(MESSAGE_MAX)

@@ -189,11 +189,11 @@ class Supervisor:
             shard.reason = f"{error.filename or shard.folder}: {error.strerror or error}"
             self._failed(shard)
             return
-        self._loop.add_reader(shard.link, self._hear, shard)
+        self._loop.add_reader(shard.link, self._receive, shard)
         shard.heard, shard.ready, shard.beat = self._loop.time(), None, Beat(0.0, 0, 0.0)
         self._turn_to(shard, State.STARTING)
 
-    def _hear(self, shard: Shard) -> bool:
+    def _receive(self, shard: Shard) -> bool:
         """Handle one packet; return False if there is none."""
         if shard.link is None:
             return False
@@ -223,7 +223,7 @@ class Supervisor:
 
     def _dead(self, number: int, status: int) -> None:
         shard = self._by_number[number]
-        while self._hear(shard):  # its last message
+        while self._receive(shard):  # its last message
             pass
         self._unlink(shard)
         shard.pid = 0

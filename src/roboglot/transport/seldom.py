@@ -18,17 +18,17 @@ class Seldom:
 
     def warning(self, key: str, message: str, *values: object) -> None:
         """Warn, once in PERIOD for each ``key``."""
-        self._say(logging.WARNING, key, message, values)
+        self._emit(logging.WARNING, key, message, values)
 
     def error(self, key: str, message: str, *values: object) -> None:
         """Log an error with the traceback at hand, once in PERIOD for each ``key``."""
-        self._say(logging.ERROR, key, message, values, traceback=True)
+        self._emit(logging.ERROR, key, message, values, traceback=True)
 
     def info(self, key: str, message: str, *values: object) -> None:
         """Log an information, once in PERIOD for each ``key``."""
-        self._say(logging.INFO, key, message, values)
+        self._emit(logging.INFO, key, message, values)
 
-    def _say(self, level: int, key: str, message: str, values: tuple[object, ...], *, traceback: bool = False) -> None:
+    def _emit(self, level: int, key: str, message: str, values: tuple[object, ...], *, traceback: bool = False) -> None:
         now = time.monotonic()
         new = now - self._said.get(key, -PERIOD) >= PERIOD
         if new:

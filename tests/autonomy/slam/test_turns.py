@@ -26,14 +26,14 @@ def scan(stamp: float) -> ScanTaken:
 async def test_no_scan_that_waits_is_lost() -> None:
     clock, taken = RealClock(), list[float]()
     turns = Turns(clock, lambda event: taken.append(event.stamp))
-    turns.hear(scan(1.0))
+    turns.put(scan(1.0))
     assert taken == []
-    turns.hear(scan(2.0))
-    turns.hear(scan(3.0))
+    turns.put(scan(2.0))
+    turns.put(scan(3.0))
     assert taken == [1.0, 2.0]  # turns are late: pending scans are taken before the next one
     await asyncio.sleep(0)
     assert taken == [1.0, 2.0, 3.0]
-    turns.hear(scan(4.0))
+    turns.put(scan(4.0))
     turns.close()
     await asyncio.sleep(0)
     assert taken == [1.0, 2.0, 3.0]
@@ -41,7 +41,7 @@ async def test_no_scan_that_waits_is_lost() -> None:
 
 async def test_scans_are_taken_at_once_in_lockstep() -> None:
     taken = list[float]()
-    Turns(LockstepClock(), lambda event: taken.append(event.stamp)).hear(scan(1.0))
+    Turns(LockstepClock(), lambda event: taken.append(event.stamp)).put(scan(1.0))
     assert taken == [1.0]
 
 

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.conditions import Interface
 from roboglot.programs.language import Problem, ProblemKind
 from roboglot.programs.library.modules import (
     ModuleOperation,
@@ -17,6 +16,7 @@ from roboglot.programs.library.modules import (
     in_the_body,
     next_module_state,
 )
+from roboglot.task_conditions import Interface
 
 # The vendor's words, shortened: 空状态, 错误状态, 正常状态, 非法操作.
 WORDS = {"空": "null", "错": "error", "正": "normal"}

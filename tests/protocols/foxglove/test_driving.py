@@ -146,7 +146,7 @@ async def test_control_that_another_took_is_respected(scene: Scene) -> None:
 class Visitors(Admission):
     """Lets all see and nothing else."""
 
-    asks = True
+    enforced = True
     connections_max = 10
 
     def check(self, door: str, operation: str, right: Right | None) -> None:  # noqa: ARG002

@@ -77,7 +77,7 @@ async def test_end_of_an_overlong_line_is_no_line(client) -> None:
 async def test_client_that_says_many_lines_fills_no_memory(client, door) -> None:
     for number in range(limits.LINES_MAX + 5):
         assert await client.ask(f"robot mode ? seq {number};") == f"chassis_lead seq {number} ;"
-    assert len(door.context.said) <= limits.LINES_MAX
+    assert len(door.context.repeated) <= limits.LINES_MAX
 
 
 async def test_repeated_lines_count_in_the_share(connect, robot) -> None:

@@ -49,7 +49,7 @@ def session_of(lab: Lab, profile: str) -> Context:
         video=MediaPort(lab.robot, VideoStream),
         audio=MediaPort(lab.robot, AudioStream),
         push=lambda _datagram, _host: None,
-        tell=lambda _event: None,
+        send_event=lambda _event: None,
     )
     return Context(lab.robot, PROFILES[profile], outlets)
 

@@ -59,7 +59,7 @@ async def test_the_door_stops_what_a_lost_client_drives(
     """The same without a cable: its host answers echoes, then no more; the test looks when it likes."""
     answering = {"127.0.0.1"}
     monkeypatch.setattr(DrivingClient, "askable", True)
-    monkeypatch.setattr(Echoes, "heard", lambda _self: set(answering))
+    monkeypatch.setattr(Echoes, "answered", lambda _self: set(answering))
     monkeypatch.setattr(Vigil, "_plan", lambda _self: None)
     client = await connect()
 

@@ -18,8 +18,8 @@ from roboglot.wire.robomaster.telemetry import (
     Target,
     TargetsSeen,
     broadcast_of,
-    hear,
     number_of,
+    parse_pushes,
 )
 
 
@@ -28,7 +28,7 @@ def test_a_captured_datagram() -> None:
         b"chassis push attitude -0.894 -0.117 0.423 ; status 0 1 0 0 0 0 0 0 0 0 0 ;gimbal push attitude -0.300 -0.100 "
         b";chassis push position 0.001 0.000 ; attitude -0.892 -0.115 0.422 ;"
     )
-    assert list(hear(data)) == [
+    assert list(parse_pushes(data)) == [
         ChassisAttitude(-0.894, -0.117, 0.423),
         ChassisStatus(False, True, *[False] * 9),
         GimbalAttitude(-0.3, -0.1),
@@ -41,17 +41,19 @@ def test_captured_events() -> None:
     data = (
         b"armor event hit 1 0 ;armor event hit 2 1 ;sound event applause 2 ;sensor_adapter event io_level (1, 2, 0);;"
     )
-    assert list(hear(data)) == [ArmorHit(1, 0), ArmorHit(2, 1), Applause(2), AdapterLevel(1, 2, 0)]
-    assert list(hear(b"game msg push [0, 6, 1, 0, 0, 255, 1, 87];")) == [GameInput(0, (1, 0, 0, 255, 1, 87))]
+    assert list(parse_pushes(data)) == [ArmorHit(1, 0), ArmorHit(2, 1), Applause(2), AdapterLevel(1, 2, 0)]
+    assert list(parse_pushes(b"game msg push [0, 6, 1, 0, 0, 255, 1, 87];")) == [GameInput(0, (1, 0, 0, 255, 1, 87))]
 
 
 def test_what_is_seen() -> None:
-    assert list(hear(b"AI push person 1 0.5 0.5 0.3 0.7;")) == [TargetsSeen("person", (Target(0.5, 0.5, 0.3, 0.7),))]
-    assert list(hear(b"AI push people 0 pose 1 4 0.1 0.2 0.3 0.4 ;;")) == [
+    assert list(parse_pushes(b"AI push person 1 0.5 0.5 0.3 0.7;")) == [
+        TargetsSeen("person", (Target(0.5, 0.5, 0.3, 0.7),))
+    ]
+    assert list(parse_pushes(b"AI push people 0 pose 1 4 0.1 0.2 0.3 0.4 ;;")) == [
         TargetsSeen("person", ()),
         TargetsSeen("gesture", (Target(0.1, 0.2, 0.3, 0.4, info=4),)),
     ]
-    (lines,) = hear(b"AI push line 1 " + b"0.1 0.2 30 4 " * 10 + b";")
+    (lines,) = parse_pushes(b"AI push line 1 " + b"0.1 0.2 30 4 " * 10 + b";")
     assert isinstance(lines, LinesSeen)
     assert [len(line) for line in lines.lines] == [10]
     assert lines.lines[0][9].tangent == 30
@@ -60,7 +62,7 @@ def test_what_is_seen() -> None:
 @pytest.mark.parametrize("profile", [SPEC, FW60, FW70], ids=lambda profile: profile.name)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2), st.tuples(*[st.floats(-1e6, 1e6)] * 3))
 def test_what_our_robots_say_is_understood(profile: Profile, xy: list[float], angles: tuple[float, ...]) -> None:
-    position, attitude = hear(profile.push("chassis", ("position", xy), ("attitude", angles), separator=" ; "))
+    position, attitude = parse_pushes(profile.push("chassis", ("position", xy), ("attitude", angles), separator=" ; "))
     assert isinstance(position, ChassisPosition)
     assert isinstance(attitude, ChassisAttitude)
     assert (position.x, position.y) == pytest.approx(xy, abs=6e-4)
@@ -73,7 +75,7 @@ words = st.sampled_from([b"line 1 ", b"person -1 ", b"999999999999 ", b"nan ", b
 
 @given(st.lists(st.one_of(heads, words, st.binary(max_size=9)), max_size=40))
 def test_nothing_breaks_it(parts: list[bytes]) -> None:
-    list(hear(b"".join(parts)))
+    list(parse_pushes(b"".join(parts)))
     broadcast_of(b"robot ip " + b"".join(parts))
 
 
@@ -95,6 +97,6 @@ def test_broadcasts(data: bytes, address: str | None) -> None:
 @pytest.mark.parametrize("number", ["nan", "inf", "-1e999", "1e10"])
 def test_what_is_no_number_is_left_out(number: str) -> None:
     for text in (f"chassis push attitude 0 {number} 0;", f"AI push people 1 {number} 0.5 0.5 0.5;"):
-        assert list(hear(f"{text}chassis push position 1 2;".encode())) == [ChassisPosition(1, 2)]
+        assert list(parse_pushes(f"{text}chassis push position 1 2;".encode())) == [ChassisPosition(1, 2)]
     with pytest.raises(ValueError, match="no number"):
         number_of(number)

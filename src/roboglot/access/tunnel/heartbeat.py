@@ -25,7 +25,7 @@ class Look(NamedTuple):
 
 
 class Heartbeat:
-    """Call ``hear`` for everything received, and ``look`` again after each look's pause. Times in s, from any zero."""
+    """Call ``note_life`` for all that is received, and ``look`` again after each look's pause. Times in s."""
 
     def __init__(self, now: float) -> None:
         self.heard = self._heard_beside = self._looked = now
@@ -35,13 +35,13 @@ class Heartbeat:
         self._patient_until = 0.0
         self._looks = 0  # in a row in which the other end was silent
 
-    def hear(self, now: float, *, quick: bool = False) -> None:
+    def note_life(self, now: float, *, quick: bool = False) -> None:
         """Note a sign of life of the other end; ``quick``: it wants quick beats."""
         self.heard = now
         if quick:
             self.quick_until = now + QUICK_SECONDS
 
-    def hear_beside(self, now: float) -> None:
+    def note_life_beside(self, now: float) -> None:
         """Note a sign of life on the second connection."""
         self._heard_beside = now
 

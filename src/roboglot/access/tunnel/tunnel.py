@@ -56,7 +56,7 @@ class Tunnel:
 
     async def run(self) -> None:
         """Carry data until the tunnel is lost, then end every stream. Raises TunnelLost."""
-        self._heart.hear(self._loop.time())
+        self._heart.note_life(self._loop.time())
         beat = asyncio.ensure_future(self._beat())
         try:
             self._link.follow(self._take, self._crowd)
@@ -127,7 +127,7 @@ class Tunnel:
     def _take_beat(self, kind: FrameKind, _number: int, _payload: bytes) -> None:
         if kind is not FrameKind.PING:
             raise BadFrame("this connection carries only heartbeats")
-        self._heart.hear_beside(self._loop.time())
+        self._heart.note_life_beside(self._loop.time())
 
     def _take(self, kind: FrameKind, number: int, payload: bytes) -> None:
         self._heart.heard = self._loop.time()
@@ -145,7 +145,7 @@ class Tunnel:
                 raise BadFrame("too many streams")
             self._open(number, PORT.unpack(payload)[0])
         elif kind is FrameKind.PING and payload == QUICK:
-            self._heart.hear(self._heart.heard, quick=True)
+            self._heart.note_life(self._heart.heard, quick=True)
         elif kind is FrameKind.DATAGRAM and len(payload) >= PORT.size:
             self._datagram(PORT.unpack_from(payload)[0], payload[PORT.size :])
 

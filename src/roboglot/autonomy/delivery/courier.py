@@ -9,12 +9,12 @@ from collections.abc import Coroutine
 from roboglot.autonomy.delivery.delivery_round import Round
 from roboglot.autonomy.delivery.drive import DeliveryDrive, Failed
 from roboglot.autonomy.delivery.follow_up import follow_up
-from roboglot.autonomy.delivery.handover import Ears
+from roboglot.autonomy.delivery.handover import Signals
 from roboglot.autonomy.delivery.order_book import OrderBook
 from roboglot.autonomy.delivery.readiness import Readiness
 from roboglot.autonomy.delivery.rules import PARKING, place_of_type
 from roboglot.model.admission import Right
-from roboglot.model.client_context import ask_for, client
+from roboglot.model.client_context import client, set_client
 from roboglot.model.components.logistics.delivery import Failure, Order, OrderKind, OrderStatus, Phase, Policy
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.errors import RobotError
@@ -29,8 +29,8 @@ BASE_LOOK = 1.0  # s between two checks whether another client still drives the 
 class Courier:
     """Worker on the book from the first ``wake`` to ``close``. ``changing``: held to add or cancel orders."""
 
-    def __init__(self, robot: Robot, book: OrderBook, driver: DeliveryDrive, ears: Ears) -> None:
-        self._robot, self._book, self._driver, self._ears = robot, book, driver, ears
+    def __init__(self, robot: Robot, book: OrderBook, driver: DeliveryDrive, signals: Signals) -> None:
+        self._robot, self._book, self._driver, self._signals = robot, book, driver, signals
         self.changing = asyncio.Lock()
         self.readiness = Readiness(robot, self, driver.report)
         self.phase = Phase.IDLE
@@ -133,7 +133,7 @@ class Courier:
             return
 
     async def _carry_out(self, order: Order) -> None:
-        ask_for(order.client, identity=order.owner)
+        set_client(order.client, identity=order.owner)
         if order.owner and not self._robot.admission.may(Right.DRIVE):  # lost while the program was down
             await self.call_off(order, Failure.REFUSED)
             return
@@ -144,7 +144,7 @@ class Courier:
         self._driver.report(DeliveryNews.STATION_STARTED if station else DeliveryNews.ORDER_STARTED)
         failure: Failure | None = None
         try:
-            if await self._do(Round(self._robot, self._book, self._driver, self._ears, order).run()):
+            if await self._do(Round(self._robot, self._book, self._driver, self._signals, order).run()):
                 status = OrderStatus.SUCCEEDED
             else:
                 status = OrderStatus.CANCELED
@@ -177,7 +177,7 @@ class Courier:
 
     async def _rest(self) -> None:
         """Drive to the parking place, or onto the dock off work and with a low battery."""
-        ask_for(client())  # the robot's own decision: the last order's client may have lost its right
+        set_client(client())  # the robot's own decision: the last order's client may have lost its right
         robot, readiness = self._robot, self.readiness
         readiness.rest_due = False
         docked = readiness.docked

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Unpack
 
 from roboglot.autonomy.delivery.drive import DeliveryDrive, Failed
-from roboglot.autonomy.delivery.handover import Ears, Handover, Signal
+from roboglot.autonomy.delivery.handover import Handover, Signal, Signals
 from roboglot.autonomy.delivery.order_book import OrderBook, OrderChanges
 from roboglot.model.components.logistics.cargo import Cargo
 from roboglot.model.components.logistics.delivery import (
@@ -23,8 +23,8 @@ from roboglot.model.robot import Robot
 class Round:
     """Execution of ``order``, with its progress written to the book."""
 
-    def __init__(self, robot: Robot, book: OrderBook, driver: DeliveryDrive, ears: Ears, order: Order) -> None:
-        self._robot, self._book, self._driver, self._ears = robot, book, driver, ears
+    def __init__(self, robot: Robot, book: OrderBook, driver: DeliveryDrive, signals: Signals, order: Order) -> None:
+        self._robot, self._book, self._driver, self._signals = robot, book, driver, signals
         self._order = order
 
     async def run(self) -> None:
@@ -74,7 +74,10 @@ class Round:
         await self._set(stage=OrderStage.DRIVING_TO_STOP, stop=stop)
         await self._driver.go_to(stop, policy, policy.delivery_speed)
         await self._set(stage=OrderStage.AT_STOP)
-        done = await self._ears.hear(Signal.OPERATION_DONE, seconds=seconds or policy.pickup_seconds) or seconds > 0.0
+        done = (
+            await self._signals.wait_for(Signal.OPERATION_DONE, seconds=seconds or policy.pickup_seconds)
+            or seconds > 0.0
+        )
         await self._note(PickUp(stop=stop, failure=None if done else Failure.NOT_TAKEN))
 
     async def _meet(self) -> None:
@@ -84,9 +87,9 @@ class Round:
                 return
             case OrderKind.ROUND:
                 seconds = self._wait(len(self._order.request.stops))
-                await self._ears.hear(Signal.OPERATION_DONE, seconds=seconds or policy.pickup_seconds)
+                await self._signals.wait_for(Signal.OPERATION_DONE, seconds=seconds or policy.pickup_seconds)
             case OrderKind.FOOD | OrderKind.RECYCLE:
-                served = await self._ears.hear(Signal.END, Signal.OPERATION_DONE, seconds=policy.food_seconds)
+                served = await self._signals.wait_for(Signal.END, Signal.OPERATION_DONE, seconds=policy.food_seconds)
                 if not served and kind is OrderKind.FOOD:
                     raise Failed(Failure.NOT_TAKEN)
             case OrderKind.DISTRIBUTE:
@@ -99,7 +102,7 @@ class Round:
         done = {result.box for result in order.results if result.box}
         left = [box for box in order.request.boxes if box not in done]
         seconds = policy.collect_seconds if order.request.kind is OrderKind.COLLECT else policy.pickup_seconds
-        if not await self._ears.hear(Signal.START, seconds=seconds):
+        if not await self._signals.wait_for(Signal.START, seconds=seconds):
             for box in left:
                 await self._note(PickUp(box, failure=Failure.NOT_TAKEN))
             return
@@ -122,7 +125,7 @@ class Round:
                     raise Failed(failure)
 
     def _handover(self) -> Handover:
-        return Handover(self._robot, self._ears, self._note, self._book.policy.door_seconds)
+        return Handover(self._robot, self._signals, self._note, self._book.policy.door_seconds)
 
     async def _note(self, result: PickUp) -> None:
         results = tuple(r for r in self._order.results if (r.box, r.stop) != (result.box, result.stop))

@@ -27,7 +27,7 @@ class Signal(Enum):
     OPERATION_DONE = "operation done"
 
 
-class Ears:
+class Signals:
     """Receiver of one awaited signal at a time."""
 
     def __init__(self, robot: Robot) -> None:
@@ -41,7 +41,7 @@ class Ears:
             raise Refused("the robot does not wait for that now")
         self._heard.set_result(None)
 
-    async def hear(self, *signals: Signal, seconds: float) -> bool:
+    async def wait_for(self, *signals: Signal, seconds: float) -> bool:
         """Wait for one of the signals; return False after ``seconds``."""
         self._awaited, self._heard = signals, asyncio.get_running_loop().create_future()
         try:
@@ -56,8 +56,8 @@ class Ears:
 class Handover:
     """Handover of boxes at one place. ``note`` is called with each box's result."""
 
-    def __init__(self, robot: Robot, ears: Ears, note: Note, door_seconds: float) -> None:
-        self._robot, self._ears, self._note = robot, ears, note
+    def __init__(self, robot: Robot, signals: Signals, note: Note, door_seconds: float) -> None:
+        self._robot, self._signals, self._note = robot, signals, note
         self._door_seconds = door_seconds
 
     async def one_by_one(self, boxes: Sequence[BoxChoice], *, opened: bool) -> None:
@@ -70,7 +70,7 @@ class Handover:
 
     async def all_at_once(self, boxes: Sequence[BoxChoice]) -> None:
         """Wait while people use the open boxes, then close them all."""
-        done = await self._ears.hear(Signal.END, seconds=self._door_seconds)
+        done = await self._signals.wait_for(Signal.END, seconds=self._door_seconds)
         for choice in boxes:
             failure = None if done or self._empty(choice) else Failure.NOT_TAKEN
             await self._note(PickUp(choice, failure=await self.shut(choice) or failure))
@@ -120,7 +120,7 @@ class Handover:
 
         stop = self._robot.events.listen(BoxChanged, look)
         try:
-            done = await self._ears.hear(Signal.END, seconds=self._door_seconds)
+            done = await self._signals.wait_for(Signal.END, seconds=self._door_seconds)
         finally:
             stop()
         taken = was_open and (done or self._empty(choice))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from roboglot.autonomy.delivery.courier import Courier
 from roboglot.autonomy.delivery.drive import DeliveryDrive
-from roboglot.autonomy.delivery.handover import Ears, Signal
+from roboglot.autonomy.delivery.handover import Signal, Signals
 from roboglot.autonomy.delivery.order_book import OrderBook
 from roboglot.autonomy.delivery.rules import BOXED, check_requests
 from roboglot.model.components.logistics.delivery import (
@@ -30,9 +30,9 @@ class QueueDelivery(Delivery):
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._book = OrderBook(robot)
-        self._driver, self._ears = DeliveryDrive(robot), Ears(robot)
+        self._driver, self._signals = DeliveryDrive(robot), Signals(robot)
         self._driver.hold(self._book.held)
-        self._courier = Courier(robot, self._book, self._driver, self._ears)
+        self._courier = Courier(robot, self._book, self._driver, self._signals)
 
     def start(self) -> None:
         """Resume the orders in the book."""
@@ -114,10 +114,10 @@ class QueueDelivery(Delivery):
             return
         if order and order.stage is OrderStage.AT_TARGET and order.request.kind in (OrderKind.FOOD, OrderKind.RECYCLE):
             return
-        self._ears.receive(Signal.START)
+        self._signals.receive(Signal.START)
 
     async def end_pickup(self) -> None:
-        self._ears.receive(Signal.END)
+        self._signals.receive(Signal.END)
 
     async def end_operation(self) -> None:
-        self._ears.receive(Signal.OPERATION_DONE)
+        self._signals.receive(Signal.OPERATION_DONE)

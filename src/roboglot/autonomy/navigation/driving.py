@@ -146,11 +146,11 @@ class OdometryDriving(Driving):
         moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source)
         if before is not None:  # it was cancelled just now and stops nothing
             before.action.hands_over = True
-            moving.minding = asyncio.get_running_loop().create_task(self._mind(moving), name="taking over a move")
+            moving.minding = asyncio.get_running_loop().create_task(self._supervise(moving), name="taking over a move")
         self._moving = moving
         return moving.action
 
-    async def _mind(self, moving: _Moving) -> None:
+    async def _supervise(self, moving: _Moving) -> None:
         """Brake for a move that was cancelled before it could take over another's motion."""
         await moving.action.done()
         if not moving.begun:

@@ -108,7 +108,7 @@ class Look:
 
 def supported(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Support:
     """Return the map's support for ``scan`` taken with base_link at ``pose``."""
-    said = _said(grid, scan, pose, scan.nearby(JUDGED_POINTS_MAX))
+    said = _verdicts(grid, scan, pose, scan.nearby(JUDGED_POINTS_MAX))
     fitting, floating = (int(np.count_nonzero(said == kind)) for kind in (FITTING, FLOATING))
     hidden = int(np.count_nonzero((said == HIDDEN) | (said == CROSSING)))
     return Support(len(said), fitting, hidden, floating)
@@ -117,7 +117,7 @@ def supported(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Support:
 def look_at(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> Look:
     """Return the agreement of all points of ``scan`` with ``pose``."""
     points, corner = scan.nearby(ALL_POINTS), grid.corner
-    said = _said(grid, scan, pose, points)
+    said = _verdicts(grid, scan, pose, points)
     sensor = np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
     off, weight = gaps(grid.slots, grid.surfaces, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION).T
@@ -151,13 +151,15 @@ def is_well_painted(grid: EvidenceGrid, scan: ScanPoints, pose: Pose) -> bool:
     return bool(np.count_nonzero((off < INLIER) & (weight >= PAINTED)) >= PAINTED_SHARE * len(points))
 
 
-def _said(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, points: NDArray[np.float64]) -> NDArray[np.uint8]:
+def _verdicts(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, points: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return the map's verdict on each of ``points`` (n, 2; base_link)."""
     corner, sensor = grid.corner, pose.compose(Pose(scan.sensor.x, scan.sensor.y))
     ends = scan.in_frame(pose, points)
     ends -= (corner.x, corner.y)
-    said: NDArray[np.uint8] = verdicts(grid.evidence, ends, sensor.x - corner.x, sensor.y - corner.y, SLACK, RESOLUTION)
-    return said
+    found: NDArray[np.uint8] = verdicts(
+        grid.evidence, ends, sensor.x - corner.x, sensor.y - corner.y, SLACK, RESOLUTION
+    )
+    return found
 
 
 def _things(points: NDArray[np.float64], floating: NDArray[np.intp]) -> list[list[int]]:

@@ -94,14 +94,14 @@ class Carried:
 
     def __enter__(self) -> Self:
         kinds = RobotDisplaced, LocalizationLost, LoopClosed, PoseJumped
-        self._stops = [self._robot.events.listen(kind, self._hear) for kind in kinds]
+        self._stops = [self._robot.events.listen(kind, self._on_event) for kind in kinds]
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         for stop in self._stops:
             stop()
 
-    def _hear(self, event: Event) -> None:
+    def _on_event(self, event: Event) -> None:
         match event:
             case RobotDisplaced():
                 self._shoved += event.distance

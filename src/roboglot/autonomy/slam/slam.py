@@ -102,7 +102,7 @@ class Slam:
         belief.reader.load_kernel()
         self._turns = Turns(robot.clock, self._take)
         listen = robot.events.listen
-        self._listeners = [listen(ScanTaken, self._turns.hear), listen(PoseJumped, self._jumped)]
+        self._listeners = [listen(ScanTaken, self._turns.put), listen(PoseJumped, self._jumped)]
         self._timer = robot.clock.call_later(SILENCE_PERIOD, self._listen)
 
     def close(self) -> None:
@@ -175,7 +175,7 @@ class Slam:
         if not len(belief.reader.read(event.scan).ends) and is_covered(event.scan.ranges):
             belief.quality *= 1.0 - QUALITY_GAIN
             return  # a covered lidar sends empty scans: treat it as silent
-        if self.whereabouts.hear(event.stamp) and belief.map.scans and belief.localizing:
+        if self.whereabouts.note_scan(event.stamp) and belief.map.scans and belief.localizing:
             belief.covariance = belief.covariance + BLIND
             self._excursions.forget()
             self.whereabouts.lose(LostReason.NO_SCANS, event.stamp)

@@ -18,7 +18,7 @@ class Turns:
         self._waiting: ScanTaken | None = None
         self._queued = False
 
-    def hear(self, event: ScanTaken) -> None:
+    def put(self, event: ScanTaken) -> None:
         """Queue a scan for this robot's turn; take a waiting one now, so that late turns lose none."""
         self._catch_up()
         self._waiting = event

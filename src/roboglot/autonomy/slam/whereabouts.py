@@ -36,7 +36,7 @@ class Whereabouts:
         self._given_at = -math.inf  # s: since when a pose is unconfirmed, set by a client or found after a displacement
         self.sure = True  # whether scans may be added to the map
 
-    def hear(self, stamp: float) -> bool:
+    def note_scan(self, stamp: float) -> bool:
         """Note a scan; return whether the silence before it was long enough to move the robot unnoticed."""
         gap, self._heard_at = stamp - self._heard_at, stamp
         if not math.isfinite(gap) or gap <= 0.0:

@@ -107,7 +107,7 @@ async def _judge(session: Session, served: _Served) -> Verdict:
         await line.open()
         for asked in session.asked:
             operation, payload = _request(session.door, asked.request)
-            for good, what in _facts(asked, await line.ask(operation, payload, [b"{}"])):
+            for good, what in _facts(asked, await line.request(operation, payload, [b"{}"])):
                 facts += 1
                 if not good:
                     wrong.append(f"`{asked.request[:60]}`: {what}")

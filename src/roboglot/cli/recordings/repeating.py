@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, cast
 import msgspec
 
 from roboglot.console import desk, program_runs, teleop
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.errors import RobotError
 from roboglot.model.inputs import noted_stage
 from roboglot.model.inputs.outside import ANSWER, Input
@@ -37,7 +37,7 @@ class Ros2Line(Line):
     async def open(self) -> None:
         """Do nothing: there is no connection."""
 
-    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
         """Pass one message to the door; ``operation``: its topic's key."""
         door = cast("Ros2Door", self._doors.door("ros2"))
         door.receive(operation, payload)
@@ -60,7 +60,7 @@ class SerialTextLine(TextLine):
         self._end = os.open(self._link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         self._closed = asyncio.Event()
 
-    async def ask(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
         """Send one command; its answer is drained."""
         os.write(self._end, payload.rstrip(b" ;") + b";")
         return []
@@ -94,7 +94,7 @@ class Repeater:
         """Repeat an input, even a refused one; return False if the robot does not wait for that answer yet."""
         if given.kind == ANSWER:
             return self._answer(given)
-        ask_for(given.client, given.connection)
+        set_client(given.client, given.connection)
         with contextlib.suppress(RobotError, BadParameters, ProgramError, LookupError, ValueError):
             await self._do(given, cast(Mapping[str, str], given.values))
         return True

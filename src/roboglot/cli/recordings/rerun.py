@@ -146,7 +146,7 @@ async def run(recording: Recording, config: Config) -> list[str]:
     repeat = Repeater(runtime)
     inputs = Inputs(recording, runtime.clock, lambda place: _line(runtime, place), repeat)
     for robot in runtime.fleet.robots.values():
-        robot.tap.listen(inputs.hear)
+        robot.tap.listen(inputs.count)
         robot.outside.listen(inputs.notice)
     try:
         await runtime.start()

@@ -93,7 +93,7 @@ class WarmParent:
             with contextlib.suppress(BlockingIOError):
                 os.read(self._wake, 4096)
             for descriptor in ready & self._callers.keys():
-                if not self._hear(descriptor):
+                if not self._forward_signals(descriptor):
                     poll.unregister(descriptor)
                     self._let_go(descriptor)
             for descriptor in self._reap():
@@ -156,7 +156,7 @@ class WarmParent:
             become(wanted, descriptors, _run_code if wanted["kind"] == CODE else _run_command)
         return pid
 
-    def _hear(self, descriptor: int) -> bool:
+    def _forward_signals(self, descriptor: int) -> bool:
         """Send the command the signals that its caller got; return False if the caller has gone."""
         pid, caller = self._callers[descriptor]
         try:

@@ -11,8 +11,8 @@ import msgspec
 
 from roboglot.clients.cyberdog.link import DogLink
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot, TimedOut
-from roboglot.misfits import read_answer
 from roboglot.model.clock import Clock
+from roboglot.validation import read_answer
 from roboglot.wire.cyberdog.codes import Code, InBandError
 
 T = TypeVar("T")

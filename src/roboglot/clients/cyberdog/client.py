@@ -37,10 +37,10 @@ from roboglot.clients.cyberdog.chapters.system.upkeep import Upkeep
 from roboglot.clients.cyberdog.link import Certificates, DogLink, Heartbeat
 from roboglot.clients.cyberdog.values import PUSHED, Value
 from roboglot.clients.errors import BadAnswer, ClientError
-from roboglot.misfits import read_answer
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
 from roboglot.transport.seldom import Seldom
+from roboglot.validation import read_answer
 from roboglot.wire.cyberdog.channel import APP_PORT, ROBOT_PORT
 from roboglot.wire.cyberdog.chapters.camera import BadSignal, read_signal
 from roboglot.wire.cyberdog.codes import Code

@@ -97,7 +97,7 @@ class RoboMasterClient:
         self._pushes = pushes or PushPort(local or "", ports.push)
         self._detach: Callable[[], None] | None = None
         self._listeners = Listeners()
-        self._events = EventLink(self.clock, ports.event, self._listeners.hear)
+        self._events = EventLink(self.clock, ports.event, self._listeners.dispatch)
         self._link: ControlLink | None = None
         self._noting: Noting | None = None
         self._search = Search(self.clock, host, self._open, lambda: self.state is LinkState.CONNECTED)
@@ -204,7 +204,7 @@ class RoboMasterClient:
         """
         if self._detach is None:
             address = self._link.peer_host if self._link else self.host
-            self._detach = self._pushes.attach(address, self._listeners.hear)
+            self._detach = self._pushes.attach(address, self._listeners.dispatch)
         return self._listeners.add(heard, kinds)
 
     def watch(self, *kinds: type[Telemetry]) -> Viewer[Telemetry]:

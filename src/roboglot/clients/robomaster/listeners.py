@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from roboglot.clients.robomaster.noting import Noting
 from roboglot.model.feed import Feed, Viewer
-from roboglot.wire.robomaster.telemetry import Telemetry, hear
+from roboglot.wire.robomaster.telemetry import Telemetry, parse_pushes
 
 QUEUE_MAX = 512  # pushes and events queued for a slow watcher; further ones are dropped
 
@@ -40,11 +40,11 @@ class Listeners:
         self._feeds.add(feed)
         return viewer
 
-    def hear(self, data: bytes) -> None:
+    def dispatch(self, data: bytes) -> None:
         """Parse a datagram or an event's line, and pass it on."""
         if self.noting is not None:
-            self.noting.heard(data)
-        for item in hear(data):
+            self.noting.note_push(data)
+        for item in parse_pushes(data):
             for heard, kinds in tuple(self._listeners):
                 if not kinds or isinstance(item, kinds):
                     heard(item)

@@ -36,7 +36,7 @@ class Noting:
         if (asked := self._asked.pop(number, None)) is not None:
             self.line.reply(asked[0], b"", LOST, why, asked[1])
 
-    def heard(self, data: bytes) -> None:
+    def note_push(self, data: bytes) -> None:
         """Record telemetry or an event."""
         if self.line.watched:
             words = " ".join(data.decode("utf-8", "replace").split(None, 2)[:2])

@@ -18,8 +18,8 @@ import msgspec
 
 from roboglot.clients.errors import BadAnswer, ClientError, RefusedByRobot
 from roboglot.clients.slamware.http import Answer, HttpLink
-from roboglot.misfits import misfit, read_answer
 from roboglot.model.tap import LOST, Line
+from roboglot.validation import read_answer, why_invalid
 from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap, decode_explore_map
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, decode_stcm, encode_stcm
@@ -162,7 +162,7 @@ def _decoder(key: str, kind: object) -> Callable[[Answer], object]:
         try:
             return convert(bytes(answer.body))
         except (msgspec.MsgspecError, BadMap, UnicodeDecodeError, RecursionError) as error:
-            raise BadAnswer(f"{key}: {misfit(error, 'the answer')}") from None
+            raise BadAnswer(f"{key}: {why_invalid(error, 'the answer')}") from None
 
     return decode
 

@@ -6,14 +6,14 @@ from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Scope
 from roboglot.console.people.sessions import Sessions, cookie_name, read_cookie
 from roboglot.model.admission import NO_PROOF, Admission, LockedOut, Proof, ProofKind, Unknown
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 
 CHALLENGE = (b"www-authenticate", b'Bearer realm="roboglot"')  # not Basic: browsers would open their own prompt
 
 
 def admission_of(desk: Desk) -> Admission | None:
     """Return the admission that authenticates clients; None: all clients are admitted."""
-    return next((robot.admission for robot in desk.robots.values() if robot.admission.asks), None)
+    return next((robot.admission for robot in desk.robots.values() if robot.admission.enforced), None)
 
 
 def address_of(scope: Scope) -> str:
@@ -38,7 +38,7 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
     proof = Proof(ProofKind.HTTP, shown) if shown else session.proof if session is not None else NO_PROOF
     admission = admission_of(desk)
     if admission is not None:
-        known = admission.known(address, proof)
+        known = admission.cached_identity(address, proof)
         try:
             who = known if known is not None else await admission.admit(address, proof)
         except LockedOut:
@@ -48,5 +48,5 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
                 await sessions.end(cookie_of(scope))
             raise
     named = who if shown and admission is not None else session.name if session is not None else ""
-    ask_for(f"{CLIENT} {named or address.rpartition(':')[0]}".strip(), address, who)
+    set_client(f"{CLIENT} {named or address.rpartition(':')[0]}".strip(), address, who)
     return named

@@ -14,9 +14,9 @@ from roboglot.console.people.classes import Classes, Elsewhere
 from roboglot.console.people.entry import address_of, admission_of, cookie_of
 from roboglot.console.people.sessions import Sessions, cookie_name, set_cookie
 from roboglot.console.settings import JOIN_TRIES
-from roboglot.misfits import misfit
 from roboglot.model.admission import NO_PROOF, LockedOut, Proof, ProofKind, Unknown
 from roboglot.transport.limiter import Limiter
+from roboglot.validation import why_invalid
 
 SIGN_IN, SIGN_OUT = "/api/sign_in", "/api/sign_out"
 Secret = Annotated[str, msgspec.Meta(max_length=300)]
@@ -54,7 +54,7 @@ class Signing:
         try:
             shown = msgspec.convert(await read_json(receive), Shown)
         except msgspec.ValidationError as error:
-            raise Problem(400, misfit(error)) from None
+            raise Problem(400, why_invalid(error)) from None
         token, answer = await self._sign_in(address_of(scope), shown)
         if not token:  # the pupil belongs to another world
             await answer_json(send, answer)

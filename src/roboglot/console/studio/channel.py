@@ -131,8 +131,8 @@ class Session:
         self._light: dict[str, object] | None = None  # the last block that began, while it waits
         self._pending: set[asyncio.Task[None]] = set()
         self._asked: deque[str] = deque(maxlen=ASKED_MAX)  # ids of frames
-        self._trial = Trial(self.tell)
-        self._seat = classroom.seat(self.tell)
+        self._trial = Trial(self.post)
+        self._seat = classroom.seat(self.post)
         self._drawn = -DRAW_EVERY
         self._allowance, self._counted_at = 2.0 * MESSAGES_PER_SECOND_MAX, time.monotonic()
 
@@ -153,7 +153,7 @@ class Session:
                 frame = message["type"] == "frame"
                 await self._send(_framed(message["text"]) if frame else msgspec.json.encode(message).decode())
 
-    def tell(self, message: dict[str, object]) -> None:
+    def post(self, message: dict[str, object]) -> None:
         """Send a message when its turn comes."""
         if self._showed and message["type"] in ("joined", "elsewhere", "grid"):
             self._codes.give_back(self._showed)
@@ -177,7 +177,7 @@ class Session:
     def answer(self, text: str) -> None:
         """Send an answer to a frame; lists requested by other pages are dropped."""
         if (found := _LIST.match(text)) is None or found[1] in self._asked:
-            self.tell({"type": "frame", "text": text})
+            self.post({"type": "frame", "text": text})
 
     def publish(self, text: str) -> None:
         """Send a report of a task; of blocks that begin in quick succession, only the newest."""
@@ -188,7 +188,7 @@ class Session:
         elif block[1] == "begin":
             if self._light is None or self._waiting[-1] is not self._light:
                 self._light = {"type": "frame"}
-                self.tell(self._light)
+                self.post(self._light)
             self._light["text"] = text
 
     async def room(self) -> None:
@@ -208,7 +208,7 @@ class Session:
             self._open(message)
             return
         if len(self._pending) >= PENDING_MAX:
-            self.tell({"type": "refused", "why": "too much is being answered"})
+            self.post({"type": "refused", "why": "too much is being answered"})
             return
         task = asyncio.get_running_loop().create_task(self._take(message), name=f"studio {type(message).__name__}")
         self._pending.add(task)
@@ -224,7 +224,7 @@ class Session:
             if programs is None:
                 raise NotFound(f"robot {name} runs no block programs")
         except RobotError as error:
-            self.tell({"type": "opened", "robot": name, "error": str(error)})
+            self.post({"type": "opened", "robot": name, "error": str(error)})
             return
         self._programs = programs
         self._seat.at(name)
@@ -234,13 +234,13 @@ class Session:
             service.log_entries.join(self._logged),
             service.insights.join(self._noticed),
         ]
-        self.tell({"type": "opened", "robot": name, "running": [figures.target_id for figures in service.running()]})
+        self.post({"type": "opened", "robot": name, "running": [figures.target_id for figures in service.running()]})
 
     async def _take(self, message: Message) -> None:
         try:
             await self._do(message)
         except (RobotError, ProgramError, ValueError) as error:
-            self.tell({"type": "refused", "id": getattr(message, "id", 0), "why": str(error)})
+            self.post({"type": "refused", "id": getattr(message, "id", 0), "why": str(error)})
 
     async def _do(self, message: Message) -> None:
         if isinstance(message, Member):
@@ -255,10 +255,10 @@ class Session:
                 self._asked.append(_id_of(text))
                 await programs.frames.receive(text)
             case Debug(id=id, text=text):
-                self.tell({"type": "debugged", "id": id, "text": await program_runs.debug(programs, text)})
+                self.post({"type": "debugged", "id": id, "text": await program_runs.debug(programs, text)})
             case Check(id=id, body=body):
                 problems = await programs.service.check(body)
-                self.tell({"type": "checked", "id": id, "problems": [_plain(problem) for problem in problems]})
+                self.post({"type": "checked", "id": id, "problems": [_plain(problem) for problem in problems]})
             case Fetch():
                 await self._fetch(programs, message)
             case TrialWish():
@@ -293,7 +293,7 @@ class Session:
             found = await (service.library.get(wish.program) if wish.module else service.get(wish.program))
         entries = await service.log(wish.program) if wish.log and not wish.module else []
         where = await service.whereabouts(wish.program)
-        self.tell(
+        self.post(
             {
                 "type": "fetched",
                 "id": wish.id,
@@ -308,13 +308,13 @@ class Session:
 
     def _logged(self, task: str, entry: LogEntry) -> None:
         if self._shown in ("", task):
-            self.tell({"type": "log", **_entry(task, entry)})
+            self.post({"type": "log", **_entry(task, entry)})
 
     def _noticed(self, insight: Insight) -> None:
         if self._shown not in ("", insight.task):
             return
         kind = "reading" if isinstance(insight, Reading) else "variables"
-        self.tell({"type": kind, **dataclasses.asdict(insight)})
+        self.post({"type": kind, **dataclasses.asdict(insight)})
 
     def _leave(self) -> None:
         for leave in self._leaving:

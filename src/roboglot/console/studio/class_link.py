@@ -143,10 +143,10 @@ class LinkedRoom:
         self._stopping: set[asyncio.Task[None]] = set()
         self._task = asyncio.get_running_loop().create_task(self._run(), name="classroom of several worlds")
 
-    def seat(self, tell: Tell) -> LinkedSeat:
+    def seat(self, post: Tell) -> LinkedSeat:
         """Return a place for a page."""
         self._next += 1
-        return LinkedSeat(self, self._next, tell)
+        return LinkedSeat(self, self._next, post)
 
     async def open(self, code: str, name: str) -> None:
         """Open a class for this program's own world. Raises Refused."""
@@ -207,15 +207,15 @@ class LinkedRoom:
             writer.write(line(self._hello))
             self._writer = writer
             while text := await reader.readline():
-                self._hear(_decode(text))
+                self._on_message(_decode(text))
         finally:
             self._writer = None
             writer.transport.abort()
             seats, self._seats = self._seats, {}
             for seat in seats.values():
-                seat.tell({"type": "left"})
+                seat.post({"type": "left"})
 
-    def _hear(self, message: FromRoom) -> None:
+    def _on_message(self, message: FromRoom) -> None:
         match message:
             case Stop():
                 task = asyncio.get_running_loop().create_task(self._do_stop(message), name=f"stop {message.robot}")
@@ -223,7 +223,7 @@ class LinkedRoom:
                 task.add_done_callback(self._stopping.discard)
             case News(seat=number, message=news):
                 if (seat := self._seats.get(number)) is not None:
-                    seat.tell(news)
+                    seat.post(news)
             case Admitted(id=id):
                 if (waiting := self._admitting.get(id)) is not None and not waiting.done():
                     waiting.set_result(message)
@@ -243,12 +243,12 @@ class LinkedRoom:
 class LinkedSeat:
     """One page's seat in the classroom, taken with the page's first request."""
 
-    def __init__(self, room: LinkedRoom, number: int, tell: Tell) -> None:
-        self._room, self.number, self.tell = room, number, tell
+    def __init__(self, room: LinkedRoom, number: int, post: Tell) -> None:
+        self._room, self.number, self.post = room, number, post
         self._robot = ""
 
     async def take(self, wish: Member, *, may_teach: bool) -> None:
-        """Pass a request on; ``tell`` gets the result. Raises Refused if the classroom is out of reach."""
+        """Pass a request on; ``post`` gets the result. Raises Refused if the classroom is out of reach."""
         self._room.send(At(self.number, self._robot), self)
         self._room.send(Wished(self.number, wish, may_teach), self)
 

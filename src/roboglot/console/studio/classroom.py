@@ -91,7 +91,7 @@ class Class:
             self.pupils[name] = Pupil(name, world=NOWHERE, bag=Bag(name))
         return self.pupils[name]
 
-    def tell_teachers(self) -> None:
+    def notify_teachers(self) -> None:
         """Schedule an update of the grid on every teacher's page."""
         if self._due is None:
             self._due = asyncio.get_running_loop().call_later(GRID_EVERY, self._send_grid)
@@ -105,14 +105,14 @@ class Class:
             for p in self.pupils.values()
         ]
         for seat in self.teachers:
-            seat.tell({"type": "grid", "code": self.code, "name": self.name, "pupils": rows})
+            seat.post({"type": "grid", "code": self.code, "name": self.name, "pupils": rows})
 
 
 class Seated(Protocol):
     """One page's place in a classroom."""
 
     async def take(self, wish: Member, *, may_teach: bool) -> None:
-        """Do what the page wishes. Raises NotFound, Refused, unless its ``tell`` hears that."""
+        """Do what the page wishes. Raises NotFound, Refused, unless its ``post`` hears that."""
 
     def at(self, robot: str) -> None:
         """The page works with this robot from now on."""
@@ -127,7 +127,7 @@ class Seated(Protocol):
 class Room(Protocol):
     """A classroom, wherever it is."""
 
-    def seat(self, tell: Tell) -> Seated:
+    def seat(self, post: Tell) -> Seated:
         """Return a place for a page."""
 
     async def open(self, code: str, name: str) -> None:
@@ -154,9 +154,9 @@ class Classroom:
                 doing = Doing(stars=bag.all_stars, program=bag.program)
                 kept.pupils[bag.name] = Pupil(bag.name, bag.world, "", None, doing, bag)
 
-    def seat(self, tell: Tell, world: str = "") -> Seat:
+    def seat(self, post: Tell, world: str = "") -> Seat:
         """Return a place for a page of a world."""
-        return Seat(self, tell, world)
+        return Seat(self, post, world)
 
     def find(self, code: str) -> Class:
         """Return a class. Raises NotFound."""
@@ -202,7 +202,7 @@ class Classroom:
             return
         for seat in [*ended.teachers, *(pupil.seat for pupil in ended.pupils.values() if pupil.seat is not None)]:
             seat.leave()
-            seat.tell({"type": "ended"})
+            seat.post({"type": "ended"})
         for world in self.worlds.values():
             world.end(code)
         if self._files is not None:
@@ -255,8 +255,8 @@ class Classroom:
 class Seat:
     """One page's place: nobody's, a teacher's or a pupil's."""
 
-    def __init__(self, room: Classroom, tell: Tell, world: str) -> None:
-        self._room, self.tell, self._world = room, tell, world
+    def __init__(self, room: Classroom, post: Tell, world: str) -> None:
+        self._room, self.post, self._world = room, post, world
         self._robot = ""
         self._class: Class | None = None
         self._pupil: Pupil | None = None
@@ -266,7 +266,7 @@ class Seat:
         self._robot = robot
         if self._pupil is not None and self._class is not None:
             self._pupil.robot = robot
-            self._class.tell_teachers()
+            self._class.notify_teachers()
 
     async def take(self, wish: Member, *, may_teach: bool) -> None:
         """Do what the page wishes. Raises NotFound, Refused."""
@@ -288,7 +288,7 @@ class Seat:
                 if shown is None:
                     raise NotFound(f"there is no pupil {wish.name!r}")
                 style = shown.bag.handed or shown.bag.style
-                self.tell({"type": "looked", "id": wish.id, "name": shown.name, "style": style})
+                self.post({"type": "looked", "id": wish.id, "name": shown.name, "style": style})
 
     async def _open(self, wish: Member, may_teach: bool) -> None:
         """Open a class, or with its code come back to it as its teacher."""
@@ -299,7 +299,7 @@ class Seat:
         self._class = opened
         opened.until = self._room.now() + OPEN_SECONDS
         opened.teachers.add(self)
-        opened.tell_teachers()
+        opened.notify_teachers()
         await self._room.save(opened)
 
     async def _join(self, wish: Member) -> None:
@@ -314,8 +314,8 @@ class Seat:
         before = pupil.bag.world
         elsewhere = self._room.place(joined, pupil, self._world)
         if elsewhere is not None:
-            self.tell({"type": "elsewhere", "code": joined.code, "name": name, "page": elsewhere.page})
-            joined.tell_teachers()
+            self.post({"type": "elsewhere", "code": joined.code, "name": name, "page": elsewhere.page})
+            joined.notify_teachers()
         else:
             self._sit(joined, pupil, pupil.bag.style if wish.carry else "")
         if pupil.bag.world != before:
@@ -326,7 +326,7 @@ class Seat:
         pupil.seat, self._class, self._pupil, name = self, joined, pupil, pupil.name
         number = [one.name for one in joined.pupils.values() if one.world == self._world].index(name)
         words: dict[str, object] = {"code": joined.code, "name": name, "class": joined.name, "style": style}
-        self.tell({"type": "joined", "number": number, **words})
+        self.post({"type": "joined", "number": number, **words})
         self.at(self._robot)
 
     async def _note(self, wish: Member) -> None:
@@ -338,14 +338,14 @@ class Seat:
         if wish.do == "hand_in":
             bag.handed, bag.stars = bag.style, wish.doing.stars
             await self._room.keep(joined.code, pupil)
-            self.tell({"type": "handed"})
-        joined.tell_teachers()
+            self.post({"type": "handed"})
+        joined.notify_teachers()
 
     def draw(self, picture: str) -> None:
         """Show teachers the robot's map, a PNG in base64."""
         if self._class is not None and self._pupil is not None:
             for seat in self._class.teachers:
-                seat.tell({"type": "map", "name": self._pupil.name, "png": picture})
+                seat.post({"type": "map", "name": self._pupil.name, "png": picture})
 
     def _taught(self) -> Class:
         if self._class is None or self not in self._class.teachers:
@@ -360,4 +360,4 @@ class Seat:
             self._pupil.seat = None
         self._class.teachers.discard(self)
         left, self._class, self._pupil = self._class, None, None
-        left.tell_teachers()
+        left.notify_teachers()

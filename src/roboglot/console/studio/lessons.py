@@ -12,12 +12,12 @@ from typing import Annotated
 import msgspec
 
 from roboglot.console.studio.checks import Check, Why, Work, failure
-from roboglot.misfits import misfit
 from roboglot.model.geometry import Point, Pose
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.language import Problem
 from roboglot.programs.rehearsing import Act, Played, Scene
 from roboglot.spelling import meant
+from roboglot.validation import why_invalid
 
 log = logging.getLogger(__name__)
 
@@ -149,7 +149,7 @@ def read(text: str) -> Lesson:
     try:
         return msgspec.toml.decode(text, type=Lesson)
     except msgspec.ValidationError as error:
-        raise ValueError(misfit(error, "the mission")) from None
+        raise ValueError(why_invalid(error, "the mission")) from None
 
 
 def load(folders: Sequence[Path]) -> dict[str, Lesson]:

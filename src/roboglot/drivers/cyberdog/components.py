@@ -35,7 +35,7 @@ class OptionalComponents:
         self._skin = CyberDogSkin(robot, client, supervisor)
         self._power = CyberDogPower(robot, client, supervisor, status)
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe the dog and add the components found. Raises LinkLost if the dog is gone."""
         with contextlib.suppress(*UNSUPPORTED):
             await self._status.ask()
@@ -47,8 +47,8 @@ class OptionalComponents:
         if self._status.volume is not None:
             await add_if_present(robot, Speaker, self._speaker)
         if self._supervisor.touches:
-            await add_if_present(robot, Power, self._power, self._power.learn(), absent=UNSUPPORTED)
-            await add_if_present(robot, ElectronicSkin, self._skin, self._skin.learn(), absent=UNSUPPORTED)
-        if await add_if_present(robot, Camera, self._camera, self._camera.learn(), absent=UNSUPPORTED):
+            await add_if_present(robot, Power, self._power, self._power.probe(), absent=UNSUPPORTED)
+            await add_if_present(robot, ElectronicSkin, self._skin, self._skin.probe(), absent=UNSUPPORTED)
+        if await add_if_present(robot, Camera, self._camera, self._camera.probe(), absent=UNSUPPORTED):
             await add_if_present(robot, VideoStream, self._video)
             await add_if_present(robot, Recorder, self._recorder)

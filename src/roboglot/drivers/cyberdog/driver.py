@@ -143,7 +143,7 @@ class CyberDogDriver(Driver):
         self.robot.description = replace(self.robot.description, maker="Xiaomi", model="CyberDog 2", serial=beat.serial)
         if await self._skills.stop_orphan():
             self._ours_at = self.robot.clock.time()  # the next heartbeat would still suggest another app
-        await self._optional.learn()
+        await self._optional.probe()
         self._beat()
         await self._read_map()
 
@@ -201,7 +201,7 @@ class CyberDogDriver(Driver):
         if beat is None or now - beat.at > SILENCE_MAX:
             raise LinkLost("the dog's heartbeats have stopped")
         if now - beat.at <= LOOK:
-            self.link.heard("heartbeat")
+            self.link.note_update("heartbeat")
         before = self._reported.battery
         self._reported.battery = replace(battery_of(beat), **self._reported.battery_details)
         self._reported.docked = beat.wireless_charging
@@ -228,7 +228,7 @@ class CyberDogDriver(Driver):
     def _take_pose(self, value: values.Value) -> None:
         assert isinstance(value, values.Pose)
         self._reported.correct(pose_of(value), self.robot.clock.time())
-        self.link.heard("pose")
+        self.link.note_update("pose")
 
     def _take_map(self, value: values.Value) -> None:
         assert isinstance(value, values.Grid)
@@ -237,7 +237,7 @@ class CyberDogDriver(Driver):
         grown = continues(self._reported.grid, grid)
         self._reported.grid = grid
         self._reported.revision += 1
-        self.link.heard("map")
+        self.link.note_update("map")
         if not grown:
             self.robot.events.publish(MapReplaced(stamp=self.robot.clock.time()))
 
@@ -250,7 +250,7 @@ class CyberDogDriver(Driver):
         stamp = self.robot.clock.time()
         pose = self._reported.reckon(stamp).pose
         self._reported.scan = scan = scan_of(value, pose, stamp)
-        self.link.heard("scan")
+        self.link.note_update("scan")
         if Lidar not in self.robot:
             self.robot.add(Lidar, ReportedLidar(lambda: self._reported.scan))
         self.robot.events.publish(ScanTaken(stamp=stamp, scan=scan, odometry=pose))

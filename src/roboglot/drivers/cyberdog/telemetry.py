@@ -54,7 +54,7 @@ class StatusPoll:
         volume = reply.get("volume")
         self.volume = volume if isinstance(volume, int) and 0 <= volume <= 100 else None
         self.saves = reply.get("lowpower_control") is True
-        self._link.heard("condition")
+        self._link.note_update("condition")
 
     async def run(self) -> None:
         """Poll every two seconds. Raises LinkLost; unanswered values age."""

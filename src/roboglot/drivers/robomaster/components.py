@@ -75,34 +75,34 @@ class OptionalComponents:
         self._recorder = Recorder(self._video, clock)
         self.refreshed: list[Refresh] = []
 
-    async def learn(self) -> bool:
+    async def probe(self) -> bool:
         """Probe every component; return True if there is a gimbal. Raises ClientError if the robot is gone."""
         robot = self._robot
         self.refreshed.clear()
-        gimbal = await add_if_present(robot, Gimbal, self._gimbal, self._gimbal.learn())
+        gimbal = await add_if_present(robot, Gimbal, self._gimbal, self._gimbal.probe())
         if await add_if_present(robot, Arm, self._arm, self._arm.refresh()):
             self.refreshed.append(self._arm.refresh)
         if await add_if_present(robot, Gripper, self._gripper, self._gripper.refresh()):
             self.refreshed.append(self._gripper.refresh)
-        if await add_if_present(robot, Servos, self._servos, self._servos.learn()):
+        if await add_if_present(robot, Servos, self._servos, self._servos.probe()):
             self.refreshed.append(self._servos.refresh)
-        if await add_if_present(robot, RangeSensors, self._ranges, self._ranges.learn()):
+        if await add_if_present(robot, RangeSensors, self._ranges, self._ranges.probe()):
             self.refreshed.append(self._ranges.refresh)
-        await add_if_present(robot, Blaster, self._blaster, self._blaster.learn())
-        await add_if_present(robot, Armor, self._armor, self._armor.learn(gimbal=gimbal))
+        await add_if_present(robot, Blaster, self._blaster, self._blaster.probe())
+        await add_if_present(robot, Armor, self._armor, self._armor.probe(gimbal=gimbal))
         if gimbal:
             self._light.provide(RINGS)
         if self._supervisor.touches:
-            await add_if_present(robot, Light, self._light, self._light.learn())
-            await add_if_present(robot, PwmPorts, self._pwm, self._pwm.learn())
-        if await add_if_present(robot, SensorAdapters, self._adapters, self._adapters.learn()):
+            await add_if_present(robot, Light, self._light, self._light.probe())
+            await add_if_present(robot, PwmPorts, self._pwm, self._pwm.probe())
+        if await add_if_present(robot, SensorAdapters, self._adapters, self._adapters.probe()):
             self.refreshed.append(self._adapters.refresh)
-        await add_if_present(robot, InputDevice, self._input, self._input.learn())
-        await add_if_present(robot, Hearing, self._hearing, self._hearing.learn())
-        await add_if_present(robot, Vision, self._vision, self._vision.learn())
-        if await add_if_present(robot, Microphone, self._microphone, self._microphone.learn()):
+        await add_if_present(robot, InputDevice, self._input, self._input.probe())
+        await add_if_present(robot, Hearing, self._hearing, self._hearing.probe())
+        await add_if_present(robot, Vision, self._vision, self._vision.probe())
+        if await add_if_present(robot, Microphone, self._microphone, self._microphone.probe()):
             await add_if_present(robot, AudioStream, self._audio)
-        if self._supervisor.touches and await add_if_present(robot, Camera, self._camera, self._camera.learn()):
+        if self._supervisor.touches and await add_if_present(robot, Camera, self._camera, self._camera.probe()):
             await add_if_present(robot, VideoStream, self._video)
             await add_if_present(robot, Recorder, self._recorder)
         return gimbal

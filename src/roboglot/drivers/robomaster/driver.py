@@ -101,7 +101,7 @@ class RoboMasterDriver(Driver):
         if isinstance(self.robot.clock, RealClock):
             self._unwatch = self._watchdog.watch(self._client.descriptor, lambda: bool(self.robot.actions.running()))
         await self._client.learn_build()  # sets the units that it uses
-        self._telemetry.has_gimbal = await self._optional.learn()
+        self._telemetry.has_gimbal = await self._optional.probe()
         await self._telemetry.begin()
         version = await self._version()
         self.robot.description = replace(

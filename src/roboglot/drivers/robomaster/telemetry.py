@@ -66,7 +66,7 @@ class TelemetryListener:
         """Subscribe to pushes and poll everything once. Raises ClientError."""
         client = self._client
         self._forget()
-        self._forget = client.listen(self._hear)
+        self._forget = client.listen(self._on_push)
         self._pushed = False
         await self._ask_battery()
         self._hear_attitude(await client.chassis.get_attitude())
@@ -78,7 +78,7 @@ class TelemetryListener:
 
     async def run(self) -> None:
         """Run until the link breaks. Raises LinkLost."""
-        await together(self._ask(), self._mind_silence())
+        await together(self._ask(), self._watch_silence())
 
     async def _ask(self) -> None:
         count = 0
@@ -94,7 +94,7 @@ class TelemetryListener:
             if count % BATTERY_EVERY == 0:
                 await self._ask_battery()
 
-    async def _mind_silence(self) -> None:
+    async def _watch_silence(self) -> None:
         async for _ in self._robot.clock.every(SPEED_PERIOD):
             if self._link.age("position") > SILENCE_MAX:
                 raise LinkLost(self._silence())
@@ -113,7 +113,7 @@ class TelemetryListener:
         speed = await self._client.chassis.get_speed()
         self._reported.latency += LATENCY_SMOOTHING * (self._robot.clock.time() - asked - self._reported.latency)
         self._reported.twist, self._reported.wheels = twist_of(speed), wheels_of(speed, self._client.as_robots)
-        self._link.heard("speed")
+        self._link.note_update("speed")
 
     async def _ask_heading(self) -> Pose:
         """Measure the yaw between position and attitude: they are zeroed at different times and the attitude drifts.
@@ -128,12 +128,12 @@ class TelemetryListener:
         """Poll the charge; the text protocol reports neither voltage nor charging."""
         before, percent = self._reported.battery.percentage, await self._client.robot.get_battery()
         self._reported.battery = BatteryState(percent / 100, 0.0, 0.0, 0.0, False, 0)
-        self._link.heard("battery")
+        self._link.note_update("battery")
         if round(before * 100) != percent:
             stamp = self._robot.clock.time()
             self._robot.events.publish(BatteryChanged(stamp=stamp, percentage=percent / 100, charging=False))
 
-    def _hear(self, push: Telemetry) -> None:
+    def _on_push(self, push: Telemetry) -> None:
         stamp = self._robot.clock.time()
         match push:
             case telemetry.ChassisPosition():
@@ -144,10 +144,10 @@ class TelemetryListener:
                 self._hear_attitude(push)
             case telemetry.ChassisStatus():
                 self._reported.flags = flags_of(push)
-                self._link.heard("status")
+                self._link.note_update("status")
             case telemetry.GimbalAttitude():
                 self._reported.gimbal = angles_of(push)
-                self._link.heard("gimbal")
+                self._link.note_update("gimbal")
             case telemetry.ArmorHit(index, kind) if index in PLATES and kind in HITS:
                 self._robot.events.publish(ArmorHit(stamp=stamp, place=PLATES[index], kind=HITS[kind]))
             case _:
@@ -158,7 +158,7 @@ class TelemetryListener:
         way = before.pose.distance_to(pose) if before.stamp or before.pose != ORIGIN else 0.0
         stamp = self._robot.clock.time()
         self._reported.odometry = OdometryReading(stamp, pose, self._reported.twist, before.distance + way)
-        self._link.heard("position")
+        self._link.note_update("position")
 
     def _hear_attitude(self, attitude: telemetry.ChassisAttitude) -> None:
         """Derive rates from two pushes; the acceleration is gravity alone, as for a robot at rest."""
@@ -171,7 +171,7 @@ class TelemetryListener:
             GRAVITY * math.cos(now.pitch) * math.cos(now.roll),
         )
         self._reported.imu = ImuReading(stamp, now, rates, gravity)
-        self._link.heard("attitude")
+        self._link.note_update("attitude")
 
 
 def _rates(before: Orientation, now: Orientation, seconds: float) -> Vector3:

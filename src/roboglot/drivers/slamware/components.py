@@ -68,18 +68,18 @@ class OptionalComponents:
         await self._places.sync()
         await self._drawings.sync()
 
-    async def learn(self, has: Callable[[str], bool]) -> None:
+    async def probe(self, has: Callable[[str], bool]) -> None:
         """Add the components that ``has`` reports as answering. Raises ClientError if the robot is gone."""
         if has("jack"):
             await add_if_present(self._robot, Jack, self._jack)
         if has("cargo") and self._cargo.compartments:
             await add_if_present(self._robot, Cargo, self._cargo)
         if has("network"):
-            await add_if_present(self._robot, Network, self._network, self._network.learn())
+            await add_if_present(self._robot, Network, self._network, self._network.probe())
         if not self._supervisor.touches:
             return
         if has("health"):
-            await add_if_present(self._robot, EmergencyStop, self._stop, self._stop.learn())
+            await add_if_present(self._robot, EmergencyStop, self._stop, self._stop.probe())
         if has("power"):
-            await add_if_present(self._robot, Power, self._power, self._power.learn())
-        await add_if_present(self._robot, Light, self._light, self._light.learn())
+            await add_if_present(self._robot, Power, self._power, self._power.probe())
+        await add_if_present(self._robot, Light, self._light, self._light.probe())

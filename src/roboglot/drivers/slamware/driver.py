@@ -92,7 +92,7 @@ class SlamwareDriver(Driver):
             software_version=plate.software_version,
         )
         await self._runner.stop_orphan()
-        await self._base.learn()
+        await self._base.probe()
         await self._telemetry.once()
         if not self._met:  # later a topic may only be silent for a while
             self._met = True
@@ -101,7 +101,7 @@ class SlamwareDriver(Driver):
                     self.robot.withdraw(interface)
         if self._telemetry.has("imu") and Imu not in self.robot:
             self.robot.add(Imu, ReportedImu(lambda: self._reported.imu))
-        await self._optional.learn(self._telemetry.has)
+        await self._optional.probe(self._telemetry.has)
 
     async def serve(self) -> None:
         lease = asyncio.ensure_future(self._watch_lease())

@@ -82,7 +82,7 @@ class TelemetryPoller:
                 continue
             try:
                 await ask()
-                self._hear(what)
+                self._note_answer(what)
             except SlamwareRefused as refused:
                 if refused.code not in ABSENT:
                     raise
@@ -104,7 +104,7 @@ class TelemetryPoller:
         async for _ in self._clock.every(period):
             try:
                 await ask()
-                self._hear(what)
+                self._note_answer(what)
                 heard = self._clock.time()
             except BadAnswer:
                 if what not in self._optional:
@@ -114,8 +114,8 @@ class TelemetryPoller:
                 if what == ESSENTIAL and is_broken and self._clock.time() - heard > REFUSED_MAX:
                     raise LinkLost(f"the robot no longer reports its {what}: {refused}") from None
 
-    def _hear(self, what: str) -> None:
-        self._link.heard(what)
+    def _note_answer(self, what: str) -> None:
+        self._link.note_update(what)
         self._met.add(what)
 
     async def _odometry(self) -> None:

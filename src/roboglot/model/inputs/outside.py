@@ -93,7 +93,7 @@ class Outside:
 
     # -- answers from outside --
 
-    async def ask(self, name: str, work: Callable[[], Awaitable[str]]) -> str:
+    async def call_out(self, name: str, work: Callable[[], Awaitable[str]]) -> str:
         """Return what ``work`` hears from someone out there, in a word; its end is an input.
 
         Where a lockstep run is noted, time waits for it as long as answers usually come soon, and robots learn of it
@@ -110,7 +110,7 @@ class Outside:
         if task is not None:
             if self._answers_come:
                 self._clock.hold(answer, PATIENCE)
-            task.add_done_callback(lambda done: self._clock.arrive(partial(self._hear, name, number, done)))
+            task.add_done_callback(lambda done: self._clock.arrive(partial(self._resolve, name, number, done)))
         try:
             return await answer
         finally:
@@ -120,7 +120,7 @@ class Outside:
                 task.cancel()
             self._waiting.pop((name, number), None)
 
-    def _hear(self, name: str, number: int, done: asyncio.Future[str]) -> None:
+    def _resolve(self, name: str, number: int, done: asyncio.Future[str]) -> None:
         """``done`` has ended."""
         answer = self._waiting.get((name, number))
         if answer is None or answer.done() or done.cancelled():

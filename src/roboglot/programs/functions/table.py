@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboglot.misfits import PYTHON
 from roboglot.model.client_context import identity
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation, OperationTable, Right
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.worker.values import Record
+from roboglot.validation import PYTHON
 
 ABILITIES: OperationTable[str] = OperationTable("visual", Right.PROGRAM)
 TIME: OperationTable[str] = OperationTable("time", Right.PROGRAM)  # Python's own module, on the robot's clock
@@ -53,7 +53,7 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
     if operation is None:
         raise NotImplementedError(f"{name} is not built yet")
     try:
-        if session.robot.admission.asks and identity():  # programs without a client's identity belong to the robot
+        if session.robot.admission.enforced and identity():  # programs without a client's identity belong to the robot
             session.robot.admission.check("visual", operation.key, operation.right)
         result = await operation.handler(session, **bind(operation, args, kwargs))
     except RobotError as error:

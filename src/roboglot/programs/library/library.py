@@ -9,7 +9,6 @@ import asyncio
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 
-from roboglot.conditions import BadCondition, parse_interface
 from roboglot.programs.errors import (
     CannotExecute,
     InvalidCondition,
@@ -28,6 +27,7 @@ from roboglot.programs.library.modules import (
 )
 from roboglot.programs.stores import ListedProgram, ProgramStore, StoredProgram
 from roboglot.programs.tasks.states import TaskOperation
+from roboglot.task_conditions import BadCondition, parse_interface
 from roboglot.values import dataclass
 
 MODULES_MAX = 1000

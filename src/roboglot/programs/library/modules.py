@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 from enum import StrEnum
 
-from roboglot.conditions import Interface
 from roboglot.programs.language import Problem
+from roboglot.task_conditions import Interface
 
 HEADER_LINES = 1
 """Lines of a module's function before its body."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import calendar
 from datetime import UTC, date, datetime, time, timedelta, tzinfo
 
-from roboglot.conditions import Cycle, Moment, parse_cycle, parse_moment
+from roboglot.task_conditions import Cycle, Moment, parse_cycle, parse_moment
 
 DAYS_AHEAD = 9 * 366
 """Every possible day of month and week recurs within this many days (worst: 29 February around the year 2100)."""

@@ -13,7 +13,7 @@ from contextvars import Context, copy_context
 from dataclasses import replace
 from functools import partial
 
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.errors import RobotError
 from roboglot.model.inputs.metering import metered
 from roboglot.model.robot import Robot
@@ -163,8 +163,8 @@ class TaskRun:
     async def execute(self) -> Outcome:
         """Answer the program's calls until it ends, then cancel the actions that it started."""
         outcome = Outcome(ExitReason.LOST, "the program was lost")
-        ask_for(f"visual {self.task.id}", identity=self.task.owner)
-        self._run.calls.asked = partial(self._asked, copy_context())
+        set_client(f"visual {self.task.id}", identity=self.task.owner)
+        self._run.calls.asked = partial(self._on_call, copy_context())
         self.control.start()
         self.time.begin()
         try:
@@ -178,7 +178,7 @@ class TaskRun:
                     case Call():
                         if event.interrupted:
                             await self._followed()
-                        self._asked(copy_context(), event)
+                        self._on_call(copy_context(), event)
                     case Halted():
                         self._answering = asyncio.create_task(self._halt(event), name=f"halt {self.task.id}")
                     case Finished():
@@ -275,7 +275,7 @@ class TaskRun:
         self._run.calls.reply(halted.id)
         self.time.ask(False)
 
-    def _asked(self, context: Context, request: Call) -> None:
+    def _on_call(self, context: Context, request: Call) -> None:
         """Answer a call at once, or in a task if that has to wait; charge the time that it takes."""
 
         async def answer() -> None:

@@ -6,13 +6,13 @@ import logging
 from collections.abc import Callable
 from datetime import tzinfo
 
-from roboglot.conditions import BadCondition
 from roboglot.model.clock import Clock
 from roboglot.programs.errors import InvalidCondition, ProgramError
 from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.calendar import due_of
 from roboglot.programs.tasks.schedule import Schedule
 from roboglot.programs.tasks.states import TaskState
+from roboglot.task_conditions import BadCondition
 
 log = logging.getLogger(__name__)
 

@@ -41,7 +41,7 @@ DOOR = DoorType(
     table=lambda: _chapters().TABLE,
     ports=(PortSetting("CyberDog", "port"), PortSetting("CyberDog app", "app_port", PortKind.APP)),
     open=_open,
-    asks="a certificate of the data folder",
+    credentials="a certificate of the data folder",
     options=(
         Option("--app", "app", "HOST:PORT of the CyberDog app to call; by default the app that called last."),
         Option("--plaintext", "plaintext", "CyberDog without TLS, on loopback only.", True),

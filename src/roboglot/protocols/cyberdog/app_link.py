@@ -181,12 +181,12 @@ class AppLink:
         finally:
             self._line = None
             self._set_connected(False)
-            await (line.close() if self._ended else self._outside.ask("close", line.close))
+            await (line.close() if self._ended else self._outside.call_out("close", line.close))
 
     async def _beat(self, target: str, line: AppLine) -> bool:
         heard, own = False, self._address
         if own in WILDCARDS:
-            own = await self._outside.ask("route", lambda: _route_to(target))
+            own = await self._outside.call_out("route", lambda: _route_to(target))
         last = self._clock.time()
         while self._target == target:
             began, asked, ticks = self._clock.time(), len(self._asking), self._ticks(own)
@@ -208,7 +208,7 @@ class AppLink:
         return heard
 
     async def _got_through(self, line: AppLine, ticks: pb.Ticks) -> bool:
-        asking = self._outside.ask(HEARTBEAT, lambda: line.heartbeat(ticks))
+        asking = self._outside.call_out(HEARTBEAT, lambda: line.heartbeat(ticks))
         try:
             return await self._clock.wait_for(asking, HEARTBEAT_DEADLINE) == DONE
         except TimeoutError:
@@ -257,7 +257,7 @@ class AppLink:
         if self._tap is not None and self._tap.watched:
             self._tap.push("cyberdog", self._target, key, text)
         try:
-            asking = self._outside.ask(key, lambda: line.push(code, text))
+            asking = self._outside.call_out(key, lambda: line.push(code, text))
             return delivery(await self._clock.wait_for(asking, PUSH_DEADLINE))
         except TimeoutError:
             log.debug("push %s was not acknowledged within %s s", key, PUSH_DEADLINE)

@@ -30,7 +30,7 @@ from roboglot.protocols.cyberdog.errors import RecordedEnd, codes_of
 from roboglot.protocols.cyberdog.table import TABLE, unread
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
-from roboglot.wire.cyberdog.text import NotJson, fitting, misfits, read_params, write
+from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_params, write
 
 log = logging.getLogger(__name__)
 DOOR = "cyberdog"
@@ -88,7 +88,7 @@ async def _stood_in(call: Call, stand_in: StandIn) -> object | None:
 async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
     """Let the stand-in answer; send all but the last answer."""
     operation = TABLE.get(call.code)
-    if call.context.robot.admission.asks:
+    if call.context.robot.admission.enforced:
         call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
     reads = operation is not None and operation.right is Right.SEE
     async for reply in stand_in.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
@@ -111,12 +111,12 @@ async def _answered(call: Call) -> object | None:
         return _not_there(call.code)
     wrong: list[str] = []
     try:
-        if call.context.robot.admission.asks:
+        if call.context.robot.admission.enforced:
             call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right)
         if values and operation.names:
             taken = fitting(values, operation.parameters)
             if len(taken) < len(values):
-                wrong = misfits(values, operation.parameters)
+                wrong = mismatches(values, operation.parameters)
             values = taken
         return _logged(call, await operation.call(call, values))
     except BadParameters as bad:

@@ -50,7 +50,7 @@ class Handshakes:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._watch, peers)
 
-    def asked(self, peer: str) -> None:
+    def note_request(self, peer: str) -> None:
         """Record a request from ``peer`` (in gRPC's form): its handshake succeeded."""
         if peer not in self._asked:
             self._asked[peer] = None

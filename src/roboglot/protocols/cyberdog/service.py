@@ -12,7 +12,7 @@ from urllib.parse import unquote
 import grpc
 
 from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
-from roboglot.model.client_context import ask_for, identity
+from roboglot.model.client_context import identity, set_client
 from roboglot.model.inputs.outside import CALLED_OFF
 from roboglot.protocols.cyberdog.app_link import host_of
 from roboglot.protocols.cyberdog.call import Call
@@ -83,12 +83,12 @@ class Service:
 
     async def _send(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:
         robot, peer = self._context.robot, rpc.peer()
-        if robot.admission.asks:
+        if robot.admission.enforced:
             await self._admit(rpc, peer)
         if request is None:
             _note_unreadable(peer)
             return _answer(0, error(InBandError.BAD_PARAMETERS))
-        if robot.admission.asks:
+        if robot.admission.enforced:
             await self._count(peer, len(request.params))
         if (fairness := robot.fairness) is None:
             return await self._serve(request, rpc, peer)
@@ -108,7 +108,7 @@ class Service:
         async def reply(value: object) -> None:
             if tap.watched:
                 tap.reply("cyberdog", str(int(code)), write(value), "ok", began=call.began)
-            await self._say(rpc, _answer(code, value))
+            await self._write(rpc, _answer(code, value))
 
         call = Call(code, request.params, self._context, reply)
         try:
@@ -127,11 +127,11 @@ class Service:
 
     async def _fetch(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:
         peer, tap = rpc.peer(), self._context.robot.tap
-        if self._context.robot.admission.asks:
+        if self._context.robot.admission.enforced:
             await self._admit(rpc, peer)
         if request is None:
             _note_unreadable(peer)
-            await self._say(rpc, pb.FileChunk(error_code=FileError.ARGUMENTS))
+            await self._write(rpc, pb.FileChunk(error_code=FileError.ARGUMENTS))
             return
         began = tap.request("cyberdog", str(int(request.nameCode)), request.params) if tap.watched else None
         try:
@@ -141,18 +141,18 @@ class Service:
         async with contextlib.aclosing(get_file(self._context, request.nameCode, fields, request.params)) as chunks:
             async for chunk in chunks:
                 if not self._context.robot.admission.may(Right.SEE):  # lost while the file was sent
-                    await self._say(rpc, pb.FileChunk(error_code=FileError.CAMERA_SILENT))
+                    await self._write(rpc, pb.FileChunk(error_code=FileError.CAMERA_SILENT))
                     return
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
-                await self._say(rpc, chunk)
+                await self._write(rpc, chunk)
                 await self._count(peer, len(chunk.buffer))
 
     def _note_end(self, peer: str, code: int, asked: float | None) -> None:
         outside = self._context.robot.outside
         outside.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
 
-    async def _say(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
+    async def _write(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
         """Write to a client; the time that this takes is not robot time."""
         with self._context.robot.clock.holding():
             await rpc.write(message)
@@ -160,21 +160,21 @@ class Service:
     async def _count(self, peer: str, size: int) -> None:
         """Count bytes to or from a client; delay one beyond its share."""
         admission = self._context.robot.admission
-        if admission.asks:
+        if admission.enforced:
             await pay(admission.spend(identity() or host_of(peer), size))
 
     def _enter(self, peer: str) -> str:
         """Return the caller's host; set the caller as the current client: where rights count, ``_admit`` does that."""
         caller = self._callers.get(peer)
         if caller is None:
-            self._handshakes.asked(peer)
+            self._handshakes.note_request(peer)
             if len(self._callers) >= CALLERS_MAX:
                 self._callers.clear()
             host = host_of(peer)
             caller = self._callers[peer] = _Caller(f"cyberdog {host}", host)
-        if not self._context.robot.admission.asks:
+        if not self._context.robot.admission.enforced:
             self._context.app.seen(peer)
-            ask_for(caller.name, peer)
+            set_client(caller.name, peer)
         return caller.host
 
     async def _admit(self, rpc: grpc.aio.ServicerContext, peer: str) -> None:
@@ -183,10 +183,10 @@ class Service:
         names = rpc.auth_context().get("x509_common_name", [])
         proof = Proof(ProofKind.CERTIFICATE, names[0].decode()) if names else NO_PROOF
         address = unquote(peer).partition(":")[2]
-        who = admission.known(address, proof) or admission.known(address) or ""
+        who = admission.cached_identity(address, proof) or admission.cached_identity(address) or ""
         with contextlib.suppress(Unknown):
             who = who or await admission.admit(address, proof)
-        ask_for(f"cyberdog {who or host_of(peer)}", peer, who)
+        set_client(f"cyberdog {who or host_of(peer)}", peer, who)
         if admission.may(Right.SEE):
             self._context.app.seen(peer)
             self._context.owner = who

@@ -18,7 +18,7 @@ class Stream:
         self._last: object = None
         self._reader: Reader | None = None
 
-    def tell(self, feedback: object) -> None:
+    def send(self, feedback: object) -> None:
         """Send feedback to the reader; a later reader gets the latest first."""
         if feedback != self._last:
             self._last = feedback

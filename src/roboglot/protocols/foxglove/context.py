@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import msgspec
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.robot import Robot
 from roboglot.protocols.channels import Carrier
 from roboglot.protocols.foxglove.channels import Channel, Source
@@ -94,7 +94,7 @@ class Context:
         """Report an action of the client that fails."""
 
         async def report() -> None:
-            ask_for("")  # not on behalf of a client
+            set_client("")  # not on behalf of a client
             if await action.done() is not ActionStatus.SUCCEEDED:
                 end = action.status.name.lower()
                 self.status(Level.WARNING, f"{action.name} {end}: {action.reason or 'another command came'}")

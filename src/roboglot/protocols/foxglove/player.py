@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial
 
 from roboglot.model.background import beside
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.errors import NotReady
 from roboglot.model.robot import Robot
 from roboglot.model.stand_in import Recorded
@@ -142,7 +142,7 @@ class Player:
         return asyncio.get_running_loop().create_task(work, name=name)
 
     async def _play(self, *, sought: bool) -> None:
-        ask_for("")  # not on behalf of the client that started it
+        set_client("")  # not on behalf of the client that started it
         try:
             if sought:
                 await self._show(self._at)
@@ -204,7 +204,7 @@ class Player:
             self._deliver(shot)
 
     async def _show_newcomers(self) -> None:
-        ask_for("")
+        set_client("")
         while self._newcomers:
             newcomers, self._newcomers = self._newcomers, []
             wanted = {number - 1 for _, number, _ in newcomers if self._channels[number - 1].schema in STATES}

@@ -16,7 +16,7 @@ from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.model.inputs.outside import CAME, GONE
 from roboglot.model.lateness import late
 from roboglot.protocols.robomaster.answers import Answer, Repeated
-from roboglot.protocols.robomaster.context import Context, speak_as
+from roboglot.protocols.robomaster.context import Context, act_as
 from roboglot.protocols.robomaster.dispatch import DOOR, answer, at_once
 from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life
 from roboglot.protocols.robomaster.limits import (
@@ -77,14 +77,16 @@ class ControlConnection(asyncio.Protocol):
         self._writable = asyncio.Event()
         self._writable.set()
         self._explained = 0
-        self._said = NOTHING  # what may be answered at once: nothing before it has joined, and while something waits
+        self._repeated = (
+            NOTHING  # what may be answered at once: nothing before it has joined, and while something waits
+        )
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
         peer = transport.get_extra_info("peername")  # None: already disconnected
         self.host = peer[0] if peer else ""
         self._name = f"{peer[0]}:{peer[1]}" if peer else ""
-        who = self._context.robot.admission.known(self._name) if peer else None
+        who = self._context.robot.admission.cached_identity(self._name) if peer else None
         self._shown = f"{who} at {self.host}" if who else self.host
         if not peer or len(self._connections) >= CONTROL_CONNECTIONS_MAX:
             log.warning("robomaster: refused %s: %d connections are open", self.host, len(self._connections))
@@ -94,7 +96,7 @@ class ControlConnection(asyncio.Protocol):
         fairness = self._context.robot.fairness
         self._use = fairness.of(self._name) if fairness else Use(self._name)
         self._variables = copy_context()
-        self._variables.run(speak_as, self._name, who or "")
+        self._variables.run(act_as, self._name, who or "")
         self._connections.add(self)
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)
@@ -103,11 +105,11 @@ class ControlConnection(asyncio.Protocol):
         log.info("robomaster: %s connected", self._shown)
 
     def data_received(self, data: bytes) -> None:
-        if (repeated := self._said.get(data)) is not None and (reply := self._repeat(repeated)) is not None:
+        if (repeated := self._repeated.get(data)) is not None and (reply := self._repeat(repeated)) is not None:
             if type(reply) is bytes:
                 self.transport.write(reply + self._line_end)
             else:
-                self._say(data[:-1].decode(errors="replace").strip(), cast(Answer, reply))
+                self._reply(data[:-1].decode(errors="replace").strip(), cast(Answer, reply))
         else:
             self._read(data)
 
@@ -124,7 +126,7 @@ class ControlConnection(asyncio.Protocol):
     def _read(self, data: bytes) -> None:
         """Queue the lines in ``data``, and answer what can be answered now."""
         whole = self._greeting.known and not self._splitter.within and data.find(END) == len(data) - 1
-        self._said = NOTHING
+        self._repeated = NOTHING
         texts = list(self._splitter.feed(turn_away_strangers(self._greeting, self.transport, data)))
         if self._lenient and self._splitter.pending and (rest := self._splitter.flush()) != "":
             texts.append(rest)
@@ -139,18 +141,18 @@ class ControlConnection(asyncio.Protocol):
 
     def _learn(self, data: bytes, text: str) -> None:
         """Keep what answers this line, for when it is said again."""
-        said = self._context.said
-        if data not in said and (repeated := at_once(self._context, text)) is not None:
-            if len(said) >= LINES_MAX:
-                said.clear()
-            said[data] = repeated
+        known = self._context.repeated
+        if data not in known and (repeated := at_once(self._context, text)) is not None:
+            if len(known) >= LINES_MAX:
+                known.clear()
+            known[data] = repeated
 
     def connection_lost(self, _exc: Exception | None) -> None:
         if self not in self._connections:
             return
         self._connections.discard(self)
         self._context.robot.outside.note_client(GONE, DOOR, self._name)
-        self._said = NOTHING
+        self._repeated = NOTHING
         self._commands.clear()
         if self._resting:
             self._resting.cancel()
@@ -164,7 +166,7 @@ class ControlConnection(asyncio.Protocol):
 
     def pause_writing(self) -> None:
         self._writable.clear()
-        self._said = NOTHING
+        self._repeated = NOTHING
 
     def resume_writing(self) -> None:
         self._writable.set()
@@ -222,8 +224,8 @@ class ControlConnection(asyncio.Protocol):
 
     async def _work(self) -> None:
         """Answer queued commands, a bounded number at a time, so that other clients get their turn."""
-        if self._context.robot.admission.asks:  # it may have proved more since
-            speak_as(self._name, self._context.robot.admission.known(self._name) or "")
+        if self._context.robot.admission.enforced:  # it may have proved more since
+            act_as(self._name, self._context.robot.admission.cached_identity(self._name) or "")
         for _ in range(BATCH_MAX):
             if not self._commands:
                 return
@@ -236,11 +238,11 @@ class ControlConnection(asyncio.Protocol):
         result = await answer(self._context, text)
         self._join()
         await late(self._context.robot)
-        self._say(text, result)
+        self._reply(text, result)
         if not self._commands and not self._splitter.within and self._writable.is_set():
-            self._said = self._context.said
+            self._repeated = self._context.repeated
 
-    def _say(self, text: str | None, result: Answer) -> None:
+    def _reply(self, text: str | None, result: Answer) -> None:
         self.transport.write(result.reply + self._line_end)
         if result.explain:
             explained = cache(lambda: self._refusal(text, result))

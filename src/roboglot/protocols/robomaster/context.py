@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from roboglot.model.actions import Action
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import RobotError
@@ -42,10 +42,10 @@ P = TypeVar("P", bound=ChapterState)
 _speaker: ContextVar[str] = ContextVar("speaker", default="nobody")
 
 
-def speak_as(name: str, identity: str = "") -> None:
+def act_as(name: str, identity: str = "") -> None:
     """Attribute this task's commands to ``name`` with the proven ``identity`` from here on."""
     _speaker.set(name)
-    ask_for(f"robomaster {identity or name}", name, identity)
+    set_client(f"robomaster {identity or name}", name, identity)
 
 
 class Outlets(Protocol):
@@ -57,7 +57,7 @@ class Outlets(Protocol):
     def push(self, datagram: bytes, host: str) -> None:
         """Send a datagram to the client at ``host``."""
 
-    def tell(self, event: bytes) -> None:
+    def send_event(self, event: bytes) -> None:
         """Send an event to all readers of the event port."""
 
 
@@ -80,7 +80,7 @@ class Context:
         self._parts: dict[type[ChapterState], Any] = {}
         self._undo: dict[str, Callable[[], object]] = {}
         self._members: dict[Hashable, str] = {}
-        self.said: dict[bytes, Repeated] = {}  # by what a member sent; emptied when SDK mode is entered or left
+        self.repeated: dict[bytes, Repeated] = {}  # by what a member sent; emptied when SDK mode is entered or left
         self._numbers = itertools.count(1)
         self._name = ""  # each session has its own: the first part of the source of its actions
 
@@ -154,8 +154,8 @@ class Context:
 
     def _forget_lines(self) -> None:
         """Drop the answers of the last session; its members, who may hold them, join the next one first."""
-        self.said.clear()
-        self.said = {}
+        self.repeated.clear()
+        self.repeated = {}
 
     def join(self, member: Hashable, host: str) -> None:
         """Add ``member`` from ``host``: it keeps the session alive and gets the pushes."""

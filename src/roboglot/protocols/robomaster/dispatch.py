@@ -126,7 +126,7 @@ def _enter(context: Context, key: str, text: str, asked: _Asked) -> None:
     asked.key = key
     if context.robot.tap.watched:
         asked.began = context.robot.tap.request(DOOR, key, text)
-    if context.robot.admission.asks:
+    if context.robot.admission.enforced:
         context.robot.admission.check(DOOR, key, TABLE[key].right)
 
 
@@ -150,7 +150,7 @@ def at_once(context: Context, text: str) -> Repeated | None:
     It returns None where it has done nothing, as the line has to go through ``answer`` just now.
     """
     asked = context.robot
-    if not context.active or asked.admission.asks or asked.stand_in is not None:
+    if not context.active or asked.admission.enforced or asked.stand_in is not None:
         return None
     try:
         meant = _meant(text, context.active, context.profile.as_robots)
@@ -198,7 +198,7 @@ async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, t
     asked.key = operation.key if operation else ""
     if context.robot.tap.watched:
         asked.began = context.robot.tap.request(DOOR, asked.key, text)
-    if context.robot.admission.asks:
+    if context.robot.admission.enforced:
         context.robot.admission.check(DOOR, asked.key, operation.right if operation else Right.ADMIN)
     try:
         reads = text.rstrip(" ;").endswith("?")

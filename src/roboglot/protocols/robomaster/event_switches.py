@@ -49,7 +49,7 @@ class EventSwitches:
             self._stops.pop(name)()
 
     def _send(self, text: str) -> None:
-        self._context.outlets.tell(self._context.profile.event(text))
+        self._context.outlets.send_event(self._context.profile.event(text))
 
     def _on_hit(self, hit: ArmorHit) -> None:
         self._send(f"armor event hit {ARMOR[hit.place]} {HITS[hit.kind]}")

@@ -29,7 +29,7 @@ GREETINGS = 3  # requests sent to a host before its client drives
 
 
 class Echoes:
-    """Echo requests to hosts; ``heard`` lists those that answered since the last call."""
+    """Echo requests to hosts; ``answered`` lists those that answered since the last call."""
 
     def __init__(self) -> None:
         self._heard: set[str] = set()
@@ -37,13 +37,13 @@ class Echoes:
         with contextlib.suppress(OSError):  # not permitted (net.ipv4.ping_group_range): the kernel's probes remain
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK, socket.IPPROTO_ICMP)
 
-    def ask(self, host: str) -> None:
+    def send(self, host: str) -> None:
         """Send one echo request."""
         if self._socket:
             with contextlib.suppress(OSError):
                 self._socket.sendto(_ECHO, (host, 0))
 
-    def heard(self) -> set[str]:
+    def answered(self) -> set[str]:
         """Return the hosts that answered since the last call."""
         if self._socket:
             with contextlib.suppress(OSError):
@@ -139,7 +139,7 @@ class Vigil:
         elapsed = asyncio.get_running_loop().time() - self._looked
         self._timer = None
         drivers = [driver for driver in self._drivers() if driver.askable]
-        heard = self._echoes.heard() if self._echoes else set()
+        heard = self._echoes.answered() if self._echoes else set()
         for driver in drivers:
             echoed, ask = driver.host in heard, True
             if not self._drives(driver.name):
@@ -148,6 +148,6 @@ class Vigil:
                 log.warning("robomaster: %s does not answer; its motions are stopped", driver.name)
                 self._gone(driver.name)
             if ask and self._echoes:
-                self._echoes.ask(driver.host)
+                self._echoes.send(driver.host)
         if drivers:
             self._plan()

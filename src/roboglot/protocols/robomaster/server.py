@@ -150,17 +150,17 @@ class RoboMasterDoor:
         elif self._datagrams and admission.carries_datagrams(place):  # a tunnel takes its copies from the tap
             self._datagrams.send(datagram, host, self._config.push_port)
 
-    def tell(self, event: bytes) -> None:
+    def send_event(self, event: bytes) -> None:
         """Send an event to all readers of the event port and down the serial line."""
         self._note(event, f"event port {self._config.event_port}")
-        self._events.tell(event)
+        self._events.write(event)
         if self._serial:
             self._serial.write(event + LINE_END)
 
     def _play(self, operation: str, message: bytes) -> None:
         """Send a stand-in's pushes: events to their readers, the rest to every client's host."""
         if operation.endswith(" event"):
-            self.tell(message)
+            self.send_event(message)
         elif operation != "> robot ip":  # this robot is elsewhere and reports it itself
             for host in {connection.host for connection in self._connections}:
                 self.push(message, host)
@@ -176,7 +176,7 @@ class RoboMasterDoor:
 
     def _explain(self, text: Callable[[], str]) -> None:
         if self._explanations:
-            self._explanations.tell(f"{text()}\n".encode())
+            self._explanations.write(f"{text()}\n".encode())
 
     def _note(self, message: bytes, to: str) -> None:
         tap = self.context.robot.tap

@@ -15,9 +15,9 @@ from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.robomaster.ranges import OnRobots
+from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 from roboglot.wire.robomaster.commands import Value, parameters_of
 
@@ -44,7 +44,7 @@ class Shape:
         try:
             checked = msgspec.convert(values, self.struct, strict=False)
         except msgspec.ValidationError as error:
-            raise BadParameters(misfit(error)) from None
+            raise BadParameters(why_invalid(error)) from None
         return {name: getattr(checked, name) for name in self.kinds}
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from roboglot.extras import explaining
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.background import beside
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.system.link import is_current
@@ -92,7 +92,7 @@ class Ros2Door:
         """Listen and publish. Raises MissingExtra without its libraries, OSError for an address that is taken."""
         if not self._config.enabled:
             return
-        if self._robot.admission.asks:
+        if self._robot.admission.enforced:
             log.warning("robot %s: the ROS 2 door stays closed: Zenoh shows no one's rights", self._robot.id)
             return
         with explaining("the ROS 2 door", "ros2"):
@@ -169,7 +169,7 @@ class Ros2Door:
         self._tokens.append(self._session.liveliness().declare_token(token))
         loop = asyncio.get_running_loop()
 
-        def hear(sample: zenoh.Sample) -> None:  # in a thread of Zenoh's
+        def on_sample(sample: zenoh.Sample) -> None:  # in a thread of Zenoh's
             data = sample.payload.to_bytes() if len(sample.payload) <= MESSAGE_MAX else None
             self._heard.put(key, data)
             if not self._called:
@@ -177,7 +177,7 @@ class Ros2Door:
                 loop.call_soon_threadsafe(self._take)
 
         key_of_all = topic_key(self._config.domain, topic, type, "*")
-        self._tokens.append(self._session.declare_subscriber(key_of_all, hear))
+        self._tokens.append(self._session.declare_subscriber(key_of_all, on_sample))
 
     def receive(self, key: str, data: bytes) -> None:
         """Take a message as if it had come from Zenoh, where the door is open."""
@@ -195,7 +195,7 @@ class Ros2Door:
             self._answering = self._follow(self._answer_all())
 
     async def _answer_all(self) -> None:
-        ask_for(DOOR)
+        set_client(DOOR)
         while self._heard:
             await self._turns.take(self._heard.stops)
             await self._turns.count(self._answer(*self._heard.pop()))
@@ -206,13 +206,13 @@ class Ros2Door:
 
         level, why = await answer(Context(self._robot, self._config, self._report), key, data, read_cdr)
         if why:
-            self._say(level, why)
+            self._log(level, why)
 
     def _report(self, action: Action) -> None:
         async def wait() -> None:
             if await action.done() is not ActionStatus.SUCCEEDED:
                 end = action.status.name.lower()
-                self._say(logging.WARNING, f"{action.name} {end}: {action.reason or 'another command came'}")
+                self._log(logging.WARNING, f"{action.name} {end}: {action.reason or 'another command came'}")
 
         self._follow(wait())
 
@@ -265,7 +265,7 @@ class Ros2Door:
             if message.type != "std_msgs/msg/String":
                 self._publish(message)
 
-    def _say(self, level: int, text: str) -> None:
+    def _log(self, level: int, text: str) -> None:
         log.info("robot %s: %s", self._robot.id, text)
         self._publish(self._words.line(self._now(), level, NODE, text))
 

@@ -19,7 +19,7 @@ from typing import get_args
 import msgspec
 
 from roboglot.model.admission import NO_PROOF, Forbidden, LockedOut, Proof, ProofKind, Unknown
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.lateness import late
@@ -110,7 +110,7 @@ class Application:
         peer = scope.get("client") or ("", 0)
         client = f"slamware {peer[0]}".strip()
         address = f"{peer[0]}:{peer[1]}"
-        ask_for(client, address)
+        set_client(client, address)
         if fairness := self._context.robot.fairness:
             await wait_for_turn(fairness, fairness.of(address), lambda: _stops(scope))
         begun = perf_counter()
@@ -118,7 +118,7 @@ class Application:
         why = ""
         try:
             shared = self._admit(scope)
-            if self._admission.asks and scope["method"] != "OPTIONS":  # browsers send no credentials in a preflight
+            if self._admission.enforced and scope["method"] != "OPTIONS":  # browsers send no credentials in a preflight
                 await self._enter(scope)
             status, headers, body = await self._answer(scope, receive)
         except ClientGone:
@@ -151,7 +151,7 @@ class Application:
         """
         robot = self._context.robot
         operation, match = self._found(scope)
-        if operation is None or match is None or self._admission.asks or robot.stand_in is not None:
+        if operation is None or match is None or self._admission.enforced or robot.stand_in is not None:
             return None
         if log.isEnabledFor(logging.DEBUG):
             return None
@@ -230,13 +230,13 @@ class Application:
         shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
         proof = Proof(ProofKind.HTTP, shown) if shown else NO_PROOF
         try:
-            who = self._admission.known(address, proof)
+            who = self._admission.cached_identity(address, proof)
             if who is None:
                 who = await self._admission.admit(address, proof)
         except Unknown as unknown:
             more = (CHALLENGE, CLOSE) if isinstance(unknown, LockedOut) else (CHALLENGE,)  # the body is not read
             raise HttpError(401, "Unauthorized", str(unknown), more) from None
-        ask_for(f"slamware {who}", address, who)
+        set_client(f"slamware {who}", address, who)
 
     async def _answer(self, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         method = scope["method"]
@@ -279,7 +279,7 @@ class Application:
 
     def _check_right(self, key: str, right: Right | None) -> None:
         """Raise HttpError if the client may not do this."""
-        if self._admission.asks:
+        if self._admission.enforced:
             try:
                 self._admission.check("slamware", key, right)
             except Forbidden as forbidden:
@@ -294,7 +294,7 @@ class Application:
     async def _call(self, operation: Operation[str], row: Row, values: dict[str, object], scope: Scope) -> object:
         """The handler's answer. Raises HttpError only."""
         try:
-            if self._admission.asks and "body" in values:
+            if self._admission.enforced and "body" in values:
                 await self._check_again(scope, row.key, operation.right)
             return await operation.call(self._context, values)
         except BadParameters as error:

@@ -8,13 +8,13 @@ from urllib.parse import parse_qsl
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.operations import Operation
 from roboglot.protocols.slamware.bodies import Receive, Scope, chunks, read_body
 from roboglot.protocols.slamware.chapters.firmware.uploads import PACKAGE_MAX, Upload
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError, bad_request
 from roboglot.protocols.slamware.routes import SHORTHANDS, Match
+from roboglot.validation import why_invalid
 
 BODY_MAX = 1 << 20  # bytes of a JSON body
 UPLOAD_MAX = 64 << 20  # bytes of a binary body
@@ -47,7 +47,7 @@ class Parameters:
             try:
                 values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)
             except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-                why = misfit(error, "the body") if body else "a JSON body is needed"
+                why = why_invalid(error, "the body") if body else "a JSON body is needed"
                 raise bad_request(operation.key, why) from None
         return values
 

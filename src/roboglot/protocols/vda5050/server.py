@@ -13,7 +13,7 @@ import msgspec
 
 from roboglot.extras import explaining
 from roboglot.model.admission import Unknown
-from roboglot.model.client_context import ask_for
+from roboglot.model.client_context import set_client
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
@@ -162,7 +162,7 @@ class Vda5050Door:
         who = ""
         with contextlib.suppress(Unknown):
             who = await self._robot.admission.admit(address)
-        ask_for(f"{self.name} {address.rpartition(':')[0]}", address, who)
+        set_client(f"{self.name} {address.rpartition(':')[0]}", address, who)
 
     async def _report(self) -> None:
         """Send the state after each change and periodically."""

@@ -71,7 +71,7 @@ class Dispatch:
         if len(self._pending) >= PENDING_MAX:
             answers.refuse(FeedbackState.INTERRUPTED, f"more than {PENDING_MAX} frames are being answered")
             return
-        if self._service.robot.admission.asks:
+        if self._service.robot.admission.enforced:
             try:
                 self._service.robot.admission.check(DOOR, key_of(request), _right_of(request))
             except Forbidden as forbidden:

@@ -12,8 +12,8 @@ from typing import Annotated, Any
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.recording.comparing.trees import kind_of
+from roboglot.validation import why_invalid
 
 RULES_MAX = 1000
 # Values that differ in every session: UUIDs, dates, Unix times in s, ms, us or ns.
@@ -88,7 +88,7 @@ def read_mask(path: Path) -> Mask:
     try:
         mask = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Mask)
     except (msgspec.ValidationError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{path}: {misfit(error)}") from None
+        raise ValueError(f"{path}: {why_invalid(error)}") from None
     if len(mask.rule) > RULES_MAX:
         raise ValueError(f"{path}: more than {RULES_MAX} rules")
     return mask

@@ -28,11 +28,11 @@ class Announcer:
             self._out, _ = await loop.create_datagram_endpoint(
                 asyncio.DatagramProtocol, local_addr=(self._address, 0), allow_broadcast=True
             )
-            self._in, _ = await loop.create_datagram_endpoint(lambda: _Ear(self.hear), sock=_listening())
+            self._in, _ = await loop.create_datagram_endpoint(lambda: _Ear(self.forward), sock=_listening())
         except OSError as error:
             log.warning("cannot pass the robot's broadcasts: UDP %d: %s", PORT, error.strerror)
 
-    def hear(self, data: bytes, sender: str) -> None:
+    def forward(self, data: bytes, sender: str) -> None:
         """Pass one broadcast on, if it is this robot's and has the known form."""
         if sender != self._host or not data.startswith(PREFIX) or self._out is None:
             return

@@ -115,7 +115,7 @@ class GrpcSniffer(Sniffer):
 
     def __init__(self, note: Note) -> None:
         super().__init__(note)
-        asking, answering = both(self.asked, self.answered, self.ended)
+        asking, answering = both(self.on_request, self.answered, self.ended)
         self._asking: Callable[[bytes], None] = asking.feed
         self._answering: Callable[[bytes], None] = answering.feed
 
@@ -125,7 +125,7 @@ class GrpcSniffer(Sniffer):
     def from_robot(self, data: bytes) -> None:
         self._answering(data)
 
-    def asked(self, call: Call, message: bytes) -> None:
+    def on_request(self, call: Call, message: bytes) -> None:
         """Handle a message of the caller."""
 
     def answered(self, call: Call, message: bytes) -> None:
@@ -138,8 +138,8 @@ class GrpcSniffer(Sniffer):
 class AppSniffer(GrpcSniffer):
     """Requests of an app, and the robot's answers."""
 
-    def asked(self, call: Call, message: bytes) -> None:
-        call.code, text = _said(message) if call.path in (SEND, FETCH) else ("", message)
+    def on_request(self, call: Call, message: bytes) -> None:
+        call.code, text = _decoded(message) if call.path in (SEND, FETCH) else ("", message)
         call.at = self._note(Direction.REQUEST, call.code, text, "", None)
 
     def answered(self, call: Call, message: bytes) -> None:
@@ -162,9 +162,9 @@ class RobotSniffer(GrpcSniffer):
         super().__init__(note)
         self._beats = beats
 
-    def asked(self, call: Call, message: bytes) -> None:
+    def on_request(self, call: Call, message: bytes) -> None:
         if call.path != BEAT:
-            code, text = _said(message)
+            code, text = _decoded(message)
             self._note(Direction.PUSH, code, text, "", None)
             return
         ticks = _read(pb.Ticks, message)
@@ -181,7 +181,7 @@ def _read(kind: type[Message], data: bytes) -> Message | None:
         return None
 
 
-def _said(request: bytes) -> tuple[str, bytes]:
+def _decoded(request: bytes) -> tuple[str, bytes]:
     """Return the code and the text of a message; "" and all its bytes if it cannot be parsed."""
     said = _read(pb.SendRequest, request)
     return ("", request) if said is None else (str(said.nameCode), said.params.encode())

@@ -47,7 +47,7 @@ class Sniffer(ABC):
     def from_robot(self, data: bytes) -> None:
         """Parse bytes to the client."""
 
-    def _asked(self, operation: str, payload: bytes) -> None:
+    def _on_request(self, operation: str, payload: bytes) -> None:
         self._waiting.append((operation, self._note(Direction.REQUEST, operation, payload[:PAYLOAD_MAX], "", None)))
 
     def _answered(self, payload: bytes, status: str) -> None:
@@ -66,7 +66,7 @@ class TextSniffer(Sniffer):
     def from_client(self, data: bytes) -> None:
         for text in self._commands.feed(data):
             if text is not None:
-                self._asked(self._key(text), text.encode())
+                self._on_request(self._key(text), text.encode())
 
     def from_robot(self, data: bytes) -> None:
         *whole, self._rest = (self._rest + data).split(b";")
@@ -147,7 +147,7 @@ class RestSniffer(Sniffer):
         method, message = self._requests.get_method().decode(), self._asking
         path = message.target.decode("latin-1")
         self._methods.append(method)
-        self._asked(rest_operation(method, path), f"{method} {path}\n\n".encode("latin-1") + message.payload)
+        self._on_request(rest_operation(method, path), f"{method} {path}\n\n".encode("latin-1") + message.payload)
 
     def _reply(self) -> None:
         message, status = self._answering, self._replies.get_status_code()

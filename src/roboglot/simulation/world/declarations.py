@@ -13,8 +13,8 @@ from typing import TypeVar, cast
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.spelling import meant
+from roboglot.validation import why_invalid
 
 T = TypeVar("T")
 FILE_BYTES_MAX = 4_000_000
@@ -51,7 +51,7 @@ def _decoded(text: str, structure: object) -> object:
 
 def _explained(error: msgspec.ValidationError, structure: type) -> str:
     """Return the mistake in plain words, with the nearest known key for an unknown one."""
-    message = misfit(error, "the file")
+    message = why_invalid(error, "the file")
     unknown = re.search(r"unknown field `([^`]+)`", str(error))
     if unknown is None:
         return message

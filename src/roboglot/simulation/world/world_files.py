@@ -13,7 +13,6 @@ import numpy as np
 from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
-from roboglot.misfits import misfit
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.building.rectangles import cover
@@ -30,6 +29,7 @@ from roboglot.simulation.world.description import (
 )
 from roboglot.simulation.world.description_checks import completed
 from roboglot.spelling import instead
+from roboglot.validation import why_invalid
 
 WORLDS = Path(__file__).parent.parent / "worlds"
 CELLS_MAX = 16_000_000
@@ -116,7 +116,7 @@ def _read(path: Path) -> RosMap:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise BadFile(f"{path}: not YAML: {error}") from None
     except msgspec.ValidationError as error:
-        raise BadFile(f"{path}: not a ROS map: {misfit(error)}") from None
+        raise BadFile(f"{path}: not a ROS map: {why_invalid(error)}") from None
     if ros_map.origin[2]:
         raise BadFile(f"{path}: origin has a yaw of {ros_map.origin[2]}; only maps with yaw 0 can be imported")
     if ros_map.free_thresh >= ros_map.occupied_thresh:

@@ -11,9 +11,9 @@ from typing import Annotated, Any
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.spelling import instead
 from roboglot.testing.wanted import SPEED, Wanted, WantedFault
+from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 
 BYTES_MAX = 1 << 20
@@ -219,7 +219,7 @@ def read(path: Path) -> Found:
         _check(scenario)
         scenario.given.wanted(path.parent)
     except (OSError, UnicodeDecodeError, YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
-        why = error.strerror if isinstance(error, OSError) and error.strerror else misfit(error, "the file")
+        why = error.strerror if isinstance(error, OSError) and error.strerror else why_invalid(error, "the file")
         raise BadScenario(f"{path}: {' '.join(why.split())}") from None
     return Found(path, scenario)
 

@@ -9,7 +9,7 @@ from typing import Annotated, NoReturn
 
 import msgspec
 
-from roboglot.misfits import misfit
+from roboglot.validation import why_invalid
 
 # Used when the strict reader fails: raw line ends inside strings, as in one app's SDP.
 _lenient = json.JSONDecoder(strict=False, parse_constant=lambda name: _refuse(name))
@@ -64,7 +64,7 @@ def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mappi
     }
 
 
-def misfits(values: Mapping[str, object], fields: type[msgspec.Struct]) -> list[str]:
+def mismatches(values: Mapping[str, object], fields: type[msgspec.Struct]) -> list[str]:
     """Describe the errors in those of ``values`` that ``fitting`` leaves out."""
     return [
         reason
@@ -88,7 +88,7 @@ def _misfit(name: str, value: object, kind: object) -> str:
         # Some languages write whole numbers in JSON with a decimal point: 303.0 counts as 303.
         msgspec.convert(value, kind, strict=not isinstance(value, float))
     except msgspec.ValidationError as error:
-        return misfit(error, field=name)
+        return why_invalid(error, field=name)
     return ""
 
 

@@ -154,7 +154,7 @@ _GAME = re.compile(r"game msg push \[(-?\d{1,9}(?:, ?-?\d{1,9}){0,63})\]")
 _BROADCAST = re.compile(r"robot ip ([0-9.]{7,15}) ?;?")
 
 
-def hear(data: bytes) -> Iterator[Telemetry]:
+def parse_pushes(data: bytes) -> Iterator[Telemetry]:
     """Yield the messages in a datagram of the push port, or in whole texts of the event port."""
     module = ""
     for text in data[:TEXT_MAX].decode(errors="replace").split(";"):

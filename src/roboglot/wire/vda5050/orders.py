@@ -8,7 +8,7 @@ from typing import Annotated, Literal, TypeVar
 
 import msgspec
 
-from roboglot.misfits import misfit
+from roboglot.validation import why_invalid
 
 MESSAGE_MAX = 1 << 20  # bytes
 NODES_MAX = 1000
@@ -166,7 +166,7 @@ def read(data: bytes, kind: type[M]) -> M:
     try:
         message = msgspec.json.decode(data, type=kind)
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
-        raise Malformed(misfit(error, "the message")) from None
+        raise Malformed(why_invalid(error, "the message")) from None
     if isinstance(message, OrderMessage):
         _check_graph(message)
     _check_ids(message)

@@ -10,7 +10,7 @@ import re
 from enum import StrEnum
 from typing import NoReturn
 
-from roboglot.conditions import BadCondition, parse_cycle, parse_interface, parse_moment
+from roboglot.task_conditions import BadCondition, parse_cycle, parse_interface, parse_moment
 from roboglot.values import dataclass
 from roboglot.wire.visual.codes import FeedbackState
 

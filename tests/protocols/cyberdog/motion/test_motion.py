@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from roboglot.model.client_context import asking_for
+from roboglot.model.client_context import acting_for
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE, Driving
@@ -203,12 +203,12 @@ async def test_frames_that_come_during_a_motion_are_refused(client, app, robot, 
 
 async def test_another_clients_servo_is_not_cut_short(client, robot, world, forward) -> None:
     gaits = Gaits(robot)
-    with asking_for("cyberdog 10.0.0.7"):
+    with acting_for("cyberdog 10.0.0.7"):
         gaits.servo(303, Wish(Twist(0.3)))
     await forward(seconds=0.1)
-    with asking_for("cyberdog 10.0.0.8"):
+    with acting_for("cyberdog 10.0.0.8"):
         assert gaits.check(111, Wish()) is MotionCode.BUSY
-    with asking_for("cyberdog 10.0.0.7"):
+    with acting_for("cyberdog 10.0.0.7"):
         assert gaits.check(111, Wish()) is None
 
 

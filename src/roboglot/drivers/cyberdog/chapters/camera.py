@@ -44,7 +44,7 @@ class CyberDogCamera(Camera):
         self._feed: Feed[Frame] = Feed(self._begin, self._end, queue_max=QUEUE_MAX)
         self._looking: asyncio.Task[None] | None = None
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe the camera. Raises CyberDogRefused or NoAnswer if there is none."""
         await self._client.end_video("nobody")
 

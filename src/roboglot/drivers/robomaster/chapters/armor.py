@@ -21,7 +21,7 @@ class RoboMasterArmor(Armor):
         self.plates = AROUND
         self._sensitivity = 5
 
-    async def learn(self, *, gimbal: bool) -> None:
+    async def probe(self, *, gimbal: bool) -> None:
         """Poll the sensitivity and subscribe to hits."""
         self._sensitivity = await self._client.armor.get_sensitivity()
         await self._client.armor.event(True)

@@ -20,7 +20,7 @@ class RoboMasterBlaster(Blaster):
         self._clock, self._client, self._supervisor = clock, client, supervisor
         self._beads, self._until = 1, -1.0
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Poll the number of beads per shot."""
         self._beads = await self._client.blaster.get_bead()
 

@@ -73,7 +73,7 @@ class RoboMasterCamera(Camera):
         self._exposure = "default"
         self._feed: Feed[Frame] = DecodedFeed(packets, clock, _decoder, _frames, queue_max=QUEUE_MAX)
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Send the current exposure. Raises RefusedByRobot if there is no camera."""
         await self._client.camera.exposure(self._exposure)
 

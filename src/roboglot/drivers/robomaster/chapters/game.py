@@ -25,11 +25,11 @@ class RoboMasterInput(InputDevice):
         self._client, self._supervisor = client, supervisor
         self._forget: Callable[[], None] = lambda: None
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Switch the reports. Raises RefusedByRobot if the robot has none."""
         await (self._client.game_msg.on() if self._listeners else self._client.game_msg.off())
         self._forget()
-        self._forget = self._client.listen(self._hear, GameInput)
+        self._forget = self._client.listen(self._on_push, GameInput)
 
     def listen(self, listener: Callable[[Input], None]) -> Callable[[], None]:
         if not self._listeners:
@@ -57,7 +57,7 @@ class RoboMasterInput(InputDevice):
         with contextlib.suppress(RobotError):  # without a link: at the next connection
             self._supervisor.send("switching the pilot's keys", game.on() if on else game.off())
 
-    def _hear(self, push: object) -> None:
+    def _on_push(self, push: object) -> None:
         assert isinstance(push, GameInput)
         if push.cmd_id != KEYS_AND_MOUSE or len(push.data) < 5:
             return

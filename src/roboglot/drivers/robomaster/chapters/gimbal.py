@@ -43,7 +43,7 @@ class RoboMasterGimbal(Gimbal):
         self._motions = motion.Motions(robot, supervisor)
         self._mode, self._suspended = FollowMode.CHASSIS_LEAD, False
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Poll attitude and mode. Raises RefusedByRobot without a gimbal; only the attitude shows that."""
         await self._client.gimbal.get_attitude()
         words = await self._client.robot.get_mode()

@@ -25,7 +25,7 @@ class RoboMasterRanges(RangeSensors):
         self._readings: dict[str, RangeReading] = {}
         self._measuring = False
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe the sensors and resume measuring. Raises RefusedByRobot if there is none."""
         count = 0
         try:

@@ -20,7 +20,7 @@ class RoboMasterPwm(PwmPorts):
         self._client, self._supervisor = client, supervisor
         self._commanded: dict[int, PwmSignal] = {}
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Send the signals again. Raises RefusedByRobot if there are no outputs."""
         await self._client.pwm.freq((1 << COUNT) - 1, round(AT_REST.frequency))  # changes nothing on a robot at rest
         for port, signal in self._commanded.items():

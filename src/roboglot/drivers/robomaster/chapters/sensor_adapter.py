@@ -40,10 +40,10 @@ class RoboMasterAdapters(SensorAdapters):
         self._turn: Iterator[tuple[int, int]] = iter(())
         self._forget: Callable[[], None] = lambda: None
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe the adapters and subscribe to changes. Raises RefusedByRobot if there is none."""
         self._forget()
-        self._forget = self._client.listen(self._hear, AdapterLevel)
+        self._forget = self._client.listen(self._on_push, AdapterLevel)
         self._inputs = {}
         try:
             for adapter, port in itertools.product(range(1, COUNT_MAX + 1), range(1, PORTS + 1)):
@@ -81,9 +81,9 @@ class RoboMasterAdapters(SensorAdapters):
         entry = self._inputs.setdefault((adapter, port), _Input())
         entry.voltage, entry.period = voltage, await robot.get_pulse_period(adapter, port) / 1000
         self._take(adapter, port, bool(await robot.get_io_level(adapter, port)))
-        self._link.heard(f"sensor adapter {adapter}")
+        self._link.note_update(f"sensor adapter {adapter}")
 
-    def _hear(self, change: object) -> None:
+    def _on_push(self, change: object) -> None:
         assert isinstance(change, AdapterLevel)
         if (change.id, change.port) in self._inputs:
             self._take(change.id, change.port, bool(change.level))

@@ -28,7 +28,7 @@ class RoboMasterServos(Servos):
         self._motions = motion.Motions(robot, supervisor)
         self._angles: list[float] = []
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe the servos. Raises RefusedByRobot if there is none."""
         self._angles = [await self._ask(1)]
         try:

@@ -51,7 +51,7 @@ class RoboMasterMicrophone(Microphone):
         self._client, self._packet_feed = client, packet_feed
         self._feed: Feed[SoundBlock] = DecodedFeed(packet_feed, clock, _decoder, _blocks, queue_max=QUEUE_MAX)
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Switch the stream. Raises RefusedByRobot if there is no microphone."""
         await (self._client.audio.on() if self._packet_feed.viewers else self._client.audio.off())
 
@@ -80,11 +80,11 @@ class RoboMasterHearing(Hearing):
         self._feed: Feed[ClapsHeard] = Feed(lambda: self._switch(True), lambda: self._switch(False), queue_max=RUNS_MAX)
         self._forget: Callable[[], None] = lambda: None
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Switch the reports. Raises RefusedByRobot if the robot has none."""
         await self._client.sound.event(self._feed.viewers > 0)
         self._forget()
-        self._forget = self._client.listen(self._hear, Applause)
+        self._forget = self._client.listen(self._on_push, Applause)
 
     def claps(self) -> Viewer[ClapsHeard]:
         return self._feed.subscribe()
@@ -96,7 +96,7 @@ class RoboMasterHearing(Hearing):
         with contextlib.suppress(RobotError):  # without a link it is sent at the next connection
             self._supervisor.send("switching applause", self._client.sound.event(on))
 
-    def _hear(self, push: object) -> None:
+    def _on_push(self, push: object) -> None:
         assert isinstance(push, Applause)
         self._feed.push(ClapsHeard(self._clock.time(), push.count))
 

@@ -45,7 +45,7 @@ class Link(Component):
         self._heard: dict[str, float] = {}
         self._holder = ""
         self._stop_others: Callable[[], Awaitable[None]] | None = None
-        self._tell_health()
+        self._report_health()
 
     @property
     def state(self) -> LinkState:
@@ -108,7 +108,7 @@ class Link(Component):
 
     # -- for the driver --
 
-    def heard(self, what: str) -> None:
+    def note_update(self, what: str) -> None:
         """Record an update of ``what`` now."""
         self._heard[what] = self._clock.time()
 
@@ -119,7 +119,7 @@ class Link(Component):
         if state is not self._state:
             self._since = self._clock.time()
         self._state, self._reason = state, reason
-        self._tell_health()
+        self._report_health()
         self._publish()
 
     def held_by(self, holder: str) -> None:
@@ -135,7 +135,7 @@ class Link(Component):
     def _publish(self) -> None:
         self._events.publish(LinkChanged(stamp=self._clock.time(), state=self._state, holder=self._holder))
 
-    def _tell_health(self) -> None:
+    def _report_health(self) -> None:
         self._health.set(FAULT, False, "link", FaultLevel.ERROR)
         if self._state is not LinkState.UP:
             self._health.set(FAULT, True, "link", FaultLevel.ERROR, f"{self.name}: {self._reason or self._state}")

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.operations import Right
 from roboglot.protocols import ros_commands
@@ -19,6 +18,7 @@ from roboglot.protocols.foxglove.vocabulary import (
     pose,
     twist,
 )
+from roboglot.validation import why_invalid
 
 PUBLISHED_MAX = 100
 MESSAGE_MAX = 65536  # bytes
@@ -56,7 +56,7 @@ async def publish(context: Context, *, channel: int, data: bytes) -> None:
     try:
         TOPICS[_name(context, published.topic)](context, data)
     except (msgspec.DecodeError, RecursionError) as error:  # includes ValidationError
-        raise InvalidGoal(f"{published.topic}: {misfit(error)}") from None
+        raise InvalidGoal(f"{published.topic}: {why_invalid(error)}") from None
 
 
 def _name(context: Context, topic: str) -> str:

@@ -30,7 +30,7 @@ class Readers:
         """The protocol of a new connection."""
         return _Reader(self._transports)
 
-    def tell(self, message: bytes) -> None:
+    def write(self, message: bytes) -> None:
         """Write once to each reader; one with EVENT_BACKLOG_MAX unread bytes is disconnected."""
         for transport in tuple(self._transports):
             if transport.get_write_buffer_size() > EVENT_BACKLOG_MAX:

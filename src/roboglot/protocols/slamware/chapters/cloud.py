@@ -12,13 +12,13 @@ from pathlib import Path
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest
 from roboglot.model.components.system.network import Network
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, RobotError
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.delivery.vocabulary import KINDS, boxes_of
+from roboglot.validation import why_invalid
 from roboglot.wire.slamware.chapters.cloud import CloudTask
 from roboglot.wire.slamware.chapters.delivery import VoicePackage
 
@@ -63,7 +63,7 @@ class CloudFolder:
         try:
             return msgspec.json.decode(data, type=list[VoicePackage]) if data else []
         except msgspec.DecodeError as error:
-            raise InvalidGoal(f"voice.json: {misfit(error, 'the list')}") from None
+            raise InvalidGoal(f"voice.json: {why_invalid(error, 'the list')}") from None
 
     def start(self) -> None:
         """Start polling for tasks."""
@@ -111,8 +111,8 @@ class CloudFolder:
                 await delivery.accept(request)
             _mark(path)
         except (RobotError, msgspec.DecodeError, RecursionError) as error:
-            log.warning("the cloud's task %s is refused: %s", path.name, misfit(error))
-            _mark(path, refused=misfit(error))
+            log.warning("the cloud's task %s is refused: %s", path.name, why_invalid(error))
+            _mark(path, refused=why_invalid(error))
 
 
 def _mark(path: Path, refused: str = "") -> None:

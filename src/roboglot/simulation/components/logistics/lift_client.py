@@ -29,7 +29,7 @@ class SimulatedLiftClient(LiftClient):
         self._section, self._lift, self._robot = section, lift, robot
         self.floors = lift.names
         self._state = lift.state
-        lift.listeners.append(self._hear)
+        lift.listeners.append(self._on_event)
 
     @property
     def state(self) -> LiftState:
@@ -62,7 +62,7 @@ class SimulatedLiftClient(LiftClient):
         if not self._reached:
             raise Refused("the lift's radio is out of reach")
 
-    def _hear(self, event: Event) -> None:
+    def _on_event(self, event: Event) -> None:
         if self._reached:
             self._robot.events.publish(event)
 

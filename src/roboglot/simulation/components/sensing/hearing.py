@@ -72,7 +72,7 @@ class SimulatedHearing(Hearing):
         counter = ClapCounter()
         with self._robot[Microphone].subscribe() as blocks:
             async for block in blocks:
-                heard = counter.hear(block)
+                heard = counter.feed(block)
                 if heard is not None:
                     self._claps.push(heard)
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import msgspec
 
-from roboglot.misfits import misfit
+from roboglot.validation import why_invalid
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Point, Pose2D, Pose3D
 
 ID_MAX = 64
@@ -129,7 +129,7 @@ def control_points(metadata: dict[str, str]) -> tuple[Point, Point] | None:
     try:
         first, second = (msgspec.json.decode((text or "").replace("'", '"'), type=Point) for text in texts)
     except (msgspec.DecodeError, UnicodeEncodeError) as error:
-        raise MetadataError(f"control_point1 and control_point2: {misfit(error)}") from None
+        raise MetadataError(f"control_point1 and control_point2: {why_invalid(error)}") from None
     return first, second
 
 

@@ -25,7 +25,7 @@ class CyberDogPower(Power):
     def __init__(self, robot: Robot, client: CyberDogClient, supervisor: Supervisor, status: StatusPoll) -> None:
         self._robot, self._client, self._supervisor, self._status = robot, client, supervisor, status
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe low power; leaves a sleeping dog asleep. Raises CyberDogRefused or NoAnswer without it."""
         if self.mode is PowerMode.AWAKE:
             await self._client.leave_low_power()

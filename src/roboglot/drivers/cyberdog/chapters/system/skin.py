@@ -29,14 +29,14 @@ class CyberDogSkin(ShownSkin):
     def enable(self, on: bool) -> None:
         self._supervisor.link.require()
         super().enable(on)
-        self._supervisor.send("switching the skin", self.learn())
+        self._supervisor.send("switching the skin", self.probe())
 
     def show(self, pattern: SkinPattern, *, cycle: float = 1.0, standing: Shade = Shade.LIGHT) -> None:
         self._supervisor.link.require()
         super().show(pattern, cycle=cycle, standing=standing)
-        self._supervisor.send("the skin's pattern", self.learn())
+        self._supervisor.send("the skin's pattern", self.probe())
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Send the current state. Raises ClientError."""
         async with self._sending:
             state = self.state

@@ -44,13 +44,13 @@ class DetectionSwitches:
         self._watching: dict[str, Callable[[Seen], None]] = {}
         self._forget: Callable[[], None] = lambda: None
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Switch the watched kinds on. Raises RefusedByRobot if the robot has no detection."""
         await self.client.ai.push(line="line" in self._watching)
         for kind in self._watching:
             await self.switch(kind, True)
         self._forget()
-        self._forget = self.client.listen(self._hear, TargetsSeen, LinesSeen)
+        self._forget = self.client.listen(self._on_push, TargetsSeen, LinesSeen)
 
     def watch(self, kind: str, heard: Callable[[Seen], None]) -> None:
         """Switch ``kind`` on and pass its pushes to ``heard``."""
@@ -74,7 +74,7 @@ class DetectionSwitches:
         word = ROBOTS_WORDS.get(kind, kind) if self.client.as_robots else kind
         await self.client.ai.push(**{word: on})
 
-    def _hear(self, push: Telemetry) -> None:
+    def _on_push(self, push: Telemetry) -> None:
         assert isinstance(push, TargetsSeen | LinesSeen)
         heard = self._watching.get("line" if isinstance(push, LinesSeen) else push.kind)
         if heard is not None:
@@ -101,13 +101,13 @@ class RoboMasterDetector(Detector[T]):
         return self._feed.subscribe()
 
     def _begin(self) -> None:
-        self._switches.watch(self._kind, self._hear)
+        self._switches.watch(self._kind, self._on_push)
 
     def _end(self) -> None:
         self._switches.leave(self._kind)
         self._latest = None
 
-    def _hear(self, push: Seen) -> None:
+    def _on_push(self, push: Seen) -> None:
         self._publish(self._read(push))
 
     def _publish(self, seen: Sequence[T]) -> None:
@@ -141,7 +141,7 @@ class ColourDetector(RoboMasterDetector[T]):
             self._looking = None
         super()._end()
 
-    def _hear(self, push: Seen) -> None:
+    def _on_push(self, push: Seen) -> None:
         if self._pushes.full():
             self._pushes.get_nowait()
         self._pushes.put_nowait(push)
@@ -212,9 +212,9 @@ class RoboMasterVision(Vision):
             UnsupportedDetector("codes"),
         )
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe the detection. Raises RefusedByRobot if there is none."""
-        await self._switches.learn()
+        await self._switches.probe()
 
 
 def _targets(push: Seen) -> Sequence[Target]:

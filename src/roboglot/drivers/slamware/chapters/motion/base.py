@@ -69,7 +69,7 @@ class SlamwareBase(LinkedBase):
     def velocity(self) -> Twist:
         return self._reported.twist
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Poll the limits of the robot."""
         speed, yaw_speed = SPEED, YAW_SPEED
         self._limit_restore.recall()

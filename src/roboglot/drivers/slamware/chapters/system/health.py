@@ -59,7 +59,7 @@ class SlamwareEmergencyStop(EmergencyStop):
         self._engaged = self._released = self._known = False
         health.changed = self._take
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe once, by releasing a released stop. Raises SlamwareRefused if there is none."""
         if self._known:
             return

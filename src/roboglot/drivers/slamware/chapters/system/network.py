@@ -47,7 +47,7 @@ class SlamwareNetwork(ReportedNetwork):
         internet = station and bool(status.ssid)
         self.take(mode, status.ssid, status.ip, status.mac, status.quality, internet=internet)
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Poll what rarely changes."""
         with contextlib.suppress(SlamwareRefused):
             self._priority = (

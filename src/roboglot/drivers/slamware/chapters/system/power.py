@@ -27,7 +27,7 @@ class SlamwarePower(Power):
         self._robot, self._client, self._supervisor = robot, client, supervisor
         self._mode = PowerMode.AWAKE
 
-    async def learn(self) -> None:
+    async def probe(self) -> None:
         """Probe sleep; leaves a sleeping robot asleep. Raises SlamwareRefused if the robot cannot sleep."""
         if self._mode is PowerMode.AWAKE:
             await self._client.wakeup()

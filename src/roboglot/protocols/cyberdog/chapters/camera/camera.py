@@ -53,7 +53,7 @@ def get_file(
 
 
 def _may_fetch(context: Context, code: int) -> bool:
-    if (admission := context.robot.admission).asks:
+    if (admission := context.robot.admission).enforced:
         try:
             admission.check("cyberdog", str(int(code)), Right.SEE if code == Code.SAVED_FILE else Right.DRIVE)
         except Forbidden:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import NotFound
@@ -18,6 +17,7 @@ from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.cyberdog.vocabulary import grid_of, label_of, no_grid
+from roboglot.validation import why_invalid
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.codes import Code
 
@@ -115,7 +115,7 @@ async def set_labels(
     try:
         labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
     except msgspec.ValidationError as error:
-        raise BadParameters(misfit(error, field="locationLabelInfo")) from None
+        raise BadParameters(why_invalid(error, field="locationLabelInfo")) from None
     names = [label.labelName for label in labels]
     try:
         stored = await library.get(mapName or await _numbered(library, map_id))

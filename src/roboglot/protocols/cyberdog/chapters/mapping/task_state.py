@@ -84,7 +84,7 @@ class Task:
         """Pass ``code`` on to the stream, with the reason of a failure in plain words."""
         if not self.stopping:
             self.last = code
-            self.stream.tell({"feedback_code": int(code), "feedback_msg": message})
+            self.stream.send({"feedback_code": int(code), "feedback_msg": message})
 
     def fail(self, code: Feedback, error: Exception) -> TaskResult:
         """Report why the task failed, to the stream and in the log."""
@@ -168,16 +168,16 @@ class Tasks:
         if self._rest not in FAILED:
             return
         self._found_again, self._rest = self._rest, FAILED[self._rest]
-        self._tell_place(Feedback.LOCALIZATION_TRYING, reason)
+        self._report_place(Feedback.LOCALIZATION_TRYING, reason)
 
     def find_place(self) -> None:
         """Leave the state of failed localization."""
         if self._found_again is None or FAILED[self._found_again] is not self._rest:
             return
         self._rest, self._found_again = self._found_again, None
-        self._tell_place(Feedback.LOCALIZATION_DONE, "")
+        self._report_place(Feedback.LOCALIZATION_DONE, "")
 
-    def _tell_place(self, code: Feedback, message: str) -> None:
+    def _report_place(self, code: Feedback, message: str) -> None:
         if self.current is None:
             self._set_state(self._rest)
         elif self.current.kind in KEEPS_LOCALIZATION:

@@ -8,7 +8,6 @@ from functools import partial
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.following import Following, FollowSide
 from roboglot.model.errors import NotFound, RobotError
@@ -20,6 +19,7 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.chapters.people.pursuit import Pursuit, ThingPursuit
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.table import TABLE
+from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
 
@@ -138,7 +138,7 @@ async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
     try:
         region = msgspec.convert(roi, Region)
     except msgspec.ValidationError as error:
-        raise BadParameters(misfit(error, field="roi")) from None
+        raise BadParameters(why_invalid(error, field="roi")) from None
     pursuit = call.context.pursuit
     chosen = pursuit is not None and pursuit.choose(region.x_offset, region.y_offset, region.width, region.height)
     return {"success": chosen}

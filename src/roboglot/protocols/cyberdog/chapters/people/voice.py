@@ -119,11 +119,11 @@ class Voice:
         with self._robot[Hearing].speech() as speech:
             async for said in speech:
                 try:
-                    self._obey(said)
+                    self._execute(said)
                 except RobotError as error:
                     log.info("%r: %s", said.text, error)
 
-    def _obey(self, said: SpeechHeard) -> None:
+    def _execute(self, said: SpeechHeard) -> None:
         text, now = said.text.casefold(), self._robot.clock.time()
         called = any(word.casefold() in text for word in wake_words(self._robot))
         if called:
@@ -133,12 +133,12 @@ class Voice:
         order = next((motion for words, motion in ORDERS.items() if words in text), None)
         if order is None:
             if called:
-                self._say(HERE)
+                self._speak(HERE)
         elif self._gaits.check(order, NOTHING_SPECIAL):
-            self._say(CANNOT)
+            self._speak(CANNOT)
         else:
             self._obeying = asyncio.get_running_loop().create_task(self._gaits.carry_out(order, NOTHING_SPECIAL))
 
-    def _say(self, text: str) -> None:
+    def _speak(self, text: str) -> None:
         if Speaker in self._robot:
             self._robot[Speaker].say(text, source="cyberdog voice")

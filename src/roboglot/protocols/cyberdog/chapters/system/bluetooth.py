@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.interaction.remote_control import Gear, RemoteControl
 from roboglot.model.components.system.bluetooth import (
@@ -22,6 +21,7 @@ from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.table import TABLE
+from roboglot.validation import why_invalid
 from roboglot.wire.cyberdog.codes import Code, InBandError
 
 CONNECT_MAX = 18.0  # s
@@ -78,7 +78,7 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
     try:
         device = msgspec.convert(selected_device, WireDevice)
     except msgspec.ValidationError as error:
-        raise BadParameters(misfit(error, field="selected_device")) from None
+        raise BadParameters(why_invalid(error, field="selected_device")) from None
     connecting = radio.connect(device.mac, source=SOURCE)
     try:
         status = await robot.clock.wait_for(connecting.done(), CONNECT_MAX)

@@ -89,7 +89,7 @@ class UpdateJobs:
         """Stream the firmware's progress, then the result of the goal."""
         named = {"id": goal.id, "operate": goal.operate}
         leave = self._robot.events.listen(
-            FirmwareChanged, lambda event: stream.tell({**named, **_progress(event.progress)})
+            FirmwareChanged, lambda event: stream.send({**named, **_progress(event.progress)})
         )
         code, message, data = GOOD, "", {}
         try:

@@ -8,7 +8,6 @@ import logging
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.system.firmware import (
     Firmware,
@@ -25,6 +24,7 @@ from roboglot.protocols.cyberdog.app_link import AppLink
 from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import UPDATE, kept
 from roboglot.protocols.cyberdog.table import push
+from roboglot.validation import why_invalid
 from roboglot.wire.cyberdog.codes import Code
 
 log = logging.getLogger(__name__)
@@ -81,7 +81,7 @@ class Updates:
         self._sent_at = -PROGRESS_PERIOD
         self._working: asyncio.Task[None] | None = None
         self._leave = robot.events.listen(FirmwareChanged, lambda event: self._changed(event.progress))
-        app.on_found.append(self._tell_result)
+        app.on_found.append(self._report_result)
 
     def progress(self) -> dict[str, int]:
         """Return the progress as in 5005."""
@@ -170,7 +170,7 @@ class Updates:
             self._word = word
             self._app.push(STATUS, {"status": word, "code": GOOD})
 
-    def _tell_result(self) -> None:
+    def _report_result(self) -> None:
         """Report after the reboot whether the robot runs what was installed."""
         wanted = kept(self._robot, UPDATE, "")
         if not wanted or Firmware not in self._robot or self._robot[Firmware].progress.state in UNDER_WAY:
@@ -192,7 +192,7 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
     try:
         wanted = msgspec.convert(modules if isinstance(modules, list) else [modules], list[WireModule])
     except msgspec.ValidationError as error:
-        raise BadParameters(misfit(error, "the modules")) from None
+        raise BadParameters(why_invalid(error, "the modules")) from None
     files = [file for module in wanted for file in module.latest.packages]
     if not files or len(wanted) > MODULES_MAX or any(file.fileSize < 0 for file in files):
         raise InvalidGoal(f"an update needs files with their sizes and has at most {MODULES_MAX} modules")

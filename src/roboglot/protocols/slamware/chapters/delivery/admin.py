@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.components.logistics.cargo import Cargo
 from roboglot.model.components.logistics.delivery import Delivery, Policy, WorkMode
 from roboglot.model.components.motion.base import Base
@@ -21,6 +20,7 @@ from roboglot.protocols.slamware.chapters.system.system import device_id, softwa
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import TRACKS
+from roboglot.validation import why_invalid
 from roboglot.wire.slamware.chapters.delivery import (
     AdminPassword,
     BatteryLevels,
@@ -133,7 +133,7 @@ async def set_move_options(context: Context, body: dict[str, object] | None = No
     try:
         how = _effective(msgspec.convert(words, MoveOptions))
     except msgspec.ValidationError as error:
-        raise InvalidGoal(misfit(error)) from None
+        raise InvalidGoal(why_invalid(error)) from None
     if how.mode not in range(len(TRACKS)):
         raise InvalidGoal(f"there is no move mode {how.mode}")
     new = replace(

@@ -7,7 +7,6 @@ from typing import Any
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.components.logistics.jack import Jack
@@ -37,6 +36,7 @@ from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import action_word
+from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters import motion as wire
 from roboglot.wire.slamware.chapters.motion import (
@@ -173,7 +173,9 @@ def create(context: Context, request: ActionRequest) -> Action:
         options = msgspec.convert(request.options or {}, factory.options)
         action = factory.start(context, options)
     except (RobotError, msgspec.ValidationError) as error:
-        raise HttpError(400, BAD_REQUESTS["POST /api/core/motion/v1/actions"], misfit(error, field="options")) from None
+        raise HttpError(
+            400, BAD_REQUESTS["POST /api/core/motion/v1/actions"], why_invalid(error, field="options")
+        ) from None
     for errand in before:
         errand.cancel(f"{action.name} took over")
     return action

@@ -127,7 +127,7 @@ async def set_current_floor(context: Context, body: FloorChoice) -> None:
     await context.maps.enter(body.building, body.floor, pose_of(body.pose) if body.pose else None)
 
 
-def _asked(context: Context, floor: str, building: str) -> list[FloorMap]:
+def _selected(context: Context, floor: str, building: str) -> list[FloorMap]:
     """Return the loaded floors that a query selects. Raises InvalidGoal if there is none."""
     loaded = [
         f
@@ -152,13 +152,13 @@ def _dock(name: FloorName, dock: PointOfInterest) -> DockInfo:
 @TABLE.on(f"GET {MAP}/pois", right=Right.SEE)
 def get_all_pois(context: Context, floor: FloorText = "", building: FloorText = "") -> list[PoiInfo]:
     """Return the places of the loaded map, of one floor or of all; new ones appear after a sync."""
-    return [_poi(f.name, place) for f in _asked(context, floor, building) for place in f.places]
+    return [_poi(f.name, place) for f in _selected(context, floor, building) for place in f.places]
 
 
 @TABLE.on(f"GET {MAP}/homedocks", right=Right.SEE)
 def get_multi_floor_home_docks(context: Context, floor: FloorText = "", building: FloorText = "") -> list[DockInfo]:
     """Return the docks of the loaded map, of one floor or of all."""
-    return [_dock(f.name, dock) for f in _asked(context, floor, building) for dock in f.annotations.docks]
+    return [_dock(f.name, dock) for f in _selected(context, floor, building) for dock in f.annotations.docks]
 
 
 @TABLE.on(f"POST {MAP}/pois/:search_nearby", right=Right.SEE, needs=(Localization, MapAnnotations))

@@ -10,7 +10,6 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 
-from roboglot.misfits import misfit
 from roboglot.model.components.mapping.annotations import (
     Annotations,
     Area,
@@ -21,6 +20,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.protocols.slamware.chapters.artifact.drawing import AREA_USAGES, area_of, line_of
+from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters import artifact
@@ -211,7 +211,7 @@ def _mark(id: str, pose: Pose, metadata: dict[str, str]) -> PointOfInterest:
     try:
         return PointOfInterest(msgspec.convert(clean(id), artifact.Identifier), pose, _texts(metadata))
     except msgspec.ValidationError as error:
-        raise InvalidGoal(f"the name {clean(id)[:40]!r} of a place: {misfit(error)}") from None
+        raise InvalidGoal(f"the name {clean(id)[:40]!r} of a place: {why_invalid(error)}") from None
 
 
 def _texts(metadata: dict[str, str]) -> dict[str, str]:

@@ -11,7 +11,6 @@ from typing import Annotated
 
 import msgspec
 
-from roboglot.misfits import misfit
 from roboglot.model.components.sensing.sensor_masks import SensorMasks
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
@@ -20,6 +19,7 @@ from roboglot.protocols.slamware.chapters.motion.speed_limits import CONFIGURED
 from roboglot.protocols.slamware.chapters.system.devices import MASKED, restore_masks
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
+from roboglot.validation import why_invalid
 
 ID_MAX, IDS_MAX = 10_000, 1000
 Speed = Annotated[float, msgspec.Meta(gt=0, le=10)]
@@ -45,7 +45,7 @@ async def set_cube_config(context: Context, body: bytes) -> None:
     try:
         config = msgspec.json.decode(body, type=CubeConfig)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InvalidGoal(f"this robot cannot read the configuration: {misfit(error)}") from None
+        raise InvalidGoal(f"this robot cannot read the configuration: {why_invalid(error)}") from None
     robot = context.robot
     if config.disabled_sensors:
         known = {sensor.id for sensor in robot[SensorMasks].sensors}

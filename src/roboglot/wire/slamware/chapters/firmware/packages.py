@@ -13,7 +13,7 @@ from typing import Annotated, BinaryIO
 
 import msgspec
 
-from roboglot.misfits import misfit
+from roboglot.validation import why_invalid
 
 DIRECTORY_MAX = 4 << 20  # bytes of an archive's table of contents
 ENTRY_MAX = 4 << 20  # bytes of a description, unpacked
@@ -40,7 +40,7 @@ def read_firmware(file: BinaryIO) -> FirmwareDescription:
     try:
         return msgspec.json.decode(entry_of(file, DESCRIPTION), type=FirmwareDescription)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadPackage(f"{DESCRIPTION}: {misfit(error)}") from None
+        raise BadPackage(f"{DESCRIPTION}: {why_invalid(error)}") from None
 
 
 def entry_of(file: BinaryIO, name: str) -> bytes:

@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 import pytest
 
-from roboglot.misfits import PYTHON, misfit, read_answer
+from roboglot.validation import PYTHON, read_answer, why_invalid
 
 
 class Side(StrEnum):
@@ -57,14 +57,14 @@ class Sent(msgspec.Struct, forbid_unknown_fields=True):
 def test_a_misfit_is_named_in_plain_words(sent: object, words: str) -> None:
     with pytest.raises(msgspec.ValidationError) as raised:
         msgspec.convert(sent, Sent)
-    assert misfit(raised.value) == words
+    assert why_invalid(raised.value) == words
 
 
 def test_a_field_around_the_value_leads_the_path() -> None:
     with pytest.raises(msgspec.ValidationError) as raised:
         msgspec.convert([{"cornerX": 1, "y": None}], list[Corner])
-    assert misfit(raised.value, field="corners") == "corners[0].y must be a whole number, not null"
-    assert misfit(raised.value, field="corners", kinds=PYTHON).endswith("not None")
+    assert why_invalid(raised.value, field="corners") == "corners[0].y must be a whole number, not null"
+    assert why_invalid(raised.value, field="corners", kinds=PYTHON).endswith("not None")
 
 
 class Tower(msgspec.Struct):
@@ -91,17 +91,17 @@ class Town(msgspec.Struct):
 def test_sentence_that_names_its_field_has_no_prefix(kind: type, sent: object, words: str) -> None:
     with pytest.raises(msgspec.ValidationError) as raised:
         msgspec.convert(sent, kind)
-    assert misfit(raised.value) == words
+    assert why_invalid(raised.value) == words
 
 
 def test_any_other_error_keeps_its_words() -> None:
-    assert misfit(ValueError("no JSON")) == "no JSON"
+    assert why_invalid(ValueError("no JSON")) == "no JSON"
 
 
 def test_a_deep_nest_is_named() -> None:
     with pytest.raises(RecursionError) as raised:
         msgspec.json.decode(b"[" * 100_000)
-    assert misfit(raised.value) == "JSON is nested too deeply"
+    assert why_invalid(raised.value) == "JSON is nested too deeply"
 
 
 @pytest.mark.parametrize("word", ["nan", "NaN", "inf", "-Infinity", "-nan", r"\u006ean", r"\u002dinf", r"n\u0061n"])

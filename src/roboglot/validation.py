@@ -45,7 +45,9 @@ _MATCHERS = [(re.compile(pattern, re.DOTALL), form) for pattern, form in _FORMS.
 FORMS = frozenset(form.replace("{place}", "{}") for form in _FORMS.values())
 
 
-def misfit(error: Exception, whole: str = "the value", *, field: str = "", kinds: Mapping[str, str] = KINDS) -> str:
+def why_invalid(
+    error: Exception, whole: str = "the value", *, field: str = "", kinds: Mapping[str, str] = KINDS
+) -> str:
     """Return in plain words why a value is invalid; the text of another error unchanged.
 
     ``field``: the field with the value, if it is not the whole; ``whole``: its name if no field is wrong.

@@ -6,7 +6,7 @@ from datetime import date, time
 
 import pytest
 
-from roboglot.conditions import (
+from roboglot.task_conditions import (
     BadCondition,
     Cycle,
     Interface,
