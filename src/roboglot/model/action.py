@@ -1,4 +1,4 @@
-"""One action: a goal under way or ended, and how it ended. Knows neither the robot nor its other actions.
+"""One action: a goal in progress or ended, and its outcome. Knows neither the robot nor its other actions.
 
 The words are ROS 2's: a goal is accepted, executes, may be paused (ours), is cancelled, succeeds or aborts.
 """
@@ -41,7 +41,7 @@ class Announcer(Protocol):
 
 
 class Action:
-    """One goal under way or ended. Made by ``Actions.start``."""
+    """One goal in progress or ended. Created by ``Actions.start``."""
 
     def __init__(
         self, owner: Announcer, id: int, name: str, goal: object, resources: frozenset[str], source: str

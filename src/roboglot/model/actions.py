@@ -1,4 +1,4 @@
-"""Actions, that is, things that take time: one executing action per resource, and the rules of preemption.
+"""Actions: one executing action per resource, and the rules of preemption.
 
 The words are ROS 2's: a goal is accepted, executes, may be paused (ours), is cancelled, succeeds or aborts.
 """
@@ -34,7 +34,7 @@ class Actions:
         self._guards: list[Callable[[Action], None]] = []
 
     def guard(self, admit: Callable[[Action], None]) -> None:
-        """Call ``admit``, too, before each action is accepted; it raises RobotError to refuse one."""
+        """Also call ``admit`` before an action is accepted; it raises RobotError to refuse the action."""
         self._guards.append(admit)
 
     def start(
@@ -50,8 +50,8 @@ class Actions:
         """Accept a goal and execute ``run(action)`` once its resources are free.
 
         ``run`` ends by returning (SUCCEEDED), raising RobotError (ABORTED) or being cancelled (CANCELED); it must leave
-        the hardware still in every case. The holder of a resource is cancelled first. ``after`` is no rival: it is let
-        end before this one begins (standing up, then driving).
+        the hardware at rest in every case. Holders of the resources are cancelled first, except ``after``, which may
+        finish before this action begins (standing up, then driving).
         """
         action = Action(self, next(self._ids), name, goal, frozenset(resources), source)
         for admit in self._guards:
@@ -81,7 +81,7 @@ class Actions:
             case _:
                 action.error, status = RobotError(f"internal error: {error}"), ActionStatus.ABORTED
                 log.error("%s #%d broke", action.name, action.id, exc_info=error)
-        forget_stack(error)  # errors are kept for a while; the frames that they passed through must not be
+        forget_stack(error)  # the error is kept for a while; its stack frames must not be
         action._task = None
         del self._running[action.id]
         self._history.append(action)

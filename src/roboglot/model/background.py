@@ -14,19 +14,19 @@ from functools import cache
 from typing import TypeVar
 
 R = TypeVar("R")
-NICENESS = 10  # of the threads: they get a tenth of a core while the event loop is busy
+NICENESS = 10  # of the threads, which get a tenth of a core while the event loop is busy
 
 
 async def beside(job: Callable[[], R]) -> R:
-    """Return the result of ``job``, done in one of as many threads as there are processors."""
+    """Run ``job`` in a pool with one thread per processor, and return its result."""
     return await asyncio.get_running_loop().run_in_executor(_pool(os.getpid()), copy_context().run, job)
 
 
 async def load(job: Callable[[], R]) -> R:
     """Return the result of ``job``, which imports modules, in a thread of its own.
 
-    Neither the loop's end nor the interpreter's waits for that thread, unlike those of an executor: an import of Numba
-    and what it compiles take seconds, and nothing is lost when the process ends in the midst of them.
+    Unlike an executor's threads, this one is not joined when the loop or the interpreter ends: importing and compiling
+    with Numba takes seconds, and nothing is lost if the process ends meanwhile.
     """
     result: Future[R] = Future()
 

@@ -1,6 +1,6 @@
-"""The client on whose behalf something is done: a door sets it once, and everything that follows inherits it.
+"""The client on whose behalf code runs: context variables that a door sets once.
 
-A context variable: every call and every new task inherits it, and no signature mentions it.
+Every call and every new task inherits them, so no signature mentions the client.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _identity: ContextVar[str] = ContextVar("identity", default="")
 
 
 def set_client(client: str, connection: str = "", identity: str = "") -> None:
-    """Set the client ("slamware 10.0.0.7") of this task and of all that it starts.
+    """Set the client ("slamware 10.0.0.7") of this task and of the tasks that it starts.
 
     ``connection``: the client's address and port; ``identity``: the one that it proved.
     """
@@ -43,7 +43,7 @@ def identity() -> str:
 
 @contextmanager
 def acting_for(client: str) -> Iterator[None]:
-    """``set_client`` inside ``with``: for programs that drive robots in Python."""
+    """Set the client inside ``with``; for programs that drive robots in Python."""
     token = _client.set(client.strip()[:NAME_MAX])
     try:
         yield

@@ -1,4 +1,4 @@
-"""Robot time: real, scaled (xN) or lockstep. All robot code waits and reads the time here and nowhere else.
+"""Robot time: real, scaled (xN) or lockstep. All robot code waits and reads the time here only.
 
 ``time()`` is seconds since the robot's clock started; ``epoch()`` the calendar time that belongs to it. A lockstep
 clock stands still until ``advance`` is called; the same program on it gives the same trace, byte for byte.

@@ -7,11 +7,11 @@ from roboglot.model.robot import Robot
 
 
 def lateness(robot: Robot) -> float:
-    """s by which what this robot says comes late now; 0 without a network card."""
+    """Return the present delay of this robot's answers, s; 0 without a network card."""
     return robot[Network].delay if Network in robot else 0.0
 
 
 async def late(robot: Robot) -> None:
-    """Wait as long as the robot's answers are late now; for code that answers clients."""
+    """Wait for the present delay of the robot's answers, before sending one."""
     if delay := lateness(robot):
         await robot.clock.sleep(delay)

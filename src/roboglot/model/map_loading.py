@@ -1,4 +1,4 @@
-"""Taking a stored map into use: its cells, and the dock that stands on it."""
+"""Loading of a stored map: its cells, and the dock on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laying one map over another: where it fits, and one map of both."""
+"""Alignment and merging of two maps."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ SURE = 127
 
 
 def aligned(base: OccupancyGrid, other: OccupancyGrid, guess: Pose) -> Pose:
-    """Return where the origin of ``other``'s map frame lies in ``base``'s: near ``guess``, walls upon walls.
+    """Return the pose of ``other``'s map frame in ``base``'s that aligns their walls, near ``guess``.
 
-    Without common walls, it is the guess.
+    Without common walls, return the guess.
     """
     walls = _walls(other)
     near = _blurred(base.log_odds > 0)
@@ -44,9 +44,9 @@ def aligned(base: OccupancyGrid, other: OccupancyGrid, guess: Pose) -> Pose:
 
 
 def merged(base: OccupancyGrid, other: OccupancyGrid, place: Pose) -> OccupancyGrid:
-    """Return one map of both in ``base``'s frame: evidence adds up where both know something.
+    """Return both maps as one in ``base``'s frame; evidence adds up where both have some.
 
-    ``place`` is the origin of ``other``'s frame. Raises Refused for what is too large.
+    ``place`` is the origin of ``other``'s frame. Raises Refused if the result would be too large.
     """
     corners = [_moved(np.array([[x, y]]), place)[0] for x, y in itertools.product(*_extent(other))]
     (left, right), (bottom, top) = _extent(base)
@@ -64,7 +64,7 @@ def merged(base: OccupancyGrid, other: OccupancyGrid, place: Pose) -> OccupancyG
 
 
 def _add(cells: NDArray[np.int16], frame: OccupancyGrid, other: OccupancyGrid, place: Pose) -> None:
-    """Add to each cell what ``other`` knows of its middle; row by row, so that large maps need little memory."""
+    """Add ``other``'s evidence at the centre of each cell; row by row, to save memory."""
     c, s = math.cos(place.yaw), math.sin(place.yaw)
     x = frame.origin.x + (np.arange(cells.shape[1]) + 0.5) * frame.resolution - place.x
     for row, line in enumerate(cells):

@@ -1,4 +1,4 @@
-"""Maps and what people write on them, in the map frame."""
+"""Maps and their points of interest, in the map frame."""
 
 from __future__ import annotations
 

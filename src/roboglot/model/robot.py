@@ -1,4 +1,4 @@
-"""A robot: who it is, what it has, what it does, what happened to it. All that a door ever sees."""
+"""A robot: description, components, actions, events. All that a door sees."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ C = TypeVar("C", bound=Component)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Description:
-    """The name plate."""
+    """Description on the name plate."""
 
     maker: str
     model: str
@@ -36,7 +36,7 @@ class Description:
 
 @dataclass(slots=True)
 class Robot:
-    """``robot[Base]`` is the component or raises ``ComponentMissing``; ``Base in robot`` asks."""
+    """``robot[Base]`` returns the component or raises ``ComponentMissing``; ``Base in robot`` checks for it."""
 
     id: str
     description: Description
@@ -46,8 +46,8 @@ class Robot:
     tap: Tap = field(init=False)
     outside: Outside = field(init=False)
     admission: Admission = field(default_factory=Admission)
-    fairness: Fairness | None = None  # to the clients of all robots of a program; None: no one waits for others
-    stand_in: StandIn | None = None  # answers at the doors in the robot's place
+    fairness: Fairness | None = None  # shared by all robots of a program; None: clients never wait
+    stand_in: StandIn | None = None  # answers requests in the robot's place
     _components: dict[type[Component], Component] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -56,14 +56,14 @@ class Robot:
         self.outside = Outside(self.id, self.clock)
 
     def add(self, interface: type[C], component: C) -> C:
-        """Give the robot a component; one of a kind."""
+        """Add a component; at most one per interface."""
         if interface in self._components:
             raise ValueError(f"{self.id} has a {interface.__name__} already")
         self._components[interface] = component
         return component
 
     def withdraw(self, interface: type[Component]) -> None:
-        """Take a component away that the robot turned out not to have; nothing happens if it has none."""
+        """Remove a component that the robot turned out not to have, if present."""
         self._components.pop(interface, None)
 
     def __getitem__(self, interface: type[C]) -> C:

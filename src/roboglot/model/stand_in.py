@@ -1,6 +1,6 @@
-"""Another who answers in a robot's place: doors that have understood what a client asks ask it, not their chapters.
+"""Stand-in that answers requests in a robot's place: doors pass parsed requests to it instead of their chapters.
 
-So a robot can be played back from a recording with everything of its doors: their ports, framing, certificates.
+Thus a recorded robot is played back behind real doors, with their ports, framing and certificates.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 
 class Recorded(NamedTuple):
-    """A file of which a robot is played back, as ``robot`` of it; its first and last instant in ns since 1970.
+    """Recording that is played back: its file, the robot's name in it, first and last instant in ns since 1970.
 
     ``others``: the other robots of the file.
     """
@@ -25,7 +25,7 @@ class Recorded(NamedTuple):
 
 
 class StandInReply(NamedTuple):
-    """One answer in the protocol's own bytes; ``status`` as in the tap; ``last``: no other follows."""
+    """One answer in the protocol's own bytes; ``status`` as in the tap; ``last``: no further answer follows."""
 
     payload: bytes
     status: str
@@ -33,25 +33,24 @@ class StandInReply(NamedTuple):
 
 
 class StandIn(ABC):
-    """Answers for one robot at all of its doors. ``recorded``: the file that it plays back, if it is one."""
+    """Answers for one robot at all its doors. ``recorded``: the recording that it plays back, if any."""
 
     recorded: Recorded | None = None
 
     @abstractmethod
     def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:
-        """Yield the answers, each when it is time for it; ``reads``: the request changes nothing.
+        """Yield the answers, each at its time; ``reads``: the request changes nothing.
 
-        Send each before you wait for anything else: so it keeps its place among the pushes. Raises NotFound for what
-        cannot be answered.
+        Send each before awaiting anything else, to keep its place among the pushes. Raises NotFound without an answer.
         """
 
     @abstractmethod
     def first_push(self, door: str, operation: str) -> bytes | None:
-        """Return the first push of this kind, for what must be known before it comes; None: there is none."""
+        """Return the first recorded push of this kind, or None, for values needed before its time."""
 
     @abstractmethod
     def join(self, door: str, send: Callable[[str, bytes], None], reads: Collection[str] = ()) -> Callable[[], None]:
-        """Have pushes of ``door`` go to ``send`` (operation, payload) from now on; returns what ends it.
+        """Pass pushes of ``door`` to ``send`` (operation, payload) from now on; return a function that ends this.
 
-        ``reads``: operations that change nothing, where requests do not show it.
+        ``reads``: read-only operations, where requests do not show that.
         """

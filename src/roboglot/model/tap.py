@@ -1,9 +1,9 @@
 """Live exchanges of a robot's doors and driver: for the console, recordings, the audit and counters.
 
-A door calls ``request`` when it has understood what a client asks, ``reply`` when it answers, ``push`` for what it
-sends by itself, each behind ``if tap.watched``: without followers that is the whole cost. The client's name is the one
-that the door gave with ``set_client``. The driver of a real robot notes through a ``Line`` what it asks that robot and
-hears from it, as the door ``driver/NAME``.
+A door calls ``request`` once it has parsed a request, ``reply`` when it answers, and ``push`` for unsolicited messages,
+each behind ``if tap.watched``, which is the whole cost without subscribers. The client is the one that the door named
+with ``set_client``. The driver of a real robot notes its messages to and from the robot through a ``Line``, as the door
+``driver/NAME``.
 """
 
 from __future__ import annotations
@@ -20,11 +20,9 @@ from roboglot.model.feed import Feed, Viewer
 QUEUE_MAX = 4096  # exchanges queued per viewer; beyond this they are dropped and counted
 _SECRET = re.compile(rb"""("\w*[Pp]assword"\s*:\s*)(?:"(?:[^"\\]|\\.)*(?:"|\Z)|[^\s",{\[][^,}\]]*)""", re.DOTALL)
 # The same for JSON inside a JSON string.
-_SECRET_IN_TEXT = re.compile(
-    rb"""(\\"\w*[Pp]assword\\"\s*:\s*\\")(?:[^"\\]|\\\\.)*""", re.DOTALL
-)  # JSON inside a JSON string
-LOST = "lost"  # the outcome when a real robot does not answer
-DRIVER = "driver/"  # prefix of the names of drivers, where doors have their own
+_SECRET_IN_TEXT = re.compile(rb"""(\\"\w*[Pp]assword\\"\s*:\s*\\")(?:[^"\\]|\\\\.)*""", re.DOTALL)
+LOST = "lost"  # status if a real robot does not answer
+DRIVER = "driver/"  # prefix of a driver's name in place of a door's
 SILENT = "silent"  # status of a request that gets no answer
 PAYLOAD_MAX = 8 * 1024 * 1024  # bytes kept of one exchange
 
@@ -46,11 +44,11 @@ class Exchange(NamedTuple):  # created for each message: a frozen dataclass take
     """One message of one door, or of the driver of a real robot, in either direction.
 
     ``stamp``: robot time in s. ``connection``: the other end's address ("127.0.0.1:40312"), or a name where there is
-    none. ``client``: for whom, as the control lease has it. ``operation``: the key in the protocol's contract; empty if
-    it is none of them. ``payload``: the message in the protocol's own bytes (REST: "POST /path?query", an empty line,
-    the body), with passwords left out. Of a reply: ``status`` in the protocol's words ("200", "ok", "fail"),
-    ``refusal`` why it was not done in plain words (empty: it was), ``seconds`` of robot time since the request. Of a
-    request: ``turn`` of the clock.
+    none. ``client``: its name, as in control leases. ``operation``: the key in the protocol's contract, or empty.
+    ``payload``: the message in the protocol's own bytes (REST: "POST /path?query", an empty line, the body), with
+    passwords left out. Of a reply: ``status`` in the protocol's words ("200", "ok", "fail"), ``refusal`` why it was not
+    done in plain words (empty: it was), ``seconds`` of robot time since the request. Of a request: ``turn`` of the
+    clock.
     """
 
     stamp: float
@@ -68,7 +66,7 @@ class Exchange(NamedTuple):  # created for each message: a frozen dataclass take
 
 
 class _Answer(NamedTuple):
-    """Outcome of a request, and the time when it was asked, if that is known."""
+    """Outcome of a request, and the request's time, if known."""
 
     status: str = ""
     refusal: str = ""
@@ -89,11 +87,11 @@ class Tap:
         self._feed: Feed[Exchange] = Feed(self._look, self._look, queue_max=QUEUE_MAX)
 
     def subscribe(self) -> Viewer[Exchange]:
-        """Follow from now on; bounded, for readers that may be slow. Raises Busy: too many follow."""
+        """Return a bounded queue of further exchanges, for slow readers. Raises Busy for too many subscribers."""
         return self._feed.subscribe()
 
     def listen(self, listener: Callable[[Exchange], None]) -> Callable[[], None]:
-        """Call ``listener`` with every exchange, in place, none dropped; returns what ends it. It must be quick."""
+        """Call ``listener``, which must be quick, on every exchange; return a function that unsubscribes it."""
         self._listeners.append(listener)
         self._look()
 
@@ -105,11 +103,11 @@ class Tap:
         return leave
 
     def line(self, driver: str, address: str) -> Line:
-        """Return what notes the messages between a driver and the robot at ``address``."""
+        """Return the line on which a driver notes its messages to and from the robot at ``address``."""
         return Line(self, f"{DRIVER}{driver}", address)
 
     def request(self, door: str, operation: str, payload: bytes | str) -> float:
-        """A client asks. Returns when, for its ``reply``."""
+        """Note a client's request; return its time, for ``reply``."""
         return self._pass(Direction.REQUEST, door, connection(), operation, payload)
 
     def reply(
@@ -121,11 +119,11 @@ class Tap:
         refusal: str = "",
         began: float | None = None,
     ) -> None:
-        """The door answers what was asked at ``began`` (None: that is not known)."""
+        """Note the door's answer to the request made at ``began`` (None: unknown)."""
         self._pass(Direction.REPLY, door, connection(), operation, payload, _Answer(status, refusal, began))
 
     def push(self, door: str, to: str, operation: str, payload: bytes | str) -> None:
-        """The door sends by itself, to the address ``to``."""
+        """Note an unsolicited message to the address ``to``."""
         self._pass(Direction.PUSH, door, to, operation, payload)
 
     def _pass(
@@ -163,31 +161,31 @@ class Tap:
         return now
 
     def _look(self) -> None:
-        """Update the flag: a follower came or left."""
+        """Update ``watched`` after a subscriber came or left."""
         self.watched = bool(self._listeners or self._feed.viewers)
 
 
 class Line:
-    """Exchanges between a driver and its robot; look at ``watched`` first, as with a tap."""
+    """Notes a driver's exchanges with its robot; check ``watched`` first, as with a tap."""
 
     def __init__(self, tap: Tap, door: str, address: str) -> None:
         self._tap, self._door, self.address = tap, door, address
 
     @property
     def watched(self) -> bool:
-        """True if the tap has followers."""
+        """True if the tap has subscribers."""
         return self._tap.watched
 
     def request(self, operation: str, payload: bytes | str) -> float:
-        """The robot is asked. Returns when, for its ``reply``."""
+        """Note a request to the robot; return its time, for ``reply``."""
         return self._tap._pass(Direction.REQUEST, self._door, self.address, operation, payload)
 
     def reply(
         self, operation: str, payload: bytes | str, status: str, refusal: str = "", began: float | None = None
     ) -> None:
-        """The robot answers what it was asked at ``began``; status LOST: it does not."""
+        """Note the robot's answer to the request made at ``began``; status LOST: none came."""
         self._tap._pass(Direction.REPLY, self._door, self.address, operation, payload, _Answer(status, refusal, began))
 
     def push(self, operation: str, payload: bytes | str) -> None:
-        """The robot says something by itself."""
+        """Note an unsolicited message of the robot."""
         self._tap._pass(Direction.PUSH, self._door, self.address, operation, payload)

@@ -69,9 +69,9 @@ class Channel:
 
 
 class TextSession:
-    """A session made of two functions: ``subscribe`` gets a function to send a text and one to await the client.
+    """Session made of two functions: ``receive`` handles a text, ``subscribe`` returns a function that unsubscribes.
 
-    It returns a function that unsubscribes; ``receive`` handles a text.
+    ``subscribe`` gets a function to send a text, and one to await a slow client.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ def texts(
 
 
 class _Noted:
-    """A session whose end is noted as an input."""
+    """Session whose end is noted as an input."""
 
     def __init__(self, inner: Session, note: Callable[[], None]) -> None:
         self._inner, self._note = inner, note
@@ -122,7 +122,7 @@ def noted(channel: Channel, outside: Outside, door: str, path: str) -> Channel:
 
 
 class _Taking:
-    """A session whose messages wait for their turns."""
+    """Session whose messages wait for their turns."""
 
     def __init__(self, inner: Session, turns: Turns, stops: Callable[[str | bytes], bool]) -> None:
         self._inner, self._turns, self._stops = inner, turns, stops
@@ -143,7 +143,7 @@ class _Taking:
 
 
 def taking_turns(channel: Channel, robot: Robot, stops: Callable[[str | bytes], bool]) -> Channel:
-    """Return the channel with fairness to other clients; ``stops``: whether a message stops the robot."""
+    """Return the channel with fairness between clients; ``stops`` returns whether a message stops the robot."""
 
     def open_fair(carrier: Carrier) -> Session:
         return _Taking(channel.open(carrier), Turns(robot, carrier.name), stops)

@@ -1,4 +1,4 @@
-"""Commands of ROS's usual topics, for every door that takes them: cmd_vel, goal_pose, initialpose."""
+"""Commands of ROS's usual topics (cmd_vel, goal_pose, initialpose), for every door that has them."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def drive(robot: Robot, wish: Twist, dead_man: float, source: str) -> None:
 
 
 def go(robot: Robot, frame: str, pose: Pose, source: str) -> Action:
-    """Go there around obstacles. Raises RobotError."""
+    """Navigate to a pose. Raises RobotError."""
     goal = pose_in_map(robot, frame, pose)
     return robot[Navigation].navigate_to([goal.point], NavigationOptions(yaw=goal.yaw), source=source)
 
 
 def place(robot: Robot, frame: str, pose: Pose) -> None:
-    """Take it that the robot is there. Raises RobotError."""
+    """Set the robot's pose in its map. Raises RobotError."""
     robot[Localization].set_pose(pose_in_map(robot, frame, pose))
 
 

@@ -1,6 +1,6 @@
-"""Turns of clients' requests: one beyond its share of the thread waits, but not with a request to stop a robot.
+"""Turns of clients' requests: a client beyond its share of the thread waits, except to stop a robot.
 
-Knows no protocol: ``stops`` is a door's way to tell whether a request that waits is one to stop.
+Knows no protocol: the door's ``stops`` returns whether a waiting request is one to stop.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ T = TypeVar("T")
 
 
 async def wait_for_turn(fairness: Fairness, use: Use, stops: Callable[[], bool]) -> None:
-    """Wait until a request of a client may be answered; its others are not delayed by this one."""
+    """Wait for the turn of one request; the client's other requests are not delayed by it."""
     while (seconds := fairness.wait(use)) and not (stops() and fairness.hurries(use)):
         await pay(seconds)
 
 
 class Turns:
-    """The turns of one client, whose requests are answered in order."""
+    """Turns of one client, whose requests are answered in order."""
 
     def __init__(self, robot: Robot, peer: str) -> None:
         """``peer``: the client's host and port."""
@@ -33,11 +33,11 @@ class Turns:
         self._news = asyncio.Event()
 
     def look(self) -> None:
-        """Ask ``stops`` of a turn that waits once more: another request came."""
+        """Evaluate ``stops`` again, as another request came."""
         self._news.set()
 
     async def take(self, stops: Callable[[], bool]) -> None:
-        """Wait for the next turn; not while a request that waits is one to stop."""
+        """Wait for the next turn, but not while ``stops``."""
         if (fairness := self._robot.fairness) is None:
             return
         use = fairness.of(self._peer)
@@ -50,7 +50,7 @@ class Turns:
                 end.cancel()
 
     async def count(self, work: Coroutine[object, None, T]) -> T:
-        """Do what a request asks for; the time that it takes counts."""
+        """Run ``work`` for a request, and charge its time to the client."""
         if (fairness := self._robot.fairness) is None:
             return await work
         return await metered(work, partial(fairness.took, fairness.of(self._peer)))

@@ -1,6 +1,6 @@
-"""WebSockets for doors: connections, limits and admission; each path leads to a session that the door makes.
+"""WebSocket server for doors: connections, limits and admission; the door makes a session for each path.
 
-Bytes are the `websockets` library's business, the meaning of a message the door's.
+The `websockets` library frames messages, the door interprets them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 LIBRARY = "websockets.server"
 """Loaded in the background once the port is open, so that the door starts as fast as without it."""
 CONNECTIONS_MAX = 32
-PENDING_MAX = 16  # texts of one connection in progress
+PENDING_MAX = 16  # messages of one connection in progress
 REASON_BYTES_MAX = 123  # of a close frame
 GOING_AWAY, UNSUPPORTED, NOT_UTF8, POLICY, TRY_LATER = 1001, 1003, 1007, 1008, 1013  # close codes of RFC 6455
 
@@ -39,7 +39,7 @@ GOING_AWAY, UNSUPPORTED, NOT_UTF8, POLICY, TRY_LATER = 1001, 1003, 1007, 1008, 1
 class WebSocketServer:
     """Listens at ``address`` and ``port`` (0: any free port) from ``start`` to ``close``.
 
-    Web pages of other hosts are refused, since any page may open a WebSocket; ``browsers`` knows the exceptions.
+    Pages of other hosts are refused, since any page may open a WebSocket; ``browsers`` has the exceptions.
     """
 
     def __init__(
@@ -101,18 +101,18 @@ class Connection(asyncio.Protocol):
         self._host = ""
         self._name = ""  # host and port
         self.identity = ""  # the account's, where admission requires one
-        self.subprotocol = ""  # the agreed one of those that the channel offers
+        self.subprotocol = ""  # the negotiated one
         self.writer = Writer()
         self._opening = Opening(server.entrance, self.writer, self._wait_for, self._begin)
         self._protocol: ServerProtocol | None = None  # set once open
         self._pieces = bytearray()
         self._channel: Channel | None = None
         self._session: Session | None = None
-        self._binary = False  # a message that arrives in pieces
+        self._binary = False  # fragments of a message
         self._pending: set[asyncio.Future[None]] = set()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Count the connection in, or abort it where there are too many."""
+        """Register the connection, or abort it if there are too many."""
         self._transport = cast(asyncio.Transport, transport)
         peer = transport.get_extra_info("peername") or ("", 0)  # None: already disconnected
         self._host = peer[0]
@@ -132,7 +132,7 @@ class Connection(asyncio.Protocol):
             self._read(self._protocol, data)
 
     def connection_lost(self, _exc: Exception | None) -> None:
-        """Forget the client; what it asked for is finished nevertheless."""
+        """Drop the client; its requests in progress are finished nevertheless."""
         self._opening.close()
         self._transport = None
         self._server.connections.discard(self)
@@ -142,11 +142,11 @@ class Connection(asyncio.Protocol):
         self.writer.lose()
 
     def pause_writing(self) -> None:
-        """Let programs wait, as asyncio asks."""
+        """Make programs wait: the transport's buffer is full."""
         self.writer.pause()
 
     def resume_writing(self) -> None:
-        """Let programs go on, as asyncio allows."""
+        """Let programs continue: the transport's buffer has room."""
         self.writer.resume()
 
     async def room(self) -> None:
@@ -155,17 +155,17 @@ class Connection(asyncio.Protocol):
 
     @property
     def name(self) -> str:
-        """The other end's address with its port."""
+        """Address and port of the client."""
         return self._name
 
     @property
     def who(self) -> str:
-        """The client in words, as control has it."""
+        """Name of the client, as in control leases."""
         return f"{self._server.entrance.door} {self.identity or self._host}"
 
     @property
     def unsent(self) -> int:
-        """Bytes that wait for the client to read."""
+        """Number of bytes that the client has yet to read."""
         return self.writer.unsent
 
     def send(self, message: str | bytes) -> None:
@@ -186,7 +186,7 @@ class Connection(asyncio.Protocol):
         self.writer.close()
 
     def _begin(self, opened: Opened) -> None:
-        """Open the channel for a client that may come in."""
+        """Open the channel for an admitted client."""
         self.identity, self._channel, self._protocol = opened.identity, opened.channel, opened.protocol
         self.subprotocol = opened.protocol.subprotocol or ""
         try:
@@ -202,7 +202,7 @@ class Connection(asyncio.Protocol):
         return channel.open(self)
 
     def _read(self, protocol: ServerProtocol, data: bytes) -> None:
-        """Take the messages that are complete; the library answers pings, goodbyes and broken frames."""
+        """Handle complete messages; the library answers pings, close frames and broken frames."""
         from websockets.frames import Frame, Opcode
 
         protocol.receive_data(data)
@@ -225,7 +225,7 @@ class Connection(asyncio.Protocol):
         self.writer.flush(protocol)
 
     def _answer(self, message: str | bytes) -> None:
-        """Answer in the background: that may take as long as a program takes to start."""
+        """Answer in the background, as an answer may wait for a program to start."""
         if self._session is None:
             return
         self._in_background(self._receive(self._session, message))

@@ -1,4 +1,4 @@
-"""The request with which a client opens a WebSocket: read, checked and answered."""
+"""Opening handshake of a WebSocket: reads, checks and answers the client's request."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 OPENING_MAX = 8192  # bytes of a request
-MESSAGE_MAX = 8 * 1024 * 1024  # bytes of a text, whole or in pieces
+MESSAGE_MAX = 8 * 1024 * 1024  # bytes of a message, whole or fragmented
 OPENING_SECONDS_MAX = 10.0
 HEAD_END = b"\r\n\r\n"
 
@@ -40,7 +40,7 @@ class Entrance:
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A client that came in; ``early`` is what it sent after its request. ``identity`` is empty if no one asked."""
+    """An admitted client; ``early``: bytes received after its request. ``identity`` is empty without access control."""
 
     channel: Channel
     protocol: ServerProtocol
@@ -49,9 +49,9 @@ class Opened:
 
 
 class Opening:
-    """Takes what a client sends until ``opened`` is called; too slow a client is disconnected.
+    """Handles received bytes until it calls ``opened``; disconnects a client that is too slow.
 
-    ``wait_for`` has something awaited in the background, and nothing more read meanwhile.
+    ``wait_for`` awaits in the background and pauses reading meanwhile.
     """
 
     def __init__(
@@ -69,11 +69,11 @@ class Opening:
         self._timer = asyncio.get_running_loop().call_later(OPENING_SECONDS_MAX, writer.abort)
 
     def begin(self, host: str, name: str) -> None:
-        """Expect the request of the client at ``host``; ``name``: with its port."""
+        """Expect the request of the client at ``host``; ``name`` includes its port."""
         self._host, self._name = host, name
 
     def close(self) -> None:
-        """The client is gone, or refused."""
+        """Stop: the client is gone, or refused."""
         self._timer.cancel()
 
     def receive(self, data: bytes) -> None:

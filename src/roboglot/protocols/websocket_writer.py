@@ -1,4 +1,4 @@
-"""Output to one client of a WebSocket: written at once, or waited for; a client that never reads is disconnected."""
+"""Output to one WebSocket client, with backpressure; a client that never reads is disconnected."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-UNSENT_MAX = 16 * 1024 * 1024  # bytes queued for a slow reader; the next text disconnects it
-ROOM = 256 * 1024  # bytes queued for a slow reader before programs wait for it
+UNSENT_MAX = 16 * 1024 * 1024  # bytes queued for a slow reader, beyond which it is disconnected
+ROOM = 256 * 1024  # bytes queued for a slow reader, beyond which programs wait for it
 STALLED_SECONDS_MAX = 10.0  # for which such a reader may take nothing before it is disconnected
 
 
 class Writer:
-    """Writes from ``connect`` to ``lose``; before and after, nothing is written and nothing waits."""
+    """Writes from ``connect`` to ``lose``; before and after, it discards everything and nothing waits."""
 
     def __init__(self) -> None:
         self._transport: asyncio.Transport | None = None
@@ -28,33 +28,33 @@ class Writer:
         self._stall_timer: asyncio.TimerHandle | None = None
 
     def connect(self, transport: asyncio.Transport, name: str) -> None:
-        """Write to ``transport`` from now on; ``name`` is the client's in the log."""
+        """Write to ``transport`` from now on; ``name`` identifies the client in the log."""
         self._transport, self._name = transport, name
         transport.set_write_buffer_limits(high=ROOM)
 
     def lose(self) -> None:
-        """The client is gone."""
+        """Stop writing: the client is gone."""
         self._transport = None
         self.resume()
 
     @property
     def lost(self) -> bool:
-        """True if no one is there to read."""
+        """True if there is no client."""
         return self._transport is None
 
     @property
     def closing(self) -> bool:
-        """True if the connection is about to end, or has."""
+        """True if the connection is closing or closed."""
         return self._transport is None or self._transport.is_closing()
 
     @property
     def unsent(self) -> int:
-        """Bytes that wait for the client to read."""
+        """Number of bytes that the client has yet to read."""
         return 0 if self._transport is None else self._transport.get_write_buffer_size()
 
     @property
     def has_room(self) -> bool:
-        """False while the client reads more slowly than it is written to."""
+        """False while the client lags behind."""
         return self._has_room.is_set()
 
     async def room(self) -> None:
@@ -62,19 +62,19 @@ class Writer:
         await self._has_room.wait()
 
     def pause(self) -> None:
-        """Let programs wait: the client reads more slowly than they report."""
+        """Make programs wait: the client lags behind."""
         self._has_room.clear()
         self._watch_reading()
 
     def resume(self) -> None:
-        """Let programs go on: the client has caught up, or is gone."""
+        """Let programs continue: the client has caught up, or is gone."""
         self._has_room.set()
         if self._stall_timer is not None:
             self._stall_timer.cancel()
             self._stall_timer = None
 
     def may_write(self) -> bool:
-        """Return True if one message more can be written; disconnect a client that leaves too much unread."""
+        """Return True if another message can be written; disconnect a client with too many unread bytes."""
         if self.closing:
             return False
         if self.unsent > UNSENT_MAX:
@@ -83,7 +83,7 @@ class Writer:
         return True
 
     def flush(self, protocol: ServerProtocol) -> None:
-        """Write what the library has for the client; an empty piece means the end."""
+        """Write the library's output; an empty chunk ends the connection."""
         for data in protocol.data_to_send():
             if self._transport is None:
                 return
@@ -104,7 +104,7 @@ class Writer:
             self._transport.abort()
 
     def _watch_reading(self, taken_before: int = -1) -> None:
-        """Disconnect a client that has taken nothing since the last time, else look again."""
+        """Disconnect a client that has read nothing since the last check; otherwise check again later."""
         if self._transport is None or self._has_room.is_set():
             return
         taken = self._written - self._transport.get_write_buffer_size()

@@ -1,14 +1,14 @@
 """Fairness to the clients of a program that one thread serves. Knows no socket and no protocol.
 
-In each WINDOW of the machine's time, the requests of all clients together may take PART of it before anyone waits. Then
-those that had more than an equal part wait for the next window, and the others go on. So a client that asks as fast as
-it can takes what is free, and slows neither the others nor the robots; one that is alone never waits. Parts are equal
-between hosts, and between all connections: a host gains nothing by having many. No client waits while other programs
-hold the processor: the thread itself must have worked for that part of the window. No one waits to stop a robot: a
-request to stop passes, and so do those before it.
+In each WINDOW of real time, the requests of all clients may together take PART of it before any client waits. Then
+clients that used more than an equal share wait for the next window, and the others continue. So a client that sends as
+fast as it can uses spare time only and slows neither other clients nor robots; a single client never waits. Shares are
+equal between hosts and between connections: a host gains nothing by opening many. No client waits while other programs
+hold the processor: the thread itself must have worked for that part of the window. Requests to stop a robot never
+wait, nor do those queued before them.
 
-Requests that are answered by little more than a plain call would be slowed by looking at the time. Of these a client is
-lent some, which are counted afterwards: as long as the last that was timed took. The first of a window is timed.
+Reading the clock would slow down requests that take little more than a plain call. A client may make LENT of these
+before the next is timed; each is then charged at the cost of the last timed one. The first in a window is timed.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ log = logging.getLogger(__name__)
 WINDOW = 0.1  # s
 PART = 0.5  # of a window, for the requests of all clients
 LIMIT = PART * WINDOW  # s
-ACTIVE_SECONDS = 1.0  # since its last request a client counts as one that wants its part
+ACTIVE_SECONDS = 1.0  # since its last request, for which a client counts as active
 LOG_SECONDS = 10.0  # between two log lines on one client
-HANDSHAKE_GAP = 0.02  # s between the beginnings of two handshakes with TLS, which hold the thread for a third of it
-COST_MAX = 0.02  # s that one request counts: longer ones wait for something
+HANDSHAKE_GAP = 0.02  # s between the starts of two TLS handshakes, each of which holds the thread for a third of that
+COST_MAX = 0.02  # s charged for one request at most: longer ones wait for something
 HURRIED_MAX = 256  # requests of a connection that pass in a window because one of them stops a robot
 LENT = 32  # requests before the next one that is timed
 UNCOUNTED = 1 << 62
@@ -33,7 +33,7 @@ CLIENTS_MAX = 4096  # connections counted at the same time; the oldest are dropp
 
 
 class Use:
-    """The use that a connection, or all those of a host, made of a window."""
+    """Time that a connection, or a host with all its connections, used in a window."""
 
     __slots__ = (
         "host",
@@ -51,26 +51,26 @@ class Use:
     )
 
     def __init__(self, name: str, host: Use | None = None) -> None:
-        """``host``: the share of all connections of its host; None: this is one."""
+        """``host``: the use of all connections of its host; None: this is a host's own."""
         self.name = name
         self.host = host or self
         self.last = 0.0  # time of the last request
         self.named = -LOG_SECONDS  # time of the last log line
-        self.used = 0.0  # s in the window of that number
+        self.used = 0.0  # s used in window number ``window``
         self.window = 0
-        self.hurried = self.hurried_in = 0  # requests that passed, and the number of that window
-        self.left = self.lent = UNCOUNTED  # requests that it may still make, of those lent; without Fairness, all
-        self.owed = 0  # requests made and not counted
-        self.typical = COST_MAX  # s: the last that was timed
+        self.hurried = self.hurried_in = 0  # requests that passed out of turn, and in which window
+        self.left = self.lent = UNCOUNTED  # untimed requests left, of those lent; unlimited without Fairness
+        self.owed = 0  # untimed requests not yet charged
+        self.typical = COST_MAX  # s: cost of the last timed request
 
     def settle(self) -> None:
-        """Take back what is lent."""
+        """Withdraw the rest of the lent requests."""
         self.owed += self.lent - self.left
         self.lent = self.left = 0
 
 
 class Fairness:
-    """The uses of all clients of a program, and who has to wait.
+    """Uses of all clients of a program; decides which have to wait.
 
     now: the machine's time, s. worked: processor time of the serving thread, s.
     """
@@ -119,9 +119,9 @@ class Fairness:
         return self._end - now
 
     def hurries(self, use: Use, requests: int = 1) -> bool:
-        """Return whether the next requests of a client that has to wait may pass, as one of them or behind them stops.
+        """Return whether a waiting client's next ``requests`` may pass because one of them, or the next, is a stop.
 
-        Not without end: a client that sends stops with all it asks for would never wait.
+        At most HURRIED_MAX per window: a client that adds stops to everything it sends has to wait, too.
         """
         if use.hurried_in != self._window:
             use.hurried_in, use.hurried = self._window, 0
@@ -142,16 +142,16 @@ class Fairness:
         self._total += seconds
 
     def lend(self, use: Use, seconds: float) -> None:
-        """Count a request that took ``seconds``, and those lent before; lend the next ones."""
+        """Charge a request that took ``seconds`` and the untimed ones before it; lend the next ones."""
         use.settle()
         owed, use.owed = use.owed, 0
-        self.took(use, seconds + owed * min(seconds, use.typical))  # what other programs held up is not typical
+        self.took(use, seconds + owed * min(seconds, use.typical))  # a request delayed by other programs is not typical
         use.typical = seconds
         use.left = use.lent = LENT
         self._lent.add(use)
 
     def timed(self, use: Use, answer: Callable[[], T | None]) -> T | None:
-        """Return what ``answer`` does at once, and lend the next ones; None if the client has to wait, or by itself."""
+        """Return the timed result of ``answer`` and lend the next requests; None if the client has to wait."""
         if self.wait(use):
             return None
         begun = self.now()
@@ -160,7 +160,7 @@ class Fairness:
         return answered
 
     def _take_back(self, now: float) -> None:
-        """Let each client be timed at its next request, and note who has asked since the last time."""
+        """Have each client's next request timed, and update the time of its last request."""
         for use in self._lent:
             if use.left < use.lent:
                 use.last = use.host.last = now
@@ -168,14 +168,14 @@ class Fairness:
         self._lent.clear()
 
     def wait_to_dial(self) -> float:
-        """Return the seconds until one more handshake may begin: those of many robots do not come at once."""
+        """Return the seconds until the next TLS handshake may begin, to spread those of many robots."""
         now = self.now()
         begins = max(now, self._handshake)
         self._handshake = begins + HANDSHAKE_GAP
         return begins - now
 
     def _is_over(self, use: Use, now: float) -> bool:
-        """Return whether a client, or its host, had more than an equal part of this window."""
+        """Return whether a client, or its host, used more than an equal share of this window."""
         if not self._connections:
             recent = now - ACTIVE_SECONDS
             self._connections = sum(each.last >= recent for each in self._uses.values())
@@ -186,7 +186,7 @@ class Fairness:
         )
 
     def _forget(self) -> None:
-        """Drop the connections whose last request is oldest: a quarter."""
+        """Drop the quarter of the connections whose last requests are oldest."""
         oldest = sorted(self._uses.items(), key=lambda item: item[1].last)
         for peer, _ in oldest[: CLIENTS_MAX // 4]:
             del self._uses[peer]

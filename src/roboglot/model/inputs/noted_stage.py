@@ -1,4 +1,4 @@
-"""A stage whose changes are noted as inputs, so that a lockstep run can be repeated with the same hands in it."""
+"""Stage that notes changes as inputs, so that a lockstep run can be repeated with them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ S = TypeVar("S", bound=Stage)
 
 
 def noted(stage: S, outside: Outside) -> S:
-    """Return ``stage`` with its changes noted, for everything outside of the world."""
+    """Wrap ``stage`` to note its changes, for callers outside the world."""
     return cast(S, _Noted(stage, Stage, outside, {}))
 
 
 class _Noted:
-    """A stage or a person in one; ``given`` goes into each note."""
+    """Wrapper of a stage or a person; ``given`` is added to each note."""
 
     def __init__(self, inner: object, kind: type, outside: Outside, given: Mapping[str, object]) -> None:
         self._inner, self._kind, self._outside, self._given = inner, kind, outside, given
@@ -59,7 +59,7 @@ class _Noted:
 
 
 def do_again(stage: Stage, noted: Input) -> None:
-    """Do what hands did. Raises what they raised, and ValueError for what is no change that hands make."""
+    """Repeat a noted change. Raises the errors of the original, and ValueError for an unknown change."""
     values = dict(noted.values)
     target: Stage | StagePerson = stage
     if PERSON in values:

@@ -1,7 +1,7 @@
-"""Inputs that come to robots from outside and are no requests at doors: noted, so that a lockstep run can be repeated.
+"""External inputs other than requests at doors, noted so that a lockstep run can be repeated.
 
-Hands that change the world, commands at the console, what others answer whom a robot calls itself (a dog's app), and
-that clients come, hang up, or call off what they asked for.
+These are changes of the world by hand, commands at the console, answers to calls that a robot makes itself (to a dog's
+app), and clients that connect, hang up or cancel their requests.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from typing import NamedTuple
 from roboglot.model.client_context import client, connection
 from roboglot.model.clock import Clock
 
-ANSWER = "answer"  # the kind of answers from outside that the robot asked for
-CAME, GONE, CALLED_OFF = "came", "gone", "called off"  # kinds of what clients do beside asking; the name is the door's
-PATIENCE = 2.0  # s (machine clock) that lockstep time waits for such an answer
+ANSWER = "answer"  # kind: answer to a call that the robot made
+CAME, GONE, CALLED_OFF = "came", "gone", "called off"  # kinds: clients; the name is the door's
+PATIENCE = 2.0  # s (machine clock) that lockstep time waits for an answer
 _carried_out: ContextVar[bool] = ContextVar("carried_out", default=False)
 
 
 class Input(NamedTuple):
     """One input. ``stamp``: robot time, s; ``turn``: the clock's; ``robot``: empty if it concerns the world.
 
-    ``kind`` says which part of the program understands ``name`` and ``values``, which are what JSON has.
-    ``client`` and ``connection``: for whom, as with an exchange.
+    ``kind`` names the part of the program that interprets ``name`` and ``values`` (JSON types). ``client`` and
+    ``connection``: as in an exchange.
     """
 
     stamp: float
@@ -56,21 +56,21 @@ class Outside:
 
     @property
     def watched(self) -> bool:
-        """True while there are listeners, and this is not the effect of an input that was noted."""
+        """True while there are listeners, unless a noted input is the cause of what happens now."""
         return bool(self._listeners) and not _carried_out.get()
 
     def listen(self, listener: Listener) -> Callable[[], None]:
-        """Call ``listener`` with every input; returns what ends it."""
+        """Call ``listener`` with every input; return a function that unsubscribes it."""
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
     def note(self, kind: str, name: str, values: Mapping[str, object]) -> None:
-        """Hand an input to the listeners."""
+        """Pass an input to the listeners."""
         who = ("", "") if kind == ANSWER else (client(), connection())
         self._pass(Input(self._clock.time(), self._clock.turn, self._robot, kind, name, values, *who))
 
     def note_client(self, kind: str, door: str, where: str, **values: object) -> None:
-        """Note that the client at the other end ``where`` came, has gone, or called off what it asked for."""
+        """Note that the client at address ``where`` connected, left or cancelled a request."""
         if self._listeners:
             self._pass(Input(self._clock.time(), self._clock.turn, self._robot, kind, door, values, "", where))
 
@@ -80,7 +80,7 @@ class Outside:
 
     @contextmanager
     def noting(self, kind: str, name: str, values: Mapping[str, object]) -> Iterator[None]:
-        """Note it; what it leads to is no input of its own."""
+        """Note an input; its effects inside ``with`` are not noted as further inputs."""
         if not self.watched:
             yield
             return
@@ -94,10 +94,10 @@ class Outside:
     # -- answers from outside --
 
     async def call_out(self, name: str, work: Callable[[], Awaitable[str]]) -> str:
-        """Return what ``work`` hears from someone out there, in a word; its end is an input.
+        """Call an external peer by ``work`` and return its one-word answer, which is noted as an input.
 
-        Where a lockstep run is noted, time waits for it as long as answers usually come soon, and robots learn of it
-        when they have come to rest. Where it is played, ``work`` is not begun.
+        In a noted lockstep run, time waits for the answer while answers usually come soon, and it is delivered between
+        two instants. In a repeated run ``work`` is not started: the recorded answer is returned.
         """
         self._asked[name] += 1
         number = self._asked[name]
@@ -121,7 +121,7 @@ class Outside:
             self._waiting.pop((name, number), None)
 
     def _resolve(self, name: str, number: int, done: asyncio.Future[str]) -> None:
-        """``done`` has ended."""
+        """Deliver the outcome of the call ``done``."""
         answer = self._waiting.get((name, number))
         if answer is None or answer.done() or done.cancelled():
             return
@@ -131,15 +131,15 @@ class Outside:
             self.answer(name, number, done.result())
 
     def play(self) -> None:
-        """Make no calls from now on: ``answer`` says what is heard."""
+        """Make no calls from now on: ``answer`` supplies the answers."""
         self._playing = True
 
     def waits(self, name: str, number: int) -> bool:
-        """Return whether the robot waits for an answer to the call with this number among those of that name."""
+        """Return whether the robot waits for the answer to call ``number`` of that name."""
         return (name, number) in self._waiting
 
     def answer(self, name: str, number: int, said: str) -> None:
-        """Let the robot hear what that call was answered."""
+        """Deliver the answer to that call."""
         answer = self._waiting.pop((name, number))
         if not answer.done():
             self.note(ANSWER, name, {"number": number, "said": said})

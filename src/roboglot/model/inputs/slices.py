@@ -1,8 +1,8 @@
 """Runs longer jobs in slices, between which the event loop serves its sockets. Knows no robot and no clock.
 
-With a slice in every turn of the loop, a request of several steps (seven turns over gRPC) would wait for a slice at
-each of them. So after a slice, sockets are served until nothing has come for a moment, in which threads can bring the
-next step of a request. Jobs that have waited too long get a slice in every turn.
+With a slice in every turn of the loop, a request that takes several turns (seven over gRPC) would wait for a slice in
+each of them. So after a slice, sockets are served until they have been idle for a moment, long enough for threads to
+deliver the next step of a request. Jobs that have waited too long get a slice in every turn.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ SLICE = 0.001  # real s of jobs, after which the loop serves its sockets
 SERVING = 0.003  # real s for which sockets may delay the next slice
 IDLE = 0.0003  # real s without anything to serve, after which the next slice begins
 BEHIND_MAX = 0.2  # real s of waiting jobs, after which sockets delay them no longer
-TURN = 0.00005  # real s; a longer turn of the loop has served something
+TURN = 0.00005  # real s; longer turns of the loop have served a socket
 
 
 class Slices:

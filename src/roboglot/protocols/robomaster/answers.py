@@ -1,4 +1,4 @@
-"""Answers of this door: a handler's results, and the bytes and reasons that they are worded as."""
+"""Answers of this door: results of handlers, and the bytes and reasons made of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from roboglot.values import dataclass
 from roboglot.wire.robomaster.replies import Number
 
 Why = Callable[[], str]
-Result = str | Sequence[Number | str] | None  # of a handler: a Reply or free text, values, or nothing to say
+Result = str | Sequence[Number | str] | None  # of a handler: a Reply or free text, values, or None for a plain "ok"
 
 
 @dataclass(frozen=True, slots=True)

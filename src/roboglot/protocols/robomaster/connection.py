@@ -40,10 +40,10 @@ NOTHING: Mapping[bytes, Repeated] = MappingProxyType({})
 
 
 class ControlConnection(asyncio.Protocol):
-    """A hang-up is detected even during a long command, and while reading is paused.
+    """Control connection; detects a hang-up even during a long command, and while reading is paused.
 
-    A line that was said before in this session, and needs no more than a plain call, is answered while it is received;
-    everything else is split, queued and answered in its turn.
+    A line that repeats an earlier one of the session and needs only a plain call is answered as it is received; all
+    others are split, queued and answered in turn.
     """
 
     transport: asyncio.Transport
@@ -73,12 +73,12 @@ class ControlConnection(asyncio.Protocol):
         self._commands: deque[str | None] = deque()
         self._resting: asyncio.TimerHandle | None = None  # while reading is paused
         self._worker: asyncio.Task[None] | None = None
-        self._turn: asyncio.TimerHandle | None = None  # while others come first
+        self._turn: asyncio.TimerHandle | None = None  # while other clients come first
         self._writable = asyncio.Event()
         self._writable.set()
         self._explained = 0
         self._repeated = (
-            NOTHING  # what may be answered at once: nothing before it has joined, and while something waits
+            NOTHING  # lines that may be answered at once; none before it has joined, or while a command waits
         )
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -124,7 +124,7 @@ class ControlConnection(asyncio.Protocol):
         return reply
 
     def _read(self, data: bytes) -> None:
-        """Queue the lines in ``data``, and answer what can be answered now."""
+        """Queue the lines in ``data``, and answer those that need not wait."""
         whole = self._greeting.known and not self._splitter.within and data.find(END) == len(data) - 1
         self._repeated = NOTHING
         texts = list(self._splitter.feed(turn_away_strangers(self._greeting, self.transport, data)))
@@ -140,7 +140,7 @@ class ControlConnection(asyncio.Protocol):
             self._learn(data, texts[0])
 
     def _learn(self, data: bytes, text: str) -> None:
-        """Keep what answers this line, for when it is said again."""
+        """Cache the function that answers this line, for its repetitions."""
         known = self._context.repeated
         if data not in known and (repeated := at_once(self._context, text)) is not None:
             if len(known) >= LINES_MAX:
@@ -172,9 +172,9 @@ class ControlConnection(asyncio.Protocol):
         self._writable.set()
 
     def _throttle(self) -> None:
-        """Read only while few commands are queued: TCP slows down a client that sends faster than they are executed.
+        """Pause reading while many commands are queued, so that TCP slows down a client that sends too fast.
 
-        A paused connection does not report a hang-up, so the kernel is asked.
+        A paused connection does not report a hang-up, so it is polled for one.
         """
         if self._resting is None and len(self._commands) >= COMMANDS_MAX:
             self.transport.pause_reading()

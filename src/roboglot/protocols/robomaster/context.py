@@ -1,7 +1,7 @@
 """The SDK session: one per robot, begun by ``command``, shared by every control connection that uses it.
 
-It ends with ``quit`` or with its last connection; then the robot stops the session's motions and every setting that
-it changed is restored. Knows no sockets: connections are members that join and leave.
+It ends with ``quit`` or with its last connection; then its motions are stopped and the settings that it changed are
+restored. Knows no sockets: connections are members that join and leave.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class Context:
         self._parts: dict[type[ChapterState], Any] = {}
         self._undo: dict[str, Callable[[], object]] = {}
         self._members: dict[Hashable, str] = {}
-        self.repeated: dict[bytes, Repeated] = {}  # by what a member sent; emptied when SDK mode is entered or left
+        self.repeated: dict[bytes, Repeated] = {}  # by received line; cleared when SDK mode is entered or left
         self._numbers = itertools.count(1)
         self._name = ""  # each session has its own: the first part of the source of its actions
 
@@ -153,7 +153,7 @@ class Context:
         self._undo[what] = undo
 
     def _forget_lines(self) -> None:
-        """Drop the answers of the last session; its members, who may hold them, join the next one first."""
+        """Drop the answers of the last session; members hold the old dict until they join the next one."""
         self.repeated.clear()
         self.repeated = {}
 

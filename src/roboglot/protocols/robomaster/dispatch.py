@@ -48,7 +48,7 @@ log = logging.getLogger(__name__)
 
 DOOR = "robomaster"
 KEPT_MAX = 128  # command lines whose meaning is kept
-MANNERS = ("vxy", "vz", "vp", "vy", "wait_for_complete")  # they say how to move, not where: alone they do nothing
+MANNERS = ("vxy", "vz", "vp", "vy", "wait_for_complete")  # parameters of how to move, not where: alone they do nothing
 
 
 @dataclass(slots=True)
@@ -61,9 +61,9 @@ class _Asked:
 
 @dataclass(frozen=True, slots=True)
 class _Meaning:
-    """Meaning of a line: its number, the command's key ("": there is none), and its values or the refusal of them.
+    """Parsed line: its number, the command's key ("" if unknown), and its values or their refusal.
 
-    The values are read only, as they are kept.
+    The values must not be changed, as they are cached.
     """
 
     seq: int | None
@@ -145,9 +145,9 @@ def _worded(profile: Profile, result: Result, seq: int | None) -> bytes:
 
 
 def at_once(context: Context, text: str) -> Repeated | None:
-    """Return what answers a line whenever it is said again in this session; None if that takes more than a plain call.
+    """Return a function that answers repetitions of a line in this session; None if that takes more than a plain call.
 
-    It returns None where it has done nothing, as the line has to go through ``answer`` just now.
+    The function returns None, without having done anything, if this repetition has to go through ``answer``.
     """
     asked = context.robot
     if not context.active or asked.admission.enforced or asked.stand_in is not None:
@@ -178,7 +178,7 @@ def at_once(context: Context, text: str) -> Repeated | None:
 
 
 async def _stood_in(context: Context, stand_in: StandIn, text: str | None, asked: _Asked) -> Answer:
-    """Let the stand-in answer."""
+    """Return the stand-in's answer."""
     seq = None
     try:
         if text is None:
@@ -211,7 +211,7 @@ async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, t
 
 @lru_cache(KEPT_MAX)
 def _meant(text: str, active: bool, as_robots: bool) -> _Meaning:
-    """Return the meaning of a line. Clients repeat few lines, so meanings are kept. Raises Malformed."""
+    """Parse a line, with a cache, as clients repeat few lines. Raises Malformed."""
     command = parse(text)
     for key, words in command.keys:
         operation = TABLE.get(key)

@@ -23,7 +23,7 @@ def nearest_command(command: Command, keys: typing.Collection[str]) -> str:
     """Return the most similar known command with the given words, or ""."""
     meant = " ".join((*command.words[:2], *((QUERY,) if command.query else ())))
     alike = {key for key in keys if key.endswith(QUERY) == command.query}
-    near = nearest(meant, alike) or nearest(meant, keys)  # the mark alone may be what is wrong
+    near = nearest(meant, alike) or nearest(meant, keys)  # perhaps only the mark is wrong
     return f"did you mean `{_spelt(near, command.words[2:])}`?" if near else ""
 
 

@@ -1,7 +1,8 @@
 """Detection, within seconds, of a peer that has vanished silently.
 
-One that is there but does not read keeps its connection: TCP_USER_TIMEOUT would end that, too, so the kernel's figures
-are looked at instead. The number of lost probes alone shows nothing: a driving client is probed many times a second.
+A peer that is alive but does not read keeps its connection. TCP_USER_TIMEOUT would end that, too, so the kernel's
+statistics are read instead. The number of lost probes alone is no proof: a driving client is probed many times a
+second.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def unanswered(connection: socket.socket) -> tuple[int, int, int]:
 
 
 def probe_for_life(transport: asyncio.Transport) -> None:
-    """Disconnect a peer that is dead. The kernel knows those on this machine, and probes the others."""
+    """Disconnect a dead peer. The kernel knows those on this machine, and probes remote ones."""
     connection = transport.get_extra_info("socket")
     if connection is None:
         return  # a serial line, or a tunnel, which monitors its clients itself

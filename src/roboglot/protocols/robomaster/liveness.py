@@ -1,8 +1,8 @@
 """Detection of a driving client that has vanished silently; its motions are stopped.
 
-While a client's motion runs, its host is asked ten times and more a second for a sign of life: by echo requests (ICMP)
-where the kernel lets ordinary programs send them, and always by the kernel's own probes of the control connection,
-which it sends only after a second of silence. What the client was sent and did not acknowledge counts as well. Knows
+While a client's motion runs, its host is probed at least ten times a second: by ICMP echo requests where the kernel
+lets ordinary programs send them, and always by the kernel's own probes of the control connection, which it sends only
+after a second of silence. What the client was sent and did not acknowledge counts as well. Knows
 hosts and connections, not programs: one that hangs on a living host is alive. A peer lives in real time, whatever
 the robot's clock does.
 """
@@ -59,12 +59,12 @@ class Echoes:
 
 
 class DrivingClient:
-    """A client at the other end of ``connection`` (None: a line that cannot be probed) and its signs of life."""
+    """Client behind ``connection`` (None: a line that cannot be probed), with its signs of life."""
 
     def __init__(self, name: str, host: str, connection: socket.socket | None) -> None:
         self.name, self.host = name, host
         self._connection = connection
-        self._echoes = False  # whether its host has ever answered: many do not
+        self._echoes = False  # True if its host has ever answered: many do not
         self._misses = 0
         self._greetings = GREETINGS
 
@@ -76,7 +76,7 @@ class DrivingClient:
         return False
 
     def rest(self, echoed: bool) -> bool:
-        """Record that the client drives nothing; return whether to probe it anyway, to see early if it answers."""
+        """Record that the client drives nothing; return whether to probe it anyway, to learn if its host answers."""
         self._misses = 0
         self._echoes = self._echoes or echoed
         self._greetings -= self._greetings > 0
@@ -85,7 +85,7 @@ class DrivingClient:
     def missing(self, echoed: bool, elapsed: float) -> bool:
         """Count one check, ``elapsed`` s after the last; return True after VIGIL_MISSES_MAX without a sign of life.
 
-        A miss is an unanswered probe: silence alone is none.
+        A miss is an unanswered probe; silence alone does not count.
         """
         assert self._connection
         try:
@@ -102,7 +102,7 @@ class DrivingClient:
 
 
 class Vigil:
-    """Watches all drivers of one robot; ``drives``: whether one has a motion under way, ``gone``: stops its motions."""
+    """Watches the clients of one robot; ``drives`` returns whether one drives, ``gone`` stops its motions."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Chassis and gimbal pushes: which attributes go out, how often, and the clockwork (manual 3.2.3.8 to 3.2.4.9)."""
+"""Chassis and gimbal pushes: their attributes, rates and timing (manual 3.2.3.8 to 3.2.4.9)."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ class _Attribute:
 
 @dataclass(slots=True, eq=False)
 class _Beat:
-    """Attributes that go out on one clockwork: alone, or all of a module together as robots have it."""
+    """Attributes sent with one period: each alone, or all of a module together, as on robots."""
 
     attributes: list[_Attribute]
-    running: tuple[int, ...] = ()  # the rates in use
+    running: tuple[int, ...] = ()  # present rates
     task: asyncio.Task[None] | None = None
 
 
 @dataclass(slots=True)
 class Pushes:
-    """Every beat is free of drift; ``send`` takes a finished datagram."""
+    """Pushes at fixed periods, without drift; ``send`` gets complete datagrams."""
 
     clock: Clock
     profile: Profile

@@ -1,6 +1,6 @@
-"""The types of the commands' parameters: ranges as the manual prints them and, where they differ, as robots have them.
+"""Types of the commands' parameters: ranges as in the manual and, where they differ, as on robots.
 
-``OnRobots`` says what real robots accept; the profiles of their builds check against that instead.
+``OnRobots`` annotates ranges of real robots, which the profiles of their builds use instead.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from roboglot.values import dataclass
 
 @dataclass(frozen=True, slots=True)
 class OnRobots:
-    """The type that takes the annotated one's place in profiles of robots' builds."""
+    """Type that replaces the annotated one in profiles of robots' builds."""
 
     kind: object
 

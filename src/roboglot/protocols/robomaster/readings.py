@@ -24,7 +24,7 @@ class ReadingSource(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """The one that is read."""
+        """Robot that is read."""
 
     @property
     def origin(self) -> Pose:

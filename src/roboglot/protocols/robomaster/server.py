@@ -29,7 +29,7 @@ from roboglot.wire.robomaster.replies import PROFILES
 
 __all__ = ["RoboMasterDoor", "implemented"]
 
-# Where a robot stands that provides its own Wi-Fi or hangs on a USB cable: clients know it, so it announces nothing.
+# Addresses of a robot on its own Wi-Fi or a USB cable: clients know them, so it announces nothing.
 CONNECTIONS_MAX = {"video": MEDIA_CONNECTIONS_MAX, "audio": MEDIA_CONNECTIONS_MAX, "pilot": PILOTS_MAX}
 PORT_RIGHTS = {"pilot": Right.DRIVE}  # required to connect; all other ports require SEE
 KNOWN_ADDRESSES = frozenset({"192.168.2.1", "192.168.42.2"})
@@ -64,7 +64,7 @@ class RoboMasterDoor:
         self._leave_stand_in: Callable[[], None] = lambda: None
 
     async def start(self) -> None:
-        """Listen on all ports, begin to announce; OSError names the address that is taken."""
+        """Listen on all ports and announce the robot. Raises OSError naming an address that is taken."""
         loop = asyncio.get_running_loop()
         try:
             everywhere = IPv4Address(self._address).is_unspecified
@@ -98,7 +98,7 @@ class RoboMasterDoor:
             )
 
     async def close(self) -> None:
-        """Stop listening, drop the clients, cancel what they began (its braking isn't waited for)."""
+        """Stop listening, disconnect clients and cancel their actions, without waiting for the robot to brake."""
         if self._announcing:
             self._announcing.cancel()
         self._leave_stand_in()
@@ -119,7 +119,7 @@ class RoboMasterDoor:
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """The control port first, then the others, the serial line, and where datagrams go."""
+        """The control port first, then the others, the serial line, and the destination of datagrams."""
         ports = {name: server.sockets[0].getsockname()[1] for name, server in self._servers.items()}
         # bash and coreutils exist everywhere; nc does not, and its options differ.
         trial = (
@@ -142,7 +142,7 @@ class RoboMasterDoor:
     # -- output of the session --
 
     def push(self, datagram: bytes, host: str) -> None:
-        """A datagram to the client's host, from the robot's own address; or down the serial line."""
+        """Send a datagram from the robot's own address to the client's host, or write it to the serial line."""
         place, admission = f"{host}:{self._config.push_port}", self.context.robot.admission
         self._note(datagram, place)
         if self._serial and host == SERIAL:
@@ -151,14 +151,14 @@ class RoboMasterDoor:
             self._datagrams.send(datagram, host, self._config.push_port)
 
     def send_event(self, event: bytes) -> None:
-        """Send an event to all readers of the event port and down the serial line."""
+        """Send an event to all readers of the event port and to the serial line."""
         self._note(event, f"event port {self._config.event_port}")
         self._events.write(event)
         if self._serial:
             self._serial.write(event + LINE_END)
 
     def _play(self, operation: str, message: bytes) -> None:
-        """Send a stand-in's pushes: events to their readers, the rest to every client's host."""
+        """Send a stand-in's push: an event to its readers, any other to every client's host."""
         if operation.endswith(" event"):
             self.send_event(message)
         elif operation != "> robot ip":  # this robot is elsewhere and reports it itself

@@ -26,7 +26,7 @@ Kinds = dict[str, object]  # parameter name: annotation
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One command under one profile."""
+    """Parameters of one command under one profile."""
 
     kinds: Kinds
     bare: tuple[str, ...]
@@ -34,11 +34,11 @@ class Shape:
     struct: type[msgspec.Struct]
 
     def values(self, words: Sequence[str]) -> dict[str, Value]:
-        """The words by parameter, not checked yet."""
+        """Return the words by parameter, unchecked."""
         return parameters_of(words, tuple(self.kinds), self.bare)
 
     def check(self, values: Mapping[str, Value | None]) -> dict[str, object]:
-        """Converted and checked values of all parameters. Raises BadParameters naming the parameter."""
+        """Return the converted and checked values of all parameters. Raises BadParameters naming the parameter."""
         if not self.kinds:
             return {}
         try:
@@ -50,7 +50,7 @@ class Shape:
 
 @cache
 def shape_of(operation: Operation[str], as_robots: bool) -> Shape:
-    """The shape of ``operation`` in the manual's ranges, or in robots'."""
+    """Return the shape of ``operation`` with the manual's ranges, or those of robots."""
     _, *parameters = inspect.signature(operation.handler, eval_str=True).parameters.values()
     kinds: Kinds = {p.name: _as_robots(p.annotation) if as_robots else p.annotation for p in parameters}
     fields: list[tuple[str, object] | tuple[str, object, object]] = [
@@ -65,7 +65,7 @@ def shape_of(operation: Operation[str], as_robots: bool) -> Shape:
 
 
 def _as_robots(kind: Any) -> Any:
-    """``kind`` with every annotation replaced that says what robots have instead."""
+    """Return ``kind`` with the types of robots in place of those annotated with ``OnRobots``."""
     if get_origin(kind) is Annotated:
         return next((extra.kind for extra in kind.__metadata__ if isinstance(extra, OnRobots)), kind)
     if get_origin(kind) in (types.UnionType, typing.Union):

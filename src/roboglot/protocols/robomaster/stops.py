@@ -1,4 +1,4 @@
-"""Commands that stop the robot, or a part of it: they wait for no other client."""
+"""Commands that stop the robot, or a part of it; they do not wait for other clients."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Recognises connections that speak another protocol: what a browser, TLS or SSH sends first is never run as commands.
+"""Recognises connections of another protocol (HTTP, TLS, SSH), so that their bytes are never run as commands.
 
-A page in a browser, any page, can have this machine's ports sent an HTTP request whose body holds commands.
+Every page in a browser can send an HTTP request whose body holds commands to ports of this machine.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ _SSH = b"SSH-"
 
 
 class Greeting:
-    """Looks at the first bytes of one connection; they may come one by one."""
+    """Inspects the first bytes of a connection, which may arrive one by one."""
 
     __slots__ = ("_head", "known")
 
     def __init__(self) -> None:
         self._head = b""
-        self.known = False  # whether the connection has proved to be a client's
+        self.known = False  # True once the connection has proved to be a client's
 
     def check(self, data: bytes) -> bytes:
         """The bytes that may be read as this port's own: none while the head could still be a stranger's.
@@ -48,7 +48,7 @@ class Greeting:
 
 
 def turn_away_strangers(greeting: Greeting, transport: asyncio.Transport, data: bytes) -> bytes:
-    """The bytes of ``data`` that may be read; a stranger is cut off, with a line in the log."""
+    """Return the bytes of ``data`` to be read; disconnect a stranger, with a line in the log."""
     if transport.is_closing():
         return b""
     try:
@@ -61,7 +61,7 @@ def turn_away_strangers(greeting: Greeting, transport: asyncio.Transport, data: 
 
 
 class StrangerError(Exception):
-    """The connection speaks the protocol that this names."""
+    """The connection uses another protocol, which the message names."""
 
 
 def _protocol(head: bytes) -> str:
@@ -73,7 +73,7 @@ def _protocol(head: bytes) -> str:
 
 
 def _undecided(head: bytes) -> bool:
-    """Return whether more bytes could make it a stranger's."""
+    """Return whether further bytes could reveal another protocol."""
     if _SSH.startswith(head) or _PERHAPS_HTTP.fullmatch(head):
         return True
     return any(method.startswith(head.lower()) for method in _METHODS)

@@ -1,4 +1,4 @@
-"""Table of this door: commands by their key, and the messages that it sends. The chapters fill it."""
+"""Table of this door: commands by key, and the messages that it sends. The chapters fill it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from roboglot.operations import OperationTable
 from roboglot.wire.contracts import contract
 
 TABLE: OperationTable[str] = OperationTable("robomaster")
-SENT = "> "  # the contract's mark of messages that the robot sends unasked
+SENT = "> "  # marks unsolicited messages in the contract
 MESSAGES = frozenset(
     {
         "> chassis push",
@@ -18,11 +18,11 @@ MESSAGES = frozenset(
         "> robot ip",
         "> game_msg push",
     }
-)  # those that this door implements
+)  # of those, the implemented ones
 
 
 def implemented() -> set[str]:
-    """The contract's keys that this door serves wholly, commands and messages."""
+    """Return the contract's keys of complete commands and messages."""
     return {row.key for row in contract("robomaster")} & (TABLE.implemented() | MESSAGES)
 
 
@@ -30,7 +30,7 @@ partly = TABLE.partly
 
 
 def key_of(message: bytes) -> str:
-    """The contract's key of what the robot sends by itself; empty if it is none of it."""
+    """Return the contract's key of an unsolicited message; empty if it is not in the contract."""
     words = message.split(None, 3)[:3]
     key = SENT + (" ".join(word.decode("ascii", "replace") for word in words[:2]))
     return "> game_msg push" if key == "> game msg" else key if key in MESSAGES else ""

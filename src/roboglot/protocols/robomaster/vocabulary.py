@@ -18,23 +18,23 @@ RPM = math.tau / 60.0  # rad/s
 
 
 def twist_of(x: float, y: float, z: float) -> Twist:
-    """The EP's m/s, m/s and degrees/s as a twist in base_link."""
+    """Return the EP's m/s, m/s and degrees/s as a twist in base_link."""
     return Twist(x, -y, -math.radians(z))
 
 
 def offset_of(x: float, y: float, z: float) -> Pose:
-    """The EP's m, m and degrees as a pose in base_link; z may exceed a turn."""
+    """Return the EP's m, m and degrees as a pose in base_link; z may exceed a turn."""
     return Pose(x, -y, -math.radians(z))
 
 
 def wheels_of(w1: float, w2: float, w3: float, w4: float, as_robots: bool) -> WheelSpeeds:
-    """The text's wheels in rpm: front right, front left, rear right, rear left; robots swap the last two."""
+    """Return wheel speeds from rpm: front right, front left, rear right, rear left; robots swap the last two."""
     right, left = (w4, w3) if as_robots else (w3, w4)
     return WheelSpeeds(front_right=w1 * RPM, front_left=w2 * RPM, rear_right=right * RPM, rear_left=left * RPM)
 
 
 def wheels_in_rpm(speeds: WheelSpeeds, as_robots: bool) -> tuple[int, int, int, int]:
-    """The other way round, whole numbers, because clients read them with int(); robots begin with the front left."""
+    """Return wheel speeds in whole rpm, as clients parse them with int(); robots begin with the front left."""
     if as_robots:
         in_order = (speeds.front_left, speeds.front_right, speeds.rear_left, speeds.rear_right)
     else:
@@ -44,7 +44,7 @@ def wheels_in_rpm(speeds: WheelSpeeds, as_robots: bool) -> tuple[int, int, int, 
 
 
 def without_yaw(speeds: WheelSpeeds) -> WheelSpeeds:
-    """The same wheels less what turns the body."""
+    """Return wheel speeds without the component that turns the body."""
     turn = (speeds.front_right + speeds.rear_right - speeds.front_left - speeds.rear_left) / 4
     return WheelSpeeds(
         front_left=speeds.front_left + turn,

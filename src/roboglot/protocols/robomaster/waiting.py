@@ -1,4 +1,4 @@
-"""Commands that answer at the end of what they began."""
+"""Commands that answer when their action has ended."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roboglot.protocols.robomaster.limits import WAIT_MAX
 
 
 async def ended(context: Context, action: Action) -> None:
-    """Return when it has succeeded; raise the reason if it failed, or after WAIT_MAX while it still runs."""
+    """Wait for an action to succeed; raise its error, or one after WAIT_MAX while it still runs."""
     try:
         status = await context.robot.clock.wait_for(action.done(), WAIT_MAX)
     except TimeoutError:

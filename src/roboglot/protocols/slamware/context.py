@@ -18,7 +18,7 @@ from roboglot.values import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """Context of one robot: the model, and this door's own state while it is open."""
+    """Context of one robot: the model, and the state of this door while it is open."""
 
     robot: Robot
     actions: ActionBook

@@ -1,7 +1,7 @@
-"""The ASGI application: one request in, the operation that it means, its answer or error out.
+"""The ASGI application: finds the operation of a request, runs it, and renders its answer or error.
 
-A bare application over the contract's paths, not a web framework: Litestar took 0.25 s to import and 0.3 s a robot to
-set up these 167 routes, more than the whole program may take to be ready.
+No web framework, as Litestar took 0.25 s to import and 0.3 s a robot to set up these 167 routes: more than the whole
+program may take to be ready.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ from roboglot.wire.contracts import Row, contract
 
 log = logging.getLogger(__name__)
 LOGGED_MAX = 200  # characters of a path or a refusal in a log line
-HEADS_MAX = 64  # heads of responses that are kept
+HEADS_MAX = 64  # cached heads of responses
 
 Repeated = Callable[[], bytes | None]  # a whole response, or None: the request must be parsed
 Send = Callable[[dict[str, object]], Awaitable[None]]
@@ -88,12 +88,12 @@ PREFLIGHT: Headers = [
     (b"access-control-allow-private-network", b"true"),
     (b"access-control-max-age", b"86400"),
 ]
-STOPS = ("/api/core/motion/v1/actions/", "/api/delivery/v1/tasks")  # what to DELETE to stop the robot
+STOPS = ("/api/core/motion/v1/actions/", "/api/delivery/v1/tasks")  # DELETE on these stops the robot
 FRAMES = (b"content-security-policy", b"frame-ancestors 'self'")  # against clickjacking by other pages
 
 
 class Application:
-    """Answers for one robot. Knows HTTP's words, but no socket."""
+    """Answers requests for one robot. Knows HTTP, but no socket."""
 
     def __init__(self, context: Context, browsers: Browsers | None = None) -> None:
         self._context = context
@@ -103,7 +103,7 @@ class Application:
         self._pages = Pages()
         self._encode = msgspec.json.Encoder().encode
         self._parameters = Parameters(context)
-        self._admitted: tuple[str, object, Headers] = "", None, []  # the last one's method and headers, and the answer
+        self._admitted: tuple[str, object, Headers] = "", None, []  # last method and headers, the answer's headers
         self.closing = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -144,10 +144,10 @@ class Application:
         await send({"type": "http.response.body", "body": body})
 
     def at_once(self, scope: Scope) -> Repeated | None:
-        """Return what answers a GET of a client whenever it comes again; None if that takes more than a plain call.
+        """Return a function that answers repetitions of a client's GET; None if that takes more than a plain call.
 
-        For what has just been answered, with the client's name. It returns None where nothing was done, and the
-        request has to come in as the first one did: for a follower, a slow network, a refusal.
+        The function returns None, without having done anything, if this repetition has to be handled like the first:
+        for a subscriber of the tap, a slow network, a refusal.
         """
         robot = self._context.robot
         operation, match = self._found(scope)
@@ -171,7 +171,7 @@ class Application:
                 if answer is NO_CONTENT or answer is None:
                     return None
                 headers, body = self._render(answer, scope)
-            except Exception:  # noqa: BLE001 - it only read: asked once more, it is worded and logged
+            except Exception:  # noqa: BLE001 - a read: the full way repeats it, reports and logs the error
                 return None
             return head(*headers, *shared) % len(body) + body
 
@@ -183,7 +183,7 @@ class Application:
         return reply
 
     def _found(self, scope: Scope) -> tuple[Operation[str] | None, Match | None]:
-        """Return the operation that a GET reads by a plain function, if it means one."""
+        """Return the operation of a GET, and its match, if its handler is a plain function."""
         if scope["method"] != "GET" or (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
             return None, None
         operation = TABLE.get(match.methods["GET"].key) if "GET" in match.methods else None
@@ -192,9 +192,9 @@ class Application:
         return (None, None) if iscoroutinefunction(operation.handler) else (operation, match)
 
     def _admit(self, scope: Scope) -> Headers:
-        """Return what tells the browser which page may read the answer. Raises HttpError 403 for strangers' pages."""
+        """Return the CORS headers of an answer. Raises HttpError 403 for pages of other hosts."""
         method, rows = scope["method"], scope["headers"]
-        if method == self._admitted[0] and rows == self._admitted[1]:  # a client that asks again and again
+        if method == self._admitted[0] and rows == self._admitted[1]:  # a client that polls
             return self._admitted[2]
         asked = of_rows(rows, method)
         shared: Headers = []
@@ -251,7 +251,7 @@ class Application:
             return await self._carry_out(row, match, scope, receive)
 
     def _page(self, path: str, method: str) -> tuple[Headers, bytes]:
-        """Return what is served besides the API."""
+        """Return a page besides the API. Raises HttpError."""
         if (page := self._pages.find(path)) is None:
             raise HttpError(404, "Not Found")
         if method not in ("GET", "HEAD"):
@@ -278,7 +278,7 @@ class Application:
         return 200, *self._render(answer, scope)
 
     def _check_right(self, key: str, right: Right | None) -> None:
-        """Raise HttpError if the client may not do this."""
+        """Raise HttpError if the client lacks the right."""
         if self._admission.enforced:
             try:
                 self._admission.check("slamware", key, right)
@@ -292,7 +292,7 @@ class Application:
             self._check_right(key, right)
 
     async def _call(self, operation: Operation[str], row: Row, values: dict[str, object], scope: Scope) -> object:
-        """The handler's answer. Raises HttpError only."""
+        """Run the handler and return its result. Raises HttpError only."""
         try:
             if self._admission.enforced and "body" in values:
                 await self._check_again(scope, row.key, operation.right)
@@ -313,7 +313,7 @@ class Application:
     async def _ask_stand_in(
         self, stand_in: StandIn, row: Row, scope: Scope, receive: Receive
     ) -> tuple[int, Headers, bytes]:
-        """Have another answer in the robot's place. Raises HttpError 501 for what it cannot answer."""
+        """Return the stand-in's answer. Raises HttpError 501 if it has none."""
         scope["body"] = await self._parameters.whole(scope, receive)
         if self._tap.watched:
             self._note_request(scope)
@@ -358,13 +358,13 @@ def head(*headers: tuple[bytes, bytes]) -> bytes:
 
 
 def _wire_form(scope: Scope) -> bytes:
-    """Return a request as the tap has it: method, path and query, an empty line, the body."""
+    """Return a request in the tap's form: method, path and query, an empty line, the body."""
     query = b"?" + scope["query_string"] if scope["query_string"] else b""
     return b"%s %s%s\n\n%s" % (scope["method"].encode(), scope["raw_path"], query, scope.get("body", b""))
 
 
 def _kind_of(body: bytes, scope: Scope) -> tuple[bytes, bytes]:
-    """Return the Content-Type of a body whose own is not known."""
+    """Return the Content-Type guessed from a recorded body."""
     try:
         msgspec.json.decode(body)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
@@ -373,12 +373,12 @@ def _kind_of(body: bytes, scope: Scope) -> tuple[bytes, bytes]:
 
 
 def allowed(methods: Iterable[str]) -> str:
-    """The header Allow of a path with these methods."""
+    """Return the header Allow of a path with these methods."""
     return ", ".join([*methods, *(["HEAD"] if "GET" in methods else []), "OPTIONS"])
 
 
 def not_allowed(methods: Iterable[str]) -> HttpError:
-    """405, which says what is."""
+    """Return the error 405 with the allowed methods."""
     words = allowed(methods)
     return HttpError(405, "Method Not Allowed", words, ((b"allow", words.encode()),))
 

@@ -1,4 +1,4 @@
-"""Errors as HTTP: the one table from RobotError to a status, and the manual's texts for bad requests.
+"""Errors in HTTP: the table from RobotError to a status, and the manual's texts for bad requests.
 
 The vendor's robots put the text into the reason phrase; we send it there and as a text/plain body.
 """
@@ -20,13 +20,13 @@ from roboglot.model.errors import (
 )
 from roboglot.values import dataclass
 
-REASON = b"reason-phrase"  # an internal header between the dispatch and a connection, which never reaches the wire
+REASON = b"reason-phrase"  # internal header from the dispatch to the connection; never sent
 REASON_MAX = 160  # characters of a reason phrase
 
 
 @dataclass(eq=False)  # not frozen: contextlib writes the traceback into exceptions that pass through
 class HttpError(Exception):
-    """A status, the text of the reason phrase, what more the body can tell, and further headers."""
+    """Error with a status, the text of the reason phrase, a detail for the body, and further headers."""
 
     status: int
     text: str
@@ -35,7 +35,7 @@ class HttpError(Exception):
 
     @property
     def body(self) -> str:
-        """Text for people: what, and why."""
+        """The text and the detail."""
         return f"{self.text}: {self.detail}" if self.detail else self.text
 
 
@@ -71,16 +71,16 @@ BAD_REQUESTS = {
 
 
 def from_robot(error: RobotError, key: str = "") -> HttpError:
-    """``error`` of the model as HTTP, for the operation ``key``."""
+    """Translate an error of the model, for the operation ``key``."""
     status, text = next(entry for kind, entry in STATUSES.items() if isinstance(error, kind))
     return bad_request(key, str(error)) if status == 400 else HttpError(status, text, str(error))
 
 
 def bad_request(key: str, detail: str) -> HttpError:
-    """400 for the operation ``key``."""
+    """Return the error 400 of the operation ``key``."""
     return HttpError(400, BAD_REQUESTS.get(key, "Bad Request"), detail)
 
 
 def reason_phrase(text: str) -> bytes:
-    """``text`` as it may stand in a status line: printable ASCII, bounded."""
+    """Return ``text`` in the form of a reason phrase: printable ASCII, bounded."""
     return "".join(c if " " <= c <= "~" else "?" for c in text[:REASON_MAX]).encode("ascii")

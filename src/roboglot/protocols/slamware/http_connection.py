@@ -1,10 +1,10 @@
 """One HTTP connection: uvicorn's httptools protocol with the vendor's reason phrases and hard limits.
 
-Loaded, with uvicorn, for a door's first client. Knows neither the robot nor the API. Its times are the machine's, not
-the robot's: they guard sockets.
+Loaded, with uvicorn, for a door's first client. Knows neither the robot nor the API. Its times are real time, as they
+guard sockets.
 
-A request that comes again, byte for byte, is answered without the parser, ASGI and a task, where the application knows
-how (``at_once``).
+A request that repeats an earlier one, byte for byte, is answered without parser, ASGI and task if the application
+offers that (``at_once``).
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ _TOO_LARGE = (
 
 
 class Answering(Protocol):
-    """An ASGI application that may know how to answer a request whenever it comes again."""
+    """ASGI application that may answer repeated requests directly."""
 
     def at_once(self, scope: Scope) -> Callable[[], bytes | None] | None:
-        """Return a function for the whole response, or for None, where the request must be parsed."""
+        """Return a function that returns the whole response to a repetition, or None if that must be parsed."""
 
 
 class ReasonTransport(asyncio.Transport):
-    """Passes everything on, but moves the header REASON of a response into its status line.
+    """Transport that moves the header REASON of a response into its status line.
 
-    A response's head waits until the loop's next turn for its body: one piece for the system, and for the network, is
+    It keeps the head of a response until the loop's next turn, to send it with the body: one write and one packet are
     quicker than two.
     """
 
@@ -81,11 +81,11 @@ class ReasonTransport(asyncio.Transport):
         return self._inner.get_extra_info(name, default)
 
     def write(self, data: bytes | bytearray | memoryview[object]) -> None:
-        """Send ``data``, or keep it until more comes: a response's head, which comes as one piece."""
+        """Send ``data``; keep a response's head, which is always one piece, until its body comes."""
         if isinstance(data, bytes) and data.startswith(_STATUS) and not data.startswith(_CONTINUE):
             self.flush()
             self._head = with_reason(data)
-            asyncio.get_running_loop().call_soon(self.flush)  # for a body that comes later
+            asyncio.get_running_loop().call_soon(self.flush)  # if the body comes later
         elif self._head and len(data) <= JOINED_MAX:
             head, self._head = self._head, b""
             self._inner.write(head + data)
@@ -106,7 +106,7 @@ class ReasonTransport(asyncio.Transport):
 
 
 def with_reason(head: bytes) -> bytes:
-    """The head of a response, its status line ending in what its header REASON said."""
+    """Move the header REASON of a response's head into its status line."""
     at = head.find(_REASON_LINE)
     if at < 0:
         return head
@@ -122,11 +122,11 @@ def send_last(transport: asyncio.Transport, response: bytes) -> None:
 
 
 class HeadTooLong(Exception):
-    """Ends the parsing of a request; never leaves this module."""
+    """Aborts parsing; never leaves this module."""
 
 
 class HttpConnection(HttpToolsProtocol):
-    """Closes connections that are too many, too slow or too long-winded."""
+    """HTTP connection with limits on number, duration and size."""
 
     _patience: asyncio.TimerHandle | None = None
     _deadline: float | None = None  # by the loop's clock; None: no deadline
@@ -137,11 +137,11 @@ class HttpConnection(HttpToolsProtocol):
     _parsed_bytes = 0  # of these, parsed: long headers may arrive at once
     _reading: bytes | memoryview = b""
     _unread: Sequence[bytes | memoryview] = ()  # received, to be parsed first
-    _begun = 0  # requests in what was received last
-    _idle = True  # nothing is half received or half answered
-    _whole, _last = b"", b""  # the request that is being answered, if it came in one piece, and the one before
+    _begun = 0  # requests in the last received data
+    _idle = True  # no request is partly received or unanswered
+    _whole, _last = b"", b""  # the request in progress if it came in one piece, and the one before
     _answered_again = False  # since the keep-alive's timer was set
-    _refusal: Callable[[], None] | None = None  # of what cannot be read, to be sent after the answers under way
+    _refusal: Callable[[], None] | None = None  # sends an error after the answers in progress
 
     def __init__(self, application: Answering, config: Config, state: ServerState) -> None:
         super().__init__(config, state, {}, asyncio.get_running_loop())
@@ -187,7 +187,7 @@ class HttpConnection(HttpToolsProtocol):
             self._whole = data
 
     def send_400_response(self, msg: str) -> None:
-        """Answer a request that cannot be parsed, or that ``_measure`` stopped; called by uvicorn."""
+        """Refuse a request that cannot be parsed, or that ``_measure`` aborted; called by uvicorn."""
         if self._parsed_bytes > HEAD_MAX:
             self._refuse(partial(send_last, self.transport, _TOO_LARGE))
         else:
@@ -199,18 +199,18 @@ class HttpConnection(HttpToolsProtocol):
 
     def on_header(self, name: bytes, value: bytes) -> None:
         self._measure(len(name) + len(value))
-        if self._in_head:  # a trailer comes too late: the request may have been answered
+        if self._in_head:  # a trailer is ignored: the request may have been answered
             super().on_header(name, value)
 
     def _measure(self, more: int) -> None:
-        """Count, and stop the parser when it is too much."""
+        """Count bytes of the head, and abort parsing when there are too many."""
         self._parsed_bytes += more
         if self._parsed_bytes > HEAD_MAX:
             raise HeadTooLong
 
     def _refuse(self, refusal: Callable[[], None]) -> None:
-        """Refuse the request that arrives, after those before it were answered."""
-        if self._receiving and not self._in_head:  # its body is wrong: it is answered, or waits as the last one
+        """Refuse the arriving request, after the answers to earlier ones."""
+        if self._receiving and not self._in_head:  # its body is malformed; it is in progress, or the last in the queue
             answering = bool(self.pipeline)
             if answering:
                 self.pipeline.popleft()
@@ -223,13 +223,13 @@ class HttpConnection(HttpToolsProtocol):
             refusal()
 
     def _should_upgrade(self) -> bool:
-        """Makes uvicorn pass over a request that asks for another protocol, and call what follows at its end."""
+        """Have uvicorn call ``handle_websocket_upgrade`` for a request to switch protocols."""
         return True
 
     def handle_websocket_upgrade(self) -> None:
-        """There is no other protocol: begin again with what the client said, but for that wish.
+        """Parse the request again without its upgrade: there is no other protocol.
 
-        Java's client wishes for HTTP/2 in every request. The parser would take the request's body for that protocol.
+        Java's client offers HTTP/2 in every request, and the parser would take the body for that protocol.
         """
         wish = sys.exception()
         assert isinstance(wish, httptools.HttpParserUpgrade)
@@ -289,7 +289,7 @@ class HttpConnection(HttpToolsProtocol):
         return not (self._receiving or self.transport.is_closing())
 
     def _learn(self, request: bytes) -> None:
-        """Keep what answers this request, which came twice, one after the other."""
+        """Cache the function that answers this request, which came twice in a row."""
         if self.cycle.keep_alive and (repeated := self._application.at_once(cast(Scope, self.scope))) is not None:
             if len(self._said) >= REPEATED_MAX:
                 self._said.clear()
@@ -314,7 +314,7 @@ class HttpConnection(HttpToolsProtocol):
         super().resume_writing()
 
     def _guard(self, seconds: float | None) -> None:
-        """Drop the connection after ``seconds`` from now; None: all is well."""
+        """Drop the connection in ``seconds`` unless called again; None: no deadline."""
         # One timer stays armed, however many requests arrive: two timers per request cost as much as its answer.
         self._deadline = None if seconds is None else self.loop.time() + seconds
         if self._deadline is None or (self._patience is not None and self._patience.when() <= self._deadline):
@@ -334,7 +334,7 @@ class HttpConnection(HttpToolsProtocol):
 
 
 class HttpConnections:
-    """All connections to one application, and their requests under way."""
+    """All connections to one application, and their requests in progress."""
 
     def __init__(self, application: Answering) -> None:
         self._application = application
@@ -358,10 +358,10 @@ class HttpConnections:
 
     @property
     def open(self) -> list[HttpConnection]:
-        """Connections that are open."""
+        """Open connections."""
         return [connection for connection in self._state.connections if isinstance(connection, HttpConnection)]
 
     @property
     def tasks(self) -> set[asyncio.Task[None]]:
-        """Requests under way."""
+        """Requests in progress."""
         return self._state.tasks

@@ -1,4 +1,4 @@
-"""The OpenAPI 3.1 document of exactly what this door serves, made from the handlers' signatures and docstrings."""
+"""OpenAPI 3.1 document of the served operations, made from the handlers' signatures and docstrings."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BINARY = {"application/octet-stream": {"schema": {"type": "string", "format": "b
 Schema = dict[str, Any]
 _RIDES = [word for word in RIDE_STAGES.values() if word]
 _STATUSES = [status.upper() for status in OrderStatus]
-# Words of answers that are plain text in their types, as other firmware has more of them.
+# Values of fields whose types are plain text, as other firmware has further ones.
 WORDS: Mapping[str, Iterable[str]] = {
     "Box.door_status": delivery.DOORS.values(),
     "Box.lock_status": ("LOCKED", "UNLOCKED"),
@@ -45,7 +45,7 @@ WORDS: Mapping[str, Iterable[str]] = {
 
 
 def document() -> Schema:
-    """The whole document; operations that are there in part say so under ``x-partial``, aliases are ``deprecated``."""
+    """Return the document; partial operations have ``x-partial``, aliases are ``deprecated``."""
     schemas = _Schemas()
     chinese = summaries()
     paths: Schema = {}
@@ -77,13 +77,13 @@ def document() -> Schema:
 
 
 def summaries() -> Mapping[str, str]:
-    """Chinese summaries by the operation's name."""
+    """Return the Chinese summaries by the operation's name."""
     data = Path(__file__).with_name("page").joinpath("summaries.zh.json").read_bytes()
     return msgspec.json.decode(data, type=dict[str, str])
 
 
 class _Schemas:
-    """Makes schemas of types: all at once, so that the same type has the same name everywhere."""
+    """Schemas of all types, made together so that each type has one name."""
 
     def __init__(self) -> None:
         self._types: list[object] = []
@@ -96,7 +96,7 @@ class _Schemas:
         )
 
     def components(self) -> Schema:
-        """Return the schemas by name; the options of an action are one of those that its kind has."""
+        """Return the schemas by name; an action's options are any of its kinds' options."""
         options = [self.of(kind) for kind in dict.fromkeys(factory.options for factory in FACTORIES.values())]
         request = self._components["ActionRequest"]["properties"]
         request["options"] = {"anyOf": [*options, {"type": "null"}]}
@@ -105,11 +105,11 @@ class _Schemas:
             name, _, field = place.partition(".")
             listed = self._components[name]["properties"][field]
             listed["enum"] = sorted(set(words))
-            listed.pop("default", None)  # a word that there is not is left out
+            listed.pop("default", None)  # an absent word is omitted
         return {name: _without_tuples(schema) for name, schema in self._components.items()}
 
     def describe(self, operation: Operation[str], path: str) -> Schema:
-        """Summary, parameters, body and answers."""
+        """Return summary, parameters, body and answers of an operation."""
         described: Schema = {
             "summary": operation.summary.replace("``", "`"),
             "responses": self._responses(operation.answer),
@@ -150,12 +150,12 @@ class _Schemas:
         return {"200": done, "default": refused}
 
     def of(self, kind: object) -> Schema:
-        """The schema of a type that some operation has."""
+        """Return the schema of a type."""
         return dict(self._made[self._types.index(kind)])
 
 
 def _members(kind: object) -> tuple[object, ...]:
-    """The members of a union of structs, or the one type."""
+    """Return the members of a union, or the type itself."""
     return typing.get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
 
 
@@ -168,7 +168,7 @@ def _anything(_: type) -> Schema:
 
 
 def _without_tuples(schema: object) -> object:
-    """``schema`` with tuples of one type as lists of a fixed length: many tools know no ``prefixItems``."""
+    """Return ``schema`` with homogeneous tuples as lists of fixed length, as many tools lack ``prefixItems``."""
     match schema:
         case {"prefixItems": [first, *others], **rest} if all(other == first for other in others):
             return {**rest, "items": first}

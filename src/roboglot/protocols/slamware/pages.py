@@ -1,4 +1,4 @@
-"""Pages of the door besides the API: its description, and a page to try the operations. Nothing from elsewhere."""
+"""Pages besides the API: its description, and a page to try the operations, without external resources."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ DESCRIPTION = "/openapi.json"
 
 
 class Pages:
-    """The files by path; the description is made at the first request."""
+    """Files by path; the description is made at the first request."""
 
     def find(self, path: str) -> tuple[str, bytes] | None:
-        """Content type and content, if there is something at ``path``."""
+        """Return content type and content of ``path``, or None."""
         if path == DESCRIPTION:
             return "application/json", self._description
         if path not in FILES:

@@ -1,4 +1,4 @@
-"""The parameters of a request, as its handler wants them: from path, query and body, all bounded."""
+"""Parameters of a request for its handler: from path, query and body, all bounded."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WHOLE_MAX = 2.0**53  # beyond it floats cannot represent every integer
 
 
 class Parameters:
-    """Parameters of one robot's requests; counts the uploads that are under way."""
+    """Parameters of one robot's requests; counts uploads in progress."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -63,7 +63,7 @@ class Parameters:
         return values
 
     async def whole(self, scope: Scope, receive: Receive) -> bytes:
-        """Return a binary body that is used as a whole. Raises HttpError."""
+        """Read a whole binary body. Raises HttpError."""
         with self._uploading():
             return await read_body(scope, receive, UPLOAD_MAX)
 
@@ -72,7 +72,7 @@ class Parameters:
 
     @contextmanager
     def _uploading(self) -> Iterator[None]:
-        """Count one more binary body. Raises HttpError 503 while too many others come in."""
+        """Count an upload. Raises HttpError 503 if there are too many."""
         if self._uploads >= UPLOADS_MAX:
             raise HttpError(503, "Service Unavailable", f"{UPLOADS_MAX} uploads are under way")
         self._uploads += 1
@@ -82,7 +82,7 @@ class Parameters:
             self._uploads -= 1
 
     async def _stored(self, scope: Scope, receive: Receive) -> Upload:
-        """A binary body that goes to the disk as it comes."""
+        """Write a binary body to disk as it arrives."""
         with self._uploading():
             upload = Upload()
             try:
@@ -95,7 +95,7 @@ class Parameters:
 
 
 def whole_numbers(value: object) -> object:
-    """``value`` of JSON with 2.0 as 2: JSON has one kind of number, and the schemas call both an integer."""
+    """Return JSON's ``value`` with 2.0 as 2, since both are integers in JSON schemas."""
     match value:
         case float() if value.is_integer() and abs(value) < WHOLE_MAX:
             return int(value)

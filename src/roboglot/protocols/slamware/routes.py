@@ -1,4 +1,4 @@
-"""Routes: the contract's operation for a method and a path; literal segments win over ``{parameters}``."""
+"""Routes: operations of the contract by method and path; literal segments take precedence over ``{parameters}``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboglot.values import dataclass
 from roboglot.wire.contracts import Row
 
 PATH_MAX = 1024  # characters
-# Paths outside the manual that clients in the field use, with the operations that they mean.
+# Paths outside the manual that clients use, with their operations.
 ALIASES = {
     "GET /api/delivery/v1/tasks/stage": "GET /api/delivery/v1/stage",  # of 2021
     "GET /api/delivery/v1/events": "GET /api/platform/v1/events",  # of 2021
@@ -19,7 +19,7 @@ ALIASES = {
 }
 # Operations outside the manual that clients in the field use.
 BEYOND = (Row("POST /api/industry/v1/generate_landing_pose", "industry", "generateLandingPose"),)
-# For these the body contains the options, which may be absent; the path names the action.
+# For these the path names the action; the body contains its options, if any.
 SHORTHANDS = {
     "/api/multi-floor/motion/v1/gohomeaction": "MultiFloorBackHomeAction",
     "/api/multi-floor/motion/v1/movetoaction": "MultiFloorMoveAction",
@@ -39,7 +39,7 @@ class Template:
         return sum(segment.startswith("{") for segment in self.segments)
 
     def match(self, segments: Sequence[str]) -> dict[str, str] | None:
-        """The parameters' values if ``segments`` (as many as the template's) fit."""
+        """Return the parameters' values if ``segments`` (as many as the template's) match, else None."""
         values = {}
         for wanted, found in zip(self.segments, segments, strict=True):
             if wanted.startswith("{"):
@@ -51,7 +51,7 @@ class Template:
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """The operations by method at a path, and the values of the path's parameters."""
+    """Operations by method at a path, and the values of its parameters."""
 
     methods: Mapping[str, Row]
     values: Mapping[str, str]
@@ -77,9 +77,9 @@ class Routes:
                 self._by_length.setdefault(len(template.segments), []).append(template)
 
     def find(self, path: str) -> Match | None:
-        """Return what is at ``path``, given as it came: each segment is percent-decoded by itself.
+        """Return the match of an undecoded ``path``, or None. Each segment is percent-decoded by itself.
 
-        So ``%3A`` is as good as a colon, and a ``%2F`` belongs to its segment.
+        So ``%3A`` is equivalent to a colon, and ``%2F`` is part of its segment.
         """
         if len(path) > PATH_MAX:
             return None

@@ -1,4 +1,4 @@
-"""The Slamware REST door: a listening socket, the application behind it, and what the door remembers of its robot."""
+"""The Slamware REST door: the listening socket, the application, and the door's own state of the robot."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ GOODBYE_SECONDS = 0.3  # for answers in progress when the door closes
 
 
 class SlamwareDoor:
-    """Serves the API of one robot at ``address``. Port 0 takes any free port; ``port`` tells which."""
+    """Serves the API of one robot at ``address``. Port 0 is any free port; ``port`` has the actual one."""
 
     name = "slamware"
 
@@ -118,7 +118,7 @@ class SlamwareDoor:
         return self._connections.add()
 
     def _fall_silent(self) -> None:
-        """The robot goes down: stop listening, and cut clients off once they have their answers."""
+        """Stop listening, and disconnect clients once they have their answers, as the robot switches off."""
         if self._server is not None:
             self._server.close()
             self._server = None
@@ -126,11 +126,11 @@ class SlamwareDoor:
             connection.shutdown()
 
     def _reopen(self) -> None:
-        """The robot is up again; what was in memory only is gone."""
+        """Open again; state in memory was lost in the restart."""
         self._opening = asyncio.get_running_loop().create_task(self._open_again(), name="slamware door opens again")
 
     def _module_restarted(self, event: ModuleRestarted) -> None:
-        """Software that is up again knows what is on the disk; the base knows no map."""
+        """Reload the map from disk after the software has restarted; the base has no map."""
         if event.module == Module.SOFTWARE:
             self._reopen()
 
@@ -141,7 +141,7 @@ class SlamwareDoor:
             await self._listen()
 
     async def close(self) -> None:
-        """Stop listening, let answers under way go out, cancel what clients asked for."""
+        """Stop listening, complete answers in progress, cancel the clients' actions."""
         for end in self._endings:
             end()
         if self._opening is not None:
@@ -162,7 +162,7 @@ class SlamwareDoor:
             await server.wait_closed()
 
     async def _cut_off(self, connections: HttpConnections) -> None:
-        """Wait a little for answers under way, then end what is left."""
+        """Wait GOODBYE_SECONDS for answers in progress, then abort the rest."""
         if connections.tasks:
             await asyncio.wait(connections.tasks, timeout=GOODBYE_SECONDS)
         self._application.closing = True
@@ -187,6 +187,6 @@ class SlamwareDoor:
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """The one address, with a line that asks for the pose."""
+        """The address, with a line that requests the pose."""
         address = f"{self._scheme}://{self._address}:{self.port}"
         return [Endpoint("Slamware REST", address, f"curl {address}/api/core/slam/v1/localization/pose")]

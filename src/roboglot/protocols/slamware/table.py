@@ -1,9 +1,9 @@
-"""The table of the REST door's operations, and what it has of them.
+"""Table of the REST door's operations.
 
-A handler registers under its contract key ("GET /api/…"). Its parameters come by name from the path and the query;
-one named ``body`` is the decoded JSON body, or the bare one if its type is ``bytes``; with a default it may be missing.
-What it returns is the answer: None an empty 200 (null where it may be something else), ``NO_CONTENT`` an empty 204,
-``bytes`` a binary, a ``Text`` a string that some clients want bare, anything else JSON.
+A handler registers under its contract key ("GET /api/…"). Its parameters are read by name from the path and the query;
+``body`` is the decoded JSON body, or the raw one if its type is ``bytes``; with a default it may be missing.
+The result is the answer: None an empty 200 (null if the handler may also return something else), ``NO_CONTENT`` an
+empty 204, ``bytes`` a binary body, a ``Text`` a string that some clients want as plain text, anything else JSON.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ TABLE: OperationTable[str] = OperationTable("slamware")
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A string that the manual calls text/plain, but which most clients want as a JSON string."""
+    """String that the manual calls text/plain, but which most clients expect as a JSON string."""
 
     value: str
 
 
 class NoContent(Enum):
-    """The answer of what the manual says ends with 204."""
+    """Answer of operations that the manual ends with 204."""
 
     NO_CONTENT = 204
 
@@ -34,7 +34,7 @@ NO_CONTENT = NoContent.NO_CONTENT
 
 
 def implemented() -> set[str]:
-    """Return the keys of the contract's operations that do all that the manual says."""
+    """Return the keys of the contract's complete operations."""
     return TABLE.implemented() - {row.key for row in BEYOND}
 
 

@@ -1,4 +1,4 @@
-"""The vendor's words and numbers for the model's: actions, stages, reasons. Knows no socket."""
+"""Translation between the model and the vendor's words and numbers: actions, stages, reasons. Knows no socket."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ MARK_STAGES = {"approaching": "MOVE_TO_LANDING_POINT", "looking": "DETECT_MARKER
 
 
 def action_word(name: str) -> str | None:
-    """``MoveToAction`` of ``slamtec.agent.actions.MoveToAction``; None if it has neither prefix."""
+    """Return ``MoveToAction`` for ``slamtec.agent.actions.MoveToAction``; None without a known prefix."""
     return next((name.removeprefix(prefix) for prefix in PREFIXES if name.startswith(prefix)), None)
 
 
 def state_of(action: Action) -> ActionState:
-    """Status, result and reason of an action of the model."""
+    """Return status, result and reason of an action of the model."""
     match action.status:
         case ActionStatus.ACCEPTED:
             return ActionState(State.NEW_BORN, Result.SUCCESS)
@@ -68,7 +68,7 @@ def reason_of(error: RobotError | None) -> str:
 
 
 def stage_of(action: Action, *, going_home: bool) -> str:
-    """The stage as robots show it; empty where they show none."""
+    """Return the stage in the words of robots; empty if they report none."""
     match part_of(action).feedback:
         case RideStage() as stage:
             return RIDE_STAGES[stage]
@@ -85,25 +85,25 @@ def stage_of(action: Action, *, going_home: bool) -> str:
 
 
 def milliseconds(stamp: float) -> str:
-    """Robot time (s) as the API writes it: milliseconds since the start, as text."""
+    """Return robot time (s) in the API's form: milliseconds since the start, as text."""
     return str(int(stamp * 1000))
 
 
 def pose3d(pose: Pose) -> Pose3D:
-    """A pose in the plane, written with six numbers."""
+    """Return a pose in the plane, with six numbers."""
     return Pose3D(pose.x, pose.y, 0.0, pose.yaw, 0.0, 0.0)
 
 
 def pose2d(pose: Pose) -> Pose2D:
-    """A pose in the plane."""
+    """Return a pose in the plane."""
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
 def pose_of(pose: Pose2D | Pose3D) -> Pose:
-    """The model's pose; height and tilt do not exist for it."""
+    """Return the model's pose, which has no height and tilt."""
     return Pose(pose.x, pose.y, wrap_angle(pose.yaw))
 
 
 def entry_of(place: PointOfInterest) -> PoseEntry:
-    """A place, dock or landmark as the API writes it."""
+    """Return a place, dock or landmark in the API's form."""
     return PoseEntry(place.id, pose2d(place.pose), dict(place.metadata))

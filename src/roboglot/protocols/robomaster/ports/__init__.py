@@ -1,4 +1,4 @@
-"""The ports and lines of the text protocol besides the one for commands: events, media, pilot, broadcast, serial.
+"""Ports of the text protocol besides the control port: events, media, pilot, broadcast, serial line.
 
-Each moves bytes between a socket or terminal and the session; none of them knows a command.
+Each moves bytes between a socket or terminal and the session; none knows a command.
 """

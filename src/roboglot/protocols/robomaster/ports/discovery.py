@@ -1,4 +1,4 @@
-"""``robot ip A.B.C.D`` for clients that look for the robot, while none holds it in SDK mode (manual 3.2.19)."""
+"""Broadcast of ``robot ip A.B.C.D`` to searching clients while no client holds SDK mode (manual 3.2.19)."""
 
 from __future__ import annotations
 

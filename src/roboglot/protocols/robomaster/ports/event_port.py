@@ -1,6 +1,6 @@
-"""The event port: clients connect and only read the session's events; what they write is thrown away.
+"""The event port: clients connect and read the session's events; their input is discarded.
 
-Explanations for teaching tools go out on a port of the same kind.
+Explanations for teaching tools have a port of the same kind.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 
 class Readers:
-    """Connected readers; beyond EVENT_CONNECTIONS_MAX of them one is turned away."""
+    """Connected readers, at most EVENT_CONNECTIONS_MAX."""
 
     def __init__(self) -> None:
         self._transports: set[asyncio.Transport] = set()
@@ -27,7 +27,7 @@ class Readers:
         return bool(self._transports)
 
     def connect(self) -> asyncio.Protocol:
-        """The protocol of a new connection."""
+        """Return the protocol of a new connection."""
         return _Reader(self._transports)
 
     def write(self, message: bytes) -> None:
@@ -40,7 +40,7 @@ class Readers:
                 transport.write(message)
 
     def close(self) -> None:
-        """Drop them all."""
+        """Disconnect all readers."""
         for transport in tuple(self._transports):
             transport.abort()
 

@@ -1,7 +1,7 @@
-"""The video and audio ports: bytes for everybody connected while the stream is on (manual 3.2.17, 3.2.18; chapter 6).
+"""The video and audio ports: packets to all connected clients while the stream is on (manual 3.2.17, 3.2.18, 6).
 
-Who connects before ``stream on`` waits; who connects in the middle begins with a key picture. While no one is
-connected nothing is subscribed to, so nothing is drawn or encoded.
+Clients that connect before ``stream on`` wait for it; later ones begin with a keyframe. Nothing is rendered or encoded
+without a client.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 class MediaPort:
-    """One stream of ``robot`` and those who watch it. A packet is one write: clients decode what one read gives."""
+    """One stream of ``robot`` and its viewers. Each packet is one write: clients decode each read by itself."""
 
     def __init__(self, robot: Robot, stream: type[VideoStream] | type[AudioStream]) -> None:
         self._robot, self._stream = robot, stream
@@ -30,11 +30,11 @@ class MediaPort:
         self.on = False
 
     def connect(self) -> asyncio.Protocol:
-        """The protocol of a new connection."""
+        """Return the protocol of a new connection."""
         return _Watcher(self)
 
     def switch(self, on: bool) -> None:
-        """Let the bytes flow or stop; twice is no matter. Raises ComponentMissing if the robot has no such stream."""
+        """Start or stop the stream; idempotent. Raises ComponentMissing if the robot has no such stream."""
         if on:
             _ = self._robot[self._stream]
         if on != self.on:
@@ -43,24 +43,24 @@ class MediaPort:
                 watcher.follow()
 
     def close(self) -> None:
-        """Drop everybody."""
+        """Disconnect all viewers."""
         self.on = False
         for watcher in tuple(self._watchers):
             watcher.transport.abort()
 
     def admit(self, watcher: _Watcher) -> bool:
-        """Return whether there is room for one more."""
+        """Return whether another viewer is allowed."""
         if len(self._watchers) >= MEDIA_CONNECTIONS_MAX:
             return False
         self._watchers.add(watcher)
         return True
 
     def forget(self, watcher: _Watcher) -> None:
-        """Forget a client that is gone."""
+        """Remove a client that is gone."""
         self._watchers.discard(watcher)
 
     async def feed(self, watcher: _Watcher) -> None:
-        """Packets to one watcher until cancelled; a slow one loses what is old and goes on at a key picture."""
+        """Send packets to one viewer until cancelled; a slow one skips to the next keyframe."""
         try:
             with self._robot[self._stream].subscribe() as packets:
                 async for packet in packets:
@@ -104,7 +104,7 @@ class _Watcher(asyncio.Protocol):
         self.writable.set()
 
     def follow(self) -> None:
-        """Begin or end with the stream."""
+        """Start or stop feeding, with the stream."""
         if self._task:
             self._task.cancel()
             self._task = None

@@ -1,8 +1,8 @@
 """A port for a simulated pilot: keyboard and mouse as text lines, for ``game_msg`` (manual 3.2.20).
 
 ``press w``, ``release w``, ``click left right`` (the buttons held from now on), ``mouse 0.5 -0.2``; each is answered
-with ``ok`` or with what is wrong. What a connection held is let go when it ends. Not the vendor's, and closed unless
-configured.
+with ``ok`` or an error. Keys and buttons that a connection holds are released when it ends. Not the vendor's, and
+closed unless configured.
 """
 
 from __future__ import annotations
@@ -46,18 +46,18 @@ ACTS: dict[str, Act] = {"press": _press, "release": _release, "click": _click, "
 
 
 class Pilots:
-    """Connected pilots; beyond PILOTS_MAX one is turned away."""
+    """Connected pilots, at most PILOTS_MAX."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.transports: set[asyncio.Transport] = set()
 
     def connect(self) -> asyncio.Protocol:
-        """The protocol of a new connection."""
+        """Return the protocol of a new connection."""
         return _Pilot(self)
 
     def close(self) -> None:
-        """Drop them all."""
+        """Disconnect all pilots."""
         for transport in tuple(self.transports):
             transport.abort()
 
@@ -100,7 +100,7 @@ class _Pilot(asyncio.Protocol):
 
 
 def do_again(robot: Robot, noted: Input) -> None:
-    """Do what a pilot did. Raises what that raised."""
+    """Repeat a pilot's recorded input. Raises the errors of the original."""
     if noted.name == LET_GO:
         _let_go(robot)
     else:
@@ -117,7 +117,7 @@ def _act(robot: Robot, text: str) -> None:
 
 
 def _let_go(robot: Robot) -> None:
-    """Let go of everything."""
+    """Release all keys and buttons."""
     if InputDevice in robot:
         device = robot[InputDevice]
         with robot.outside.noting(PILOT, LET_GO, {}):

@@ -1,6 +1,6 @@
 """The robot's serial port as a pseudo-terminal: commands, answers, pushes and events as text, no video and no sound.
 
-Programs open the link that it makes as they would ``/dev/ttyUSB0``. Every answer ends in a line feed, as on robots.
+Programs open its symbolic link like ``/dev/ttyUSB0``. Every answer ends with a line feed, as on robots.
 """
 
 from __future__ import annotations

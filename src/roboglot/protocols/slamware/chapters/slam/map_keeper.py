@@ -1,7 +1,7 @@
-"""The robot's two maps: the one in memory, which it uses and draws on, and the one on disk, which survives.
+"""The robot's two maps: the one in memory, which it uses and changes, and the one on disk, which survives restarts.
 
-In memory are the grid, places and annotations. The file on disk is kept as it came, and loaded when the robot starts
-or on request. What multi-floor operations know (floors, their places and docks) is what was loaded last.
+In memory are the grid, places and annotations. The file on disk is stored unchanged, and loaded when the robot starts
+or on request. Multi-floor operations use the floors, places and docks that were loaded last.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ FILE = "slamware/map.stcm"
 DRAWN = "slamware/drawn.json"  # the file of drawings on that map's other floors
 NOT_MOVED = (0.0, 0.0)
 FLOOR = "slamware.floor"  # the setting that holds the id of the floor of the drawings in memory
-NO_FLOOR = ""  # there: no floor
+NO_FLOOR = ""  # its value for no floor
 # The setting that holds the files on which the drawings in memory are based: by digest, the m (x, y) by which the
 # origin has moved since.
 BASIS = "slamware.map_origins"
 
 
 class MapKeeper:
-    """One robot's. Changes of the maps, in memory and on disk, come one after the other."""
+    """Map keeper of one robot; changes of its maps, in memory and on disk, are made one after the other."""
 
     def __init__(self, robot: Robot, cloud: CloudFolder, synced: Callable[[], None]) -> None:
         self._robot, self._cloud, self._synced = robot, cloud, synced
@@ -72,7 +72,7 @@ class MapKeeper:
         self.current = FloorName()
 
     async def start(self) -> None:
-        """Load the map on disk, if there is one and the robot maps at all."""
+        """Load the map on disk, if there is one and the robot can map."""
         if Mapping not in self._robot or FileStore not in self._robot:
             return
         try:
@@ -146,11 +146,10 @@ class MapKeeper:
         self.status = MapLoadStatus.LOADED
 
     async def reload(self, pose: Pose | None = None, *, newer_drawings: bool = False) -> None:
-        """Disk to memory, the cloud's map first, if there is one, which takes the place of the one on disk.
+        """Load the map from disk, after replacing it by the cloud's, if there is one. Raises NotFound without a map.
 
-        Without ``pose`` the robot stands on its dock or before it. NotFound if nothing is saved.
-
-        ``newer_drawings``: keep what people drew on that same map after it was saved.
+        Without ``pose`` the robot is taken to stand on its dock or in front of it. ``newer_drawings``: keep drawings
+        made on that same map since it was saved.
         """
         async with self._turn:
             before, self.status = self.status, MapLoadStatus.LOADING
@@ -203,7 +202,7 @@ class MapKeeper:
         return await asyncio.to_thread(_parsed, data)
 
     async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[object, None, None]) -> None:
-        """The grid to memory, what is on it by ``draw``, and the robot to ``pose``, else to its dock."""
+        """Load the grid into memory, call ``draw`` for its drawings, and set the robot's pose, else at its dock."""
         self._loading = True
         try:
             if floor.grid is None:
@@ -225,10 +224,10 @@ class MapKeeper:
         return dict(self._robot[Settings].get(BASIS, {}))
 
     async def begin_anew(self, origin: Pose) -> None:
-        """Memory's grid was cleared, its origin is where ``origin`` was: the docks are seen from there.
+        """Handle the clearing of memory's grid: its origin is now at ``origin``, from which docks are given.
 
-        What is drawn from now on belongs to no floor of the file: a restart brings the file's grid back, and what is
-        drawn on it now.
+        Further drawings belong to no floor of the file: a restart restores the file's grid with the drawings that it
+        has now.
         """
         async with self._turn:
             others, basis = await self._others(), self._basis
@@ -252,7 +251,7 @@ class MapKeeper:
             self._layers = ()
 
     async def _turn_over(self, floor: FloorMap, digest: str) -> None:
-        """Change from memory's floor to ``floor`` of the map with ``digest``, each with its drawings."""
+        """Switch from the floor in memory to ``floor`` of the map with ``digest``, each with its drawings."""
         if digest not in self._basis:  # memory holds another map
             await self._put_drawings(floor, {digest: NOT_MOVED})
             return
@@ -265,7 +264,7 @@ class MapKeeper:
         await self._robot[MapMemory].replace(turn)
 
     def _put_aside(self, now: Drawings, shift: Sequence[float], others: dict[str, Drawings]) -> None:
-        """Memory's drawings to the ``others``, as they were on the file's grid before its origin was moved."""
+        """Add memory's drawings to the ``others``, in the frame of the file's grid before its origin was moved."""
         if (last := self._robot[Settings].get(FLOOR, self.current.map_id)) != NO_FLOOR:
             others[last] = seen_from(Point(-shift[0], -shift[1]), now)
 
