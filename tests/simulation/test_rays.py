@@ -61,10 +61,18 @@ async def test_sensors_see_the_same_with_the_kernel(name: str, is_compiled: bool
     await clock.advance(0.1)  # otherwise the physics does not know yet where things are
     hull, rays, ways = world._population.hull("a"), world._physics.rays, directions(np.random.default_rng(1))
     origin = np.array(((hull.x, hull.y, hull.elevation + 0.2),))
-    before = rays.cast(origin, ways, 4.0, hull)
+    eyes, noise = np.array(((0.1, 0.0, 0.2), (0.0, -0.1, 0.3))), np.random.default_rng(2).standard_normal(len(ways))
+    shares = np.linspace(0.5, 1.0, len(ways))
+    hull.tilt = 0.1, -0.2
+    before, looked = rays.cast(origin, ways, 4.0, hull), rays.look(eyes, ways, 4.0, hull)
+    measured = rays.reading(looked, shares, noise, (0.01, 0.02), (0.3, 3.0, -np.inf))
     rays.load_kernel()
     assert (rays._kernel is not None) is is_compiled
     assert rays.cast(origin, ways, 4.0, hull) == pytest.approx(before, abs=1e-9)
+    assert rays.look(eyes, ways, 4.0, hull) == pytest.approx(looked, abs=1e-9)
+    again = rays.reading(looked, shares, noise, (0.01, 0.02), (0.3, 3.0, -np.inf))
+    assert again == pytest.approx(measured, abs=1e-6)
+    assert {-np.inf, np.inf} < set(measured.tolist())
     assert np.isfinite(before).any()
     assert before.min() > 0.19  # the floor: it does not see itself
     world.close()

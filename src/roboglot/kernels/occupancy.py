@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, Int32Array, SingleArray
+from roboglot.kernels.arrays import BoolArray, ByteArray, FloatArray, Int16Array, Int32Array, SingleArray
 from roboglot.kernels.compiled import kernel
 
 HIT = 100
@@ -296,6 +296,17 @@ def verdicts(
         elif not unknown:
             said[i] = FLOATING
     return said
+
+
+@kernel("boolean[::1](float64[:,::1], float64, float64, float64, float64[:,::1])")
+def outside(ends: FloatArray, x: float, y: float, yaw: float, discs: FloatArray) -> BoolArray:
+    """Return which ``ends`` (n, 2; m), in a frame at (x, y, yaw), lie in none of the ``discs`` (x, y, radius)."""
+    found, cos, sin = np.ones(len(ends), np.bool_), np.cos(yaw), np.sin(yaw)
+    for i in range(len(ends)):
+        at_x, at_y = cos * ends[i, 0] - sin * ends[i, 1] + x, sin * ends[i, 0] + cos * ends[i, 1] + y
+        for k in range(len(discs)):
+            found[i] &= np.hypot(at_x - discs[k, 0], at_y - discs[k, 1]) > discs[k, 2]
+    return found
 
 
 @kernel(

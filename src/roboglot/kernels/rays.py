@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.kernels.arrays import FloatArray
+from roboglot.kernels.arrays import FloatArray, SingleArray
 from roboglot.kernels.compiled import kernel
 
 SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # as in MuJoCo's mjtGeom
@@ -247,4 +247,62 @@ def cast(
     for k in range(len(origins)):
         part = slice(k * each, (k + 1) * each)
         _cast_from(kinds, places, turns, sizes, bounds, origins[k], directions[part], reach, found[part])
+    return found
+
+
+@kernel("float64[:,::1](float64[:,::1], float64[:,::1])")
+def _turned(vectors: FloatArray, turn: FloatArray) -> FloatArray:
+    """Return ``vectors`` (n, 3) turned by a rotation (3, 3)."""
+    found = np.empty(vectors.shape)
+    for k in range(len(vectors)):
+        x, y, z = vectors[k, 0], vectors[k, 1], vectors[k, 2]
+        for axis in range(3):
+            found[k, axis] = turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] * z
+    return found
+
+
+@kernel(
+    "float64[::1](int32[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[::1],"
+    " float64[:,::1], float64[:,::1], float64[:,::1], float64, float64, float64, float64)"
+)
+def look(
+    kinds: NDArray[np.int32],
+    places: FloatArray,
+    turns: FloatArray,
+    sizes: FloatArray,
+    bounds: FloatArray,
+    eyes: FloatArray,
+    directions: FloatArray,
+    turn: FloatArray,
+    x: float,
+    y: float,
+    z: float,
+    reach: float,
+) -> FloatArray:
+    """Return what ``cast`` does, for ``eyes`` and ``directions`` in a frame at (x, y, z), turned by ``turn``."""
+    origins = _turned(eyes, turn)
+    for k in range(len(origins)):
+        origins[k, 0], origins[k, 1], origins[k, 2] = origins[k, 0] + x, origins[k, 1] + y, origins[k, 2] + z
+    return cast(kinds, places, turns, sizes, bounds, origins, _turned(directions, turn), reach)
+
+
+@kernel("float32[::1](float64[::1], float64[::1], float64[::1], UniTuple(float64, 2), UniTuple(float64, 3))")
+def reading(
+    ways: FloatArray,
+    shares: FloatArray,
+    noise: FloatArray,
+    sigmas: tuple[float, float],
+    limits: tuple[float, float, float],
+) -> SingleArray:
+    """Return a sensor's readings of ``ways`` (m), of each of which it measures its share.
+
+    ``noise`` (standard normal) is scaled by ``sigmas``: m, and m per m2 of the distance. ``limits``: nearest and
+    farthest distance, and the reading of what is nearer; farther ones are inf.
+    """
+    found, (low, high, near) = np.empty(len(ways), np.float32), limits
+    for k in range(len(ways)):
+        depth = ways[k] * shares[k]
+        if depth < np.inf:
+            depth += noise[k] * (sigmas[0] + sigmas[1] * (depth * depth))
+        found[k] = np.inf if depth > high else near if depth < low else depth
     return found

@@ -42,9 +42,9 @@ class ScanPoints:
         """Return the scan without the rays that end in ``discs`` (x, y, radius; m), in the frame of ``pose``."""
         if not discs or not len(self.ends):
             return self
-        ends, kept = self.in_frame(pose, self.ends), np.ones(len(self.ends), bool)
-        for x, y, radius in discs:
-            kept &= np.hypot(ends[:, 0] - x, ends[:, 1] - y) > radius
+        from roboglot.kernels.occupancy import outside  # it needs Numba
+
+        kept = outside(self.ends, pose.x, pose.y, pose.yaw, np.array(discs))
         if kept.all():
             return self
         ends, hit = np.ascontiguousarray(self.ends[kept]), np.ascontiguousarray(self.hit[kept])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.kernels import loading
-from roboglot.simulation.bodies.hull import Hull
+from roboglot.simulation.bodies.hull import Hull, rotation
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
@@ -30,6 +30,8 @@ class Rays:
         self._model, self._data, self._mujoco = model, data, mujoco
         self._kinds: dict[Hull, NDArray[np.int32]] = {}  # of all shapes except those of the observing robot
         self._kernel: Callable[..., NDArray[np.float64]] | None = None
+        self._look: Callable[..., NDArray[np.float64]] | None = None
+        self.reading: Callable[..., NDArray[np.float32]] = _reading
         self._outdated = False  # whether people and props may have moved since the physics placed all shapes
 
     def outdate(self) -> None:
@@ -48,9 +50,9 @@ class Rays:
         """
         if np.isin(self._model.geom_type, COMPILED).all():
             with loading():
-                from roboglot.kernels.rays import cast
+                from roboglot.kernels.rays import cast, look, reading
 
-            self._kernel = cast
+            self._kernel, self._look, self.reading = cast, look, reading
 
     def cast(
         self, origins: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
@@ -64,13 +66,26 @@ class Rays:
             bundles = np.split(directions, len(origins))
             parts = zip(origins, bundles, strict=True)
             return np.concatenate([self._cast_slowly(origin, ways, reach, viewer) for origin, ways in parts])
+        return self._kernel(*self._solids(viewer), origins, directions, reach)
+
+    def look(
+        self, eyes: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
+    ) -> NDArray[np.float64]:
+        """Return the same for ``eyes`` and ``directions`` in the viewer's base_link."""
+        turn, (x, y, z) = rotation(viewer.tilt, viewer.turned), (viewer.x, viewer.y, viewer.elevation)
+        if self._look is None:
+            return self.cast(eyes @ turn.T + (x, y, z), directions @ turn.T, reach, viewer)
+        self._place_shapes()
+        return self._look(*self._solids(viewer), eyes, directions, turn, x, y, z, reach)
+
+    def _solids(self, viewer: Hull) -> tuple[NDArray[np.generic], ...]:
+        """Return kinds, places, rotations, sizes and bounds of all shapes, as the kernel takes them."""
         kinds = self._kinds.get(viewer)
         if kinds is None:
             kinds = self._kinds[viewer] = self._model.geom_type.copy()
             kinds[viewer.shape] = PASSED
         model, data = self._model, self._data
-        solids = data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rbound
-        return self._kernel(kinds, *solids, origins, directions, reach)
+        return kinds, data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rbound
 
     def _cast_slowly(
         self, origin: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
@@ -103,3 +118,16 @@ class Rays:
         groups[own] = UNSEEN
         yield
         groups[own] = before
+
+
+def _reading(
+    ways: NDArray[np.float64],
+    shares: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    sigmas: tuple[float, float],
+    limits: tuple[float, float, float],
+) -> NDArray[np.float32]:
+    """Return the same as the kernel of this name, with numpy."""
+    depths, (low, high, near) = ways * shares, limits
+    depths += noise * (sigmas[0] + sigmas[1] * np.where(ways < np.inf, depths, 0.0) ** 2)
+    return np.where(depths > high, np.inf, np.where(depths < low, near, depths)).astype(np.float32)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
 from roboglot.model.geometry import Orientation, Vector3
-from roboglot.simulation.bodies.hull import Hull, rotation
+from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative, Positive
 
@@ -54,6 +54,8 @@ class SimulatedDepthCamera(DepthCamera):
         c, s = math.cos(section.pitch), math.sin(section.pitch)
         sigma = section.noise * section.range_max**2
         self._reach = (section.range_max + SIGMAS * sigma) / float(self._optical[:, 0].min())  # m along a ray
+        self._ahead = np.ascontiguousarray(self._optical[:, 0])
+        self._place = np.array(((section.forward, 0.0, section.above_ground),))
         self._directions = self._optical @ np.array(((c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c)))  # base_link
 
     @property
@@ -74,15 +76,10 @@ class SimulatedDepthCamera(DepthCamera):
 
     def _take(self, stamp: float) -> DepthImage:
         section, hull = self._section, self._hull
-        turn = rotation(hull.tilt, hull.turned)
-        place = turn @ (section.forward, 0.0, section.above_ground)
-        origin = place + np.array(((hull.x, hull.y, hull.elevation),))
-        ways = self._rays.cast(origin, self._directions @ turn.T, self._reach, hull)
-        depths = ways * self._optical[:, 0]
-        depths += self._random.standard_normal(len(depths)) * section.noise * np.where(ways < np.inf, depths, 0.0) ** 2
-        seen = (depths >= section.range_min) & (depths <= section.range_max)
-        depths[~seen] = np.inf
-        image = depths.reshape(section.rows, section.columns).astype(np.float32)
+        ways = self._rays.look(self._place, self._directions, self._reach, hull)
+        noise, limits = self._random.standard_normal(len(ways)), (section.range_min, section.range_max, math.inf)
+        depths = self._rays.reading(ways, self._ahead, noise, (0.0, section.noise), limits)
+        image = depths.reshape(section.rows, section.columns)
         image.setflags(write=False)
         mount = Vector3(section.forward, 0.0, section.above_ground)
         attitude = Orientation(pitch=section.pitch)

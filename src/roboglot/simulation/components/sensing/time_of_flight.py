@@ -69,6 +69,7 @@ class SimulatedTimeOfFlight(TimeOfFlight):
         self.rate = section.rate
         bundle = _bundle(section.field_of_view)
         self._bundles = np.concatenate([bundle @ rotation((0.0, eye.pitch), eye.yaw).T for eye in section.sensors])
+        self._whole = np.ones(len(self._bundles))
         self._mounts = np.array([(eye.forward, eye.left, eye.above_belly) for eye in section.sensors])
         self._readings: list[ZoneDistances] = []
         self._measured_at = -math.inf
@@ -90,19 +91,15 @@ class SimulatedTimeOfFlight(TimeOfFlight):
     def _measure(self, stamp: float) -> None:
         """Take readings of all sensors at once."""
         section, hull = self._section, self._hull
-        turn = rotation(hull.tilt, hull.turned).T
         posture = hull.attitude, hull.shift, hull.belly
         if self._held is None or self._held.posture != posture:
             self._held = self._hold(posture)
         held = self._held
-        ahead, origins = held.ahead, held.eyes @ turn
-        origins += (hull.x, hull.y, hull.elevation)
         reach = section.range_max + SIGMAS * section.noise
-        distances = self._rays.cast(origins, ahead @ turn, reach, hull)
-        distances += self._random.standard_normal(len(distances)) * section.noise
-        distances[distances > section.range_max] = np.inf
-        distances[distances < section.range_min] = -np.inf
-        grids, low, high = distances.reshape(-1, ZONES, ZONES).astype(np.float32), section.range_min, section.range_max
+        distances = self._rays.look(held.eyes, held.ahead, reach, hull)
+        noise, low, high = self._random.standard_normal(len(distances)), section.range_min, section.range_max
+        readings = self._rays.reading(distances, self._whole, noise, (section.noise, 0.0), (low, high, -math.inf))
+        grids = readings.reshape(-1, ZONES, ZONES)
         grids.setflags(write=False)
         views = zip(grids, held.rays, held.places, strict=True)
         self._readings = [ZoneDistances(stamp, grid, low, high, rays, eye) for grid, rays, eye in views]
