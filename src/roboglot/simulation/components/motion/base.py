@@ -52,6 +52,7 @@ class SimulatedBase(Base):
         self._haste = 1.0  # the factor in use
         self._walkable: Callable[[Twist], Twist] = _any
         self._steered: float | None = None  # rad/s
+        self._seconds = 0.0  # length of a tick, once one has passed
 
     def set_velocity(self, twist: Twist) -> None:
         if not all(map(math.isfinite, (twist.x, twist.y, twist.yaw))):
@@ -71,6 +72,7 @@ class SimulatedBase(Base):
     def brake_hard(self) -> None:
         self.set_velocity(STILL)
         self._haste = self._hardest
+        self.duty.begin()
 
     def set_wheel_speeds(self, speeds: WheelSpeeds) -> None:
         if not all(map(math.isfinite, four(speeds))):
@@ -155,11 +157,11 @@ class SimulatedBase(Base):
         wanted, now = self._target, self._ramp.now
         if self._steered is not None and isinstance(wanted, Twist):
             wanted = Twist(wanted.x, wanted.y, self._steered)
-        linear = self._haste * self.limits.linear_acceleration * seconds
-        angular = self._haste * self.limits.angular_acceleration * seconds
-        if self._goes_on(linear, angular):
+        self._seconds = seconds
+        if self._goes_on():
             self.duty.end()
             return
+        linear, angular = _steps(self.limits, self._haste * seconds)
         if wanted is not now:
             match wanted:
                 case Twist() as target:
@@ -176,14 +178,14 @@ class SimulatedBase(Base):
         if now is self._target:
             self.duty.end()
 
-    def _goes_on(self, linear: float, angular: float) -> bool:
-        """Leave it to the kernel to approach the target, by these steps a tick, if nothing else changes the speed."""
+    def _goes_on(self) -> bool:
+        """Leave it to the kernel to approach the target if nothing else changes the speed."""
         target, watched = self._target, self.hindrances.bars or self.when_driven or self.wheels.dead
         if watched or self._steered is not None or not isinstance(target, Twist):
             return False
         if max(target.speed, self._ramp.now.speed) > self.hindrances.pace:
             return False
-        if not self._ramp.go_on(target, linear, angular):
+        if not self._ramp.go_on(target, *_steps(self.limits, self._haste * self._seconds)):
             return False
         self._speeds = None
         return True
@@ -203,10 +205,11 @@ class SimulatedBase(Base):
 
     def _take_time(self) -> None:
         """Begin to follow a command; end hard braking, unless it is to stand."""
-        self.duty.begin()
         self._note_pace()
         if self._target not in (STILL, NO_WHEELS):
             self._haste = 1.0
+        if self.duty.on or not self._seconds or not self._goes_on():
+            self.duty.begin()
 
     def _note_pace(self) -> None:
         """Start what watches a base that moves faster than SLOW, or will."""
@@ -229,6 +232,11 @@ class SimulatedBase(Base):
         self._target = STILL
         self.duty.begin()
         self._note_pace()
+
+
+def _steps(limits: BaseLimits, seconds: float) -> tuple[float, float]:
+    """Return the largest changes of velocity in ``seconds``, m/s and rad/s."""
+    return limits.linear_acceleration * seconds, limits.angular_acceleration * seconds
 
 
 def _rolled(hull: Hull, *, mecanum: bool) -> Twist:
