@@ -162,7 +162,7 @@ async def story(seed: int, *, glides: bool) -> list[list[tuple[bool, float, floa
     return seen
 
 
-@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 15))])
+@pytest.mark.parametrize("seed", [3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 15))])
 async def test_touches_are_those_of_mujoco(seed: int) -> None:
     gliding, stepping = await story(seed, glides=True), await story(seed, glides=False)
     assert any(touches for tick in stepping for touches, _, _ in tick)

@@ -10,7 +10,6 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,37 +152,23 @@ class Sight:
 
     def _circles_at(self, floor: int, height: float) -> Rows:
         """Return the circles of round solids and of everything that moves."""
-        moving = [*self._people_at(floor, height), *self._robots_at(floor, height), *self._things_at(floor, height)]
-        _, circles = self._floors[floor].at(height)
-        if not moving:
-            return circles
-        rows = np.array(list(chain.from_iterable(moving))).reshape(-1, 4)  # numpy reads a plain list twice as fast
-        return np.concatenate((circles, rows)) if len(circles) else rows
-
-    def _people_at(self, floor: int, height: float) -> list[Four]:
-        found = []
+        found: list[float] = []  # numpy reads a plain list twice as fast
         for walker in self._walkers:
             person = walker.person
             if walker.floor == floor and 0.0 < height < person.height:
-                found.append((*walker.spot, _girth(person.radius, person.height, height), 0.0))
-        return found
-
-    def _robots_at(self, floor: int, height: float) -> list[Four]:
-        """Return the circles of all hulls; the observing robot is inside its own, which is invisible from inside."""
-        return [
-            (hull.x, hull.y, hull.body.hull.radius, 0.0)
-            for hull in self._hulls
-            if hull.floor == floor and hull.covers(height)
-        ]
-
-    def _things_at(self, floor: int, height: float) -> list[Four]:
-        """Return the things that robots do not carry."""
-        found = []
-        for thing in self._things:
+                found += *walker.spot, _girth(person.radius, person.height, height), 0.0
+        for hull in self._hulls:  # the observing robot is inside its own, which is invisible from inside
+            if hull.floor == floor and hull.covers(height):
+                found += hull.x, hull.y, hull.body.hull.radius, 0.0
+        for thing in self._things:  # that no robot carries
             x, y, z = thing.position.tolist()
             if not thing.carried and z <= self._elevations[floor] + height < z + thing.height:
-                found.append((x, y, thing.diameter / 2, 0.0))
-        return found
+                found += x, y, thing.diameter / 2, 0.0
+        _, circles = self._floors[floor].at(height)
+        if not found:
+            return circles
+        rows = np.array(found).reshape(-1, 4)
+        return np.concatenate((circles, rows)) if len(circles) else rows
 
 
 def _sweep(edges: Rows, circles: Rows, ways: Rows, x: float, y: float, yaw: float, reach: float) -> Distances:

@@ -24,8 +24,8 @@ AHEAD = slice(RAYS // 2 - 17, RAYS // 2 + 18)  # those within 51 degrees of the 
 FAN = math.tau / RAYS * np.arange(-17, 18)  # rad from the direction of motion
 SIDE, ALONG = np.maximum(1e-9, np.abs(np.sin(FAN))), np.cos(FAN)
 DECELERATION = 5.0  # m/s2 of blocked wheels on the floor, with a margin
-REACTION = 0.1  # s
-PERIOD = 4  # ticks
+REACTION = 0.12  # s: a period and a tick
+PERIOD = 5  # ticks, as most sensors: fewer ticks have something due
 
 
 class SoftTouch:
