@@ -21,7 +21,7 @@ STANDS, FOOT, HANGS, MOVES = 1, 2, 4, 8  # collision bits
 SPRING, DAMPER = 2500.0, 100.0  # 1/s2 and 1/s: stiffness and damping of the floor per kg
 SETTLED, LIFTED = 1e-4, 1e-3  # m/s up to which it rests on the floor, and m from which it is off it
 NEAR = 0.3  # m beyond the rim
-AGAIN = 0.1  # m of motion near an object after which the distance is checked again
+AGAIN = 0.1  # m of motion for which a check holds at least
 
 
 class Nearness:
@@ -70,7 +70,7 @@ class Nearness:
         self._x, self._y, self._floor = x, y, floor
         self._next = self._room(x, y, floor)
         free = self._next - self._zone
-        before, self.near = self.near, free <= 0.0
+        before, self.near = self.near, free <= AGAIN  # just outside the zone every tick would check again
         self._free = AGAIN if self.near else free
         if self.near and not before:
             for duty in self._duties:
