@@ -31,6 +31,8 @@ GENERATED = ("_pb2.py", "_pb2_grpc.py")
 WORDS_MAX = 5  # in 10,000 lines
 RIDDLES = set(re.findall(r"\w+", "how if nobody now what when where whether which who whoever whom whose why"))
 SUBJECT = re.compile(r"(?=.{1,60}$)[a-z][\w ,./-]*: [a-z].*[^.]")  # of a commit
+HEADING = re.compile("#+ [^`]*$")
+HEADING_MAX = 80  # a longer one has swallowed its paragraph
 COLUMNS_MAX = 120  # of a line of docs; table rows, code and what is generated may be longer
 CHAPTERLESS = {  # modules of a vendor's package that belong to no chapter of its manual
     "wire": "annexb channel cloud codes commands geometry lines messages orders proto relay replies requests telemetry "
@@ -186,6 +188,14 @@ def test_commit_subjects_have_an_area_and_fit() -> None:
     assert [line for line in log.stdout.splitlines() if not SUBJECT.fullmatch(line)] == []
 
 
+def test_no_ignored_file_is_tracked() -> None:
+    """Caches of tools get in by force only."""
+    listed = subprocess.run(["git", "ls-files", "-ci", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode:
+        pytest.skip("git does not read this checkout")
+    assert listed.stdout.split() == []
+
+
 def test_docs_are_not_wide() -> None:
     """A line that does not fit into an editor is hard to read in a change, too."""
     wide = {}
@@ -193,6 +203,8 @@ def test_docs_are_not_wide() -> None:
         code = False
         for number, line in enumerate(page.read_text().splitlines(), start=1):
             code ^= line.lstrip().startswith("```")
+            if HEADING.match(line) and len(line) > HEADING_MAX and not code:
+                wide[f"{page.name}:{number}"] = len(line)
             if len(line) > COLUMNS_MAX and not code and not line.startswith("|") and " " in line[:COLUMNS_MAX].strip():
                 wide[f"{page.name}:{number}"] = len(line)
     assert wide == {}
