@@ -31,7 +31,7 @@ from typing import Any, NoReturn
 from execnet.gateway_io import popen_bootstrapline
 
 from roboglot.cli.warm.command import surroundings
-from roboglot.shards.warmth import end_with, fork
+from roboglot.shards.warm_up import end_with, fork
 
 COLD = "ROBOGLOT_TESTS_COLD"
 WORKER = [sys.executable, "-u", "-c", popen_bootstrapline]
@@ -78,7 +78,7 @@ class WarmParent:
         return int(answer)
 
     def _open(self) -> socket.socket:
-        from roboglot.shards.warmth import ENVIRONMENT
+        from roboglot.shards.warm_up import ENVIRONMENT
 
         ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with its:
@@ -251,7 +251,7 @@ def main(descriptor: int) -> None:
     """Load everything, then serve."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from roboglot import cli
-    from roboglot.shards.warmth import ENVIRONMENT, refuse_threads, warm
+    from roboglot.shards.warm_up import ENVIRONMENT, refuse_threads, warm
 
     for module in pkgutil.walk_packages(cli.__path__, f"{cli.__name__}."):
         importlib.import_module(module.name)

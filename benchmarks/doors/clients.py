@@ -32,7 +32,7 @@ from _pupils import GRPC, REST, TEXT, Lesson, Seen, in_a_process, percentile
 from roboglot.clients.cyberdog import Certificates
 from roboglot.hosting import local_socket
 from roboglot.protocols.cyberdog.certificates import ensure_certificates
-from roboglot.shards.wishes import SOCKET
+from roboglot.shards.requests import SOCKET
 
 FIRST, APP = IPv4Address("127.16.1.1"), "127.16.9.1:18985"
 PATIENCE = 120.0

@@ -27,7 +27,7 @@ from typing import Any
 from _claim import Claims
 
 from roboglot.hosting import local_socket
-from roboglot.shards.wishes import SOCKET
+from roboglot.shards.requests import SOCKET
 from roboglot.testing.process import served
 
 FIRST = "127.78.1.1"

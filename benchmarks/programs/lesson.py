@@ -28,7 +28,7 @@ from _claim import Claims
 from websockets.asyncio.client import ClientConnection, connect
 
 from roboglot.hosting.local_socket import ask
-from roboglot.shards.wishes import SOCKET
+from roboglot.shards.requests import SOCKET
 
 FIRST = "127.79.1.1"
 PATIENCE = 120.0

@@ -28,10 +28,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))  # the tests' PostgreSQL serv
 from roboglot.shards.messages import Beat, Ready, encode, pair
 from roboglot.shards.plan import FleetPlan, plan_fleet
 from roboglot.shards.supervisor import State, Supervisor
+from roboglot.storage.dead_programs import Silence
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry
 from roboglot.storage.residence import Residence
-from roboglot.storage.silence import Silence
 from tests.storage.postgresql_server import binary_folder, postgresql_server
 
 TICKS = os.sysconf("SC_CLK_TCK")

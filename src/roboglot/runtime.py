@@ -24,7 +24,7 @@ from roboglot.console.server import Console
 from roboglot.console.studio.programs import FOLDER, ClassHome, Programs, Studio
 from roboglot.extras import own_version
 from roboglot.fleet import build_fleet, clock_of, origin_of
-from roboglot.hosting.exclusive import lock_folder
+from roboglot.hosting.folder_lock import lock_folder
 from roboglot.model.client_context import concerning
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import RobotError

@@ -20,7 +20,7 @@ from roboglot.cli.connect import registered
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
-from roboglot.storage import whereabouts
+from roboglot.storage import gateways
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry, read_registry
 from roboglot.testing.addresses import free_addresses
@@ -38,7 +38,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(heartbeat, limit, 20.0)  # a busy machine must not look like a lost tunnel
     monkeypatch.setattr(dialling, "AGAIN_AFTER", 0.01)
     monkeypatch.setattr(dialling, "SOON", 0.01)
-    monkeypatch.setattr(whereabouts, "PERIOD", 0.01)
+    monkeypatch.setattr(gateways, "PERIOD", 0.01)
 
 
 @contextlib.asynccontextmanager

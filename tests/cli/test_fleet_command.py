@@ -10,8 +10,8 @@ import pytest
 from roboglot.cli import fleet
 from roboglot.shards import forking
 from roboglot.shards.plan import PLAN, plan_fleet, save
+from roboglot.shards.requests import Answer, RobotRow, Row
 from roboglot.shards.supervisor import Shard, State
-from roboglot.shards.wishes import Answer, RobotRow, Row
 from roboglot.testing.addresses import free_addresses
 
 TEMPLATE = 'world = "moon"\n'

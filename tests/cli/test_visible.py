@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.hosting.visible import VisibleFormatter, visible, xml_text
+from roboglot.hosting.escaping import VisibleFormatter, visible, xml_text
 
 
 def test_controls_are_written_out_and_words_stay() -> None:

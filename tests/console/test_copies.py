@@ -11,7 +11,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
-from roboglot.console.copies import FORMS, copy
+from roboglot.console.as_code import FORMS, copy
 from roboglot.console.wire_log import WireLog, readable, rows
 from roboglot.model.clock import LockstepClock
 from roboglot.model.errors import InvalidGoal, NotFound

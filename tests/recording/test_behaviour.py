@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from roboglot.cli import loaded
 from roboglot.cli.recordings.compare import compared
-from roboglot.cli.recordings.reads import askable, reads
+from roboglot.cli.recordings.read_only import askable, reads
 from roboglot.config import load_config
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections

@@ -19,8 +19,8 @@ from typing import Any
 import pytest
 
 from roboglot.hosting import local_socket
+from roboglot.shards.requests import SOCKET
 from roboglot.shards.supervisor import SILENCE_MAX
-from roboglot.shards.wishes import SOCKET
 from roboglot.testing.addresses import free_addresses
 
 PATIENCE = 150.0  # s; a busy machine is twenty times slower than a quiet one

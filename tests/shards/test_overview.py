@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 import pytest
 
 from roboglot.agents.console import ConsoleClient, Refused
-from roboglot.shards.glances import Glances
 from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.overview import PAGE, SEEN_MAX, Overview
 from roboglot.shards.plan import plan_fleet
+from roboglot.shards.snapshots import Snapshots
 from roboglot.shards.supervisor import Shard, State
 from roboglot.transport import http as connections
 
@@ -45,7 +45,7 @@ def fleet_host(tmp_path) -> Any:
 
 
 async def test_many_pages_cost_a_world_one_request(fleet_host) -> None:
-    glances = Glances(fleet_host, Console)
+    glances = Snapshots(fleet_host, Console)
     states = await asyncio.gather(*(glances.state("a1") for _ in range(20)))
     assert states == [{"battery": {"charge": 0.5}}] * 20  # and no history: tiles do not show it
     assert await glances.picture("a1") == await glances.picture("a1") == PICTURE
@@ -53,7 +53,7 @@ async def test_many_pages_cost_a_world_one_request(fleet_host) -> None:
 
 
 async def test_worlds_that_do_not_answer_say_why(fleet_host) -> None:
-    glances = Glances(fleet_host, Console)
+    glances = Snapshots(fleet_host, Console)
     assert await glances.state("a2") == {"error": "sign in first"}
     assert await glances.state("a3") == {"error": "this world has no console"}
     with pytest.raises(Refused, match="sign in first"):
@@ -73,7 +73,7 @@ async def request(page: Overview, line: str, host: str = "127.16.3.1") -> tuple[
 
 async def test_page_lists_all_worlds_and_changes_nothing(fleet_host) -> None:
     page = Overview(fleet_host, "127.16.3.1", 0)
-    page._glances = Glances(fleet_host, Console)
+    page._snapshots = Snapshots(fleet_host, Console)
     page.open()
     await page.ready()
     try:

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.shards import warmth
+from roboglot.shards import warm_up
 from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet, save
-from roboglot.shards.warmth import ENVIRONMENT
+from roboglot.shards.warm_up import ENVIRONMENT
 from roboglot.storage.database import connect
 from roboglot.storage.transfer import copy_robot, forget_robot
 
@@ -101,7 +101,7 @@ def test_a_plan_is_kept(tmp_path: Path) -> None:
 
 def test_warming_starts_no_thread() -> None:
     """Raises Threaded otherwise; a fork would copy the thread's locks without the thread."""
-    code = "from roboglot.shards.warmth import warm; warm()"
+    code = "from roboglot.shards.warm_up import warm; warm()"
     subprocess.run([sys.executable, "-c", code], env={**ENVIRONMENT}, check=True, timeout=120)
 
 
@@ -132,7 +132,7 @@ def test_rows_of_one_robot_go_and_others_stay(tmp_path: Path) -> None:
 
 def test_kernels_are_compiled_in_a_process_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[list[str]] = []
-    monkeypatch.setattr(warmth.subprocess, "run", lambda command, **_: started.append(command))
+    monkeypatch.setattr(warm_up.subprocess, "run", lambda command, **_: started.append(command))
     monkeypatch.setattr("roboglot.kernels.ahead.missing", lambda: ["search"])
-    warmth._compile()
+    warm_up._compile()
     assert [command[1:] for command in started] == [["-m", "roboglot.kernels"]]

@@ -19,8 +19,8 @@ from roboglot.model.components.motion.legs import Legs
 from roboglot.model.errors import Collided, Refused
 from roboglot.model.geometry import Pose, Twist, Vector3
 from roboglot.model.robot import Robot
+from roboglot.simulation.world.contact_switch import NO_CONTACTS
 from roboglot.simulation.world.description import Box
-from roboglot.simulation.world.meetings import NO_CONTACTS
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 

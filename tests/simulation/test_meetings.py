@@ -9,8 +9,8 @@ import pytest
 from roboglot.model.components.motion.base import Base
 from roboglot.model.errors import Collided
 from roboglot.model.geometry import Pose, Twist, Vector3
+from roboglot.simulation.world.contact_switch import Meetings
 from roboglot.simulation.world.gliding import Gliding
-from roboglot.simulation.world.meetings import Meetings
 
 from .conftest import Simulate, Simulation
 

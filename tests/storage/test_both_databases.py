@@ -201,7 +201,7 @@ def test_an_error_of_the_server_is_one_line() -> None:
 async def test_clients_see_no_host_of_the_database(
     server: PostgreSQLServer, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(postgresql.seldom, "_said", {})
+    monkeypatch.setattr(postgresql.limited_log, "_said", {})
     server.empty()
     database = open_database(tmp_path / "unused", server.url, ["a"])
     settings = StoredSettings(database, "a")

@@ -23,10 +23,10 @@ from roboglot.model.errors import Busy
 from roboglot.model.geometry import Twist
 from roboglot.runtime import Runtime
 from roboglot.storage import residence as timing
+from roboglot.storage.dead_programs import GAP_MAX, Silence
 from roboglot.storage.homes import Homes, Occupied
 from roboglot.storage.opening import open_database
 from roboglot.storage.residence import HOLD, LEASE, PERIOD, Residence, holder_of
-from roboglot.storage.silence import GAP_MAX, Silence
 from roboglot.storage.transactions import Connection, DatabaseError, Transactions
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.transport.limiter import BUCKETS_MAX, Limiter
+from roboglot.transport.log_limiter import KINDS_MAX, LogLimiter
 from roboglot.transport.metered import Metered
-from roboglot.transport.seldom import KINDS_MAX, Seldom
 from tests.transport.test_tls import Echo
 
 
@@ -76,7 +76,7 @@ async def test_client_that_sends_too_much_is_read_later() -> None:
 
 
 def test_the_log_is_not_flooded(caplog: pytest.LogCaptureFixture) -> None:
-    seldom = Seldom(logging.getLogger("test"))
+    seldom = LogLimiter(logging.getLogger("test"))
     with caplog.at_level(logging.WARNING):
         for number in range(100):
             seldom.warning("10.0.0.7", "refused %d", number)

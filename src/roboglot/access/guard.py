@@ -35,10 +35,10 @@ from roboglot.model.robot import Robot
 from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.storage.transactions import DatabaseError, Transactions
 from roboglot.transport.limiter import Limiter
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 
 log = logging.getLogger(__name__)
-seldom = Seldom(log)
+limited_log = LogLimiter(log)
 
 LOOK_PERIOD = 0.25  # s between two checks of the list and of expiry times
 LOOK_PAUSE = 0.02  # s at least, even when unknown clients come
@@ -202,7 +202,7 @@ class Guard:
                     seen = newer.version
                     loop.call_soon_threadsafe(partial(self._adopt_safely, newer))
             except DatabaseError as error:
-                seldom.warning("list", "cannot read the list of identities, the last one stays: %s", error)
+                limited_log.warning("list", "cannot read the list of identities, the last one stays: %s", error)
             for look in looks:
                 loop.call_soon_threadsafe(look.cancel)
 
@@ -285,7 +285,7 @@ class RobotAdmission(Admission):
                 self._allowed.clear()
             self._allowed[who, operation] = right
             return
-        seldom.warning(f"{door} {operation} {who}", "%s: %s refused: %s", door, operation, why)
+        limited_log.warning(f"{door} {operation} {who}", "%s: %s refused: %s", door, operation, why)
         self._note(who, connection(), door, operation, "refused", why)
         raise Forbidden(why)
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboglot.extras import MissingExtra
-from roboglot.hosting.reasons import in_words
-from roboglot.hosting.visible import visible
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import visible
 
 if TYPE_CHECKING:
     from roboglot.testing.campaign.local import Ended, Leave

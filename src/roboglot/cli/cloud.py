@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboglot.hosting.error_text import in_words
 from roboglot.hosting.logs import set_up_logging
-from roboglot.hosting.reasons import in_words
 
 if TYPE_CHECKING:
     from roboglot.storage.cloud import CloudStore

@@ -19,13 +19,13 @@ import typer
 from roboglot.access.tunnel.connector import AnnouncedGateway, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.dialling import Dialling, OnePlace, Place, Places, Unusable
 from roboglot.config import ROBOTS_MAX, is_loopback
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import visible
 from roboglot.hosting.event_loop import run
 from roboglot.hosting.logs import set_up_logging
-from roboglot.hosting.reasons import in_words
-from roboglot.hosting.visible import visible
 
 if TYPE_CHECKING:
-    from roboglot.storage.whereabouts import Whereabouts
+    from roboglot.storage.gateways import Whereabouts
 
 PORT = 50090
 
@@ -137,9 +137,9 @@ class _Registered:
 @contextmanager
 def registered(registry: str) -> Iterator[Places]:
     """Context to find robots by a registry: a PostgreSQL URL, or a file. Raises OSError, ValueError, sqlite3.Error."""
+    from roboglot.storage.gateways import Whereabouts
     from roboglot.storage.homes import Homes
     from roboglot.storage.opening import read_registry
-    from roboglot.storage.whereabouts import Whereabouts
 
     database = read_registry(registry)
     try:

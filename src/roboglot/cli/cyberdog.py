@@ -20,7 +20,7 @@ from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefu
 from roboglot.clients.cyberdog.values import Grid
 from roboglot.clients.errors import ClientError
 from roboglot.config import load_config
-from roboglot.hosting.reasons import in_words
+from roboglot.hosting.error_text import in_words
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Feedback
 

@@ -22,14 +22,14 @@ from roboglot.cli.control import running
 from roboglot.cli.suggestions import Group
 from roboglot.config import default_data_folder
 from roboglot.extras import MissingExtra, refuse_without
-from roboglot.hosting.reasons import in_words
-from roboglot.hosting.visible import visible
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import visible
 
 if TYPE_CHECKING:
     from roboglot.shards.fleet_host import FleetHost
     from roboglot.shards.forking import Nursery
     from roboglot.shards.plan import FleetPlan
-    from roboglot.shards.wishes import Answer, Row, Verb
+    from roboglot.shards.requests import Answer, Row, Verb
 
 app = typer.Typer(cls=Group, add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
 PATIENCE = 120.0  # s for a request; stopping and starting 100 shards takes a while
@@ -68,13 +68,13 @@ def up(
 ) -> None:
     """Start a fleet and keep it up until Ctrl-C; its robots' data stays in its folder."""
     from roboglot.shards.forking import NotWarm, launched
-    from roboglot.shards.warmth import FOREIGN
+    from roboglot.shards.warm_up import FOREIGN
 
     if not on:
         refuse_without("roboglot fleet", "up", dict.fromkeys(name.partition(".")[0] for name in ("numba", *FOREIGN)))
     began = time.monotonic()
     with launched(wanted=not on) as nursery:  # it loads while we import what a plan needs
-        from roboglot.hosting.exclusive import FolderInUse
+        from roboglot.hosting.folder_lock import FolderInUse
         from roboglot.hosting.logs import set_up_logging
         from roboglot.shards.plan import PLAN
 
@@ -354,7 +354,7 @@ def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
 
 def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:
     """Return the fleet's answer; without one, or after a refusal, end the program with a sentence."""
-    from roboglot.shards.wishes import SOCKET, Answer, Request
+    from roboglot.shards.requests import SOCKET, Answer, Request
 
     return running.request("fleet", _folder(data) / SOCKET, Request(verb, **wish), Answer, PATIENCE, "no fleet is up")
 

@@ -16,7 +16,7 @@ from msgspec.structs import astuple
 from roboglot.cli.maps.merge import merged
 from roboglot.cli.maps.ros_map import write_ros_map
 from roboglot.cli.maps.survey import RADIUS, first_pose, surveyed
-from roboglot.hosting.reasons import in_words
+from roboglot.hosting.error_text import in_words
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
 from roboglot.simulation.world.world_files import load_world, read_ros_grid

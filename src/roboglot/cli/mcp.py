@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from roboglot.hosting.reasons import in_words
+from roboglot.hosting.error_text import in_words
 
 
 def command(

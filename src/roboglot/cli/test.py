@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from roboglot.hosting.visible import visible
+from roboglot.hosting.escaping import visible
 from roboglot.testing.artifacts import FOLDER
 
 

@@ -24,10 +24,10 @@ import typer
 from roboglot.cli.screen import announce, warn_if_open
 from roboglot.config import Config, RobotConfig, load_config, parse_robot, refuse_unguarded
 from roboglot.hosting import open_files
-from roboglot.hosting.exclusive import FolderInUse
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.folder_lock import FolderInUse
 from roboglot.hosting.logs import set_up_logging
 from roboglot.hosting.process import end_in_any_case, prepare
-from roboglot.hosting.reasons import in_words
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.protocols.door import Option

@@ -9,8 +9,8 @@ from typing import TypeVar
 import msgspec
 
 from roboglot.console import drawings, program_runs
+from roboglot.console.as_code import FORMS, LABELS, copy
 from roboglot.console.camera import Calls, send_film, send_photo, send_sound
-from roboglot.console.copies import FORMS, LABELS, copy
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
 from roboglot.console.openapi import document

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.console import words
+from roboglot.console import plain_values
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.places import Places
@@ -20,10 +20,12 @@ def drawings_of(robot: Robot) -> dict[str, object]:
     places = robot[Places].all() if Places in robot else ()
     drawn = robot[MapAnnotations].current if MapAnnotations in robot else Annotations()
     return {
-        "places": [{"id": p.id, "name": name_of(p.id, dict(p.metadata)), "pose": words.pose(p.pose)} for p in places],
-        "lines": [{"id": n.id, "kind": str(n.kind), "points": words.points(n.points())} for n in drawn.lines],
-        "areas": [{"id": a.id, "kind": str(a.kind), "points": words.points(a.corners())} for a in drawn.areas],
-        "docks": [{"id": d.id, "pose": words.pose(d.pose)} for d in drawn.docks],
+        "places": [
+            {"id": p.id, "name": name_of(p.id, dict(p.metadata)), "pose": plain_values.pose(p.pose)} for p in places
+        ],
+        "lines": [{"id": n.id, "kind": str(n.kind), "points": plain_values.points(n.points())} for n in drawn.lines],
+        "areas": [{"id": a.id, "kind": str(a.kind), "points": plain_values.points(a.corners())} for a in drawn.areas],
+        "docks": [{"id": d.id, "pose": plain_values.pose(d.pose)} for d in drawn.docks],
     }
 
 
@@ -38,8 +40,8 @@ def plans_of(stage: Stage) -> list[dict[str, object]]:
         {
             "number": plan.number,
             "name": plan.name,
-            "walls": [words.points(outline) for outline in plan.walls],
-            "furniture": [words.points(outline) for outline in plan.furniture],
+            "walls": [plain_values.points(outline) for outline in plan.walls],
+            "furniture": [plain_values.points(outline) for outline in plan.furniture],
         }
         for plan in stage.floors
     ]
@@ -48,13 +50,13 @@ def plans_of(stage: Stage) -> list[dict[str, object]]:
 def truth_of(stage: Stage) -> dict[str, object]:
     """Return the true places of everything, in the world's frame, and the injected faults."""
     return {
-        "robots": {r.name: [*words.pose(r.pose), r.floor] for r in stage.robots},
-        "people": {p.name: [*words.pose(p.pose), p.floor] for p in stage.people},
-        "things": {t.name: [*words.pose(t.pose), t.floor] for t in stage.things},
-        "boxes": {str(b.number): [*words.pose(b.pose), b.floor, *b.size[:2]] for b in stage.obstacles},
-        "tags": {str(t.number): [*words.pose(t.pose), t.floor, t.text] for t in stage.tags},
+        "robots": {r.name: [*plain_values.pose(r.pose), r.floor] for r in stage.robots},
+        "people": {p.name: [*plain_values.pose(p.pose), p.floor] for p in stage.people},
+        "things": {t.name: [*plain_values.pose(t.pose), t.floor] for t in stage.things},
+        "boxes": {str(b.number): [*plain_values.pose(b.pose), b.floor, *b.size[:2]] for b in stage.obstacles},
+        "tags": {str(t.number): [*plain_values.pose(t.pose), t.floor, t.text] for t in stage.tags},
         "faults": [
-            {"number": f.number, "kind": f.kind, "robot": f.robot, "options": words.plain(dict(f.options))}
+            {"number": f.number, "kind": f.kind, "robot": f.robot, "options": plain_values.plain(dict(f.options))}
             for f in stage.faults
         ],
     }

@@ -11,7 +11,7 @@ import zlib
 import msgspec
 import numpy as np
 
-from roboglot.console import words
+from roboglot.console import plain_values
 from roboglot.model.geometry import Path, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.sensing import LaserScan
@@ -35,7 +35,7 @@ def scan_frame(robot: str, scan: LaserScan, base: Pose) -> bytes:
         "kind": "scan",
         "robot": robot,
         "stamp": round(scan.stamp, 3),
-        "pose": words.pose(base.compose(scan.mount)),
+        "pose": plain_values.pose(base.compose(scan.mount)),
         "from": float(scan.angle_min),
         "step": float(scan.angle_increment),
     }

@@ -24,7 +24,7 @@ from prometheus_client.core import Metric as Family
 from prometheus_client.samples import Sample
 
 from roboglot.console.metrics import Metrics
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 
 log = logging.getLogger(__name__)
 SECONDS = 5.0  # s for the collector's answer
@@ -37,7 +37,7 @@ class Pusher:
         self._metrics, self._period = metrics, period
         self._url = f"{endpoint.rstrip('/')}/v1/metrics"
         self._began = time.time_ns()
-        self._seldom = Seldom(log)
+        self._log_limiter = LogLimiter(log)
 
     async def run(self) -> None:
         """Push until cancelled; failures of the collector are logged now and then."""
@@ -47,7 +47,7 @@ class Pusher:
             try:
                 await asyncio.to_thread(self._post, data)
             except OSError as error:
-                self._seldom.warning("push", "collector %s took no metrics: %s", self._url, error)
+                self._log_limiter.warning("push", "collector %s took no metrics: %s", self._url, error)
 
     def _post(self, data: bytes) -> None:
         request = Request(self._url, data, {"content-type": "application/x-protobuf"}, method="POST")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.console import words
+from roboglot.console import plain_values
 from roboglot.console.verbs.robots import VERBS
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.energy.power import Power
@@ -59,8 +59,8 @@ def state_of(robot: Robot) -> dict[str, object]:
         "absent": [
             verb.key for verb in VERBS if any(part not in robot for part in verb.needs)
         ],  # what it has no part for
-        "actions": [words.action(action, robot.clock.time()) for action in robot.actions.running()],
-        "history": [words.action(action, robot.clock.time()) for action in reversed(robot.actions.history)],
+        "actions": [plain_values.action(action, robot.clock.time()) for action in robot.actions.running()],
+        "history": [plain_values.action(action, robot.clock.time()) for action in reversed(robot.actions.history)],
         "control": _control(robot),
         "faults": _faults(robot),
         "battery": _battery(robot),
@@ -138,7 +138,7 @@ def _place(robot: Robot) -> dict[str, object]:
         "lost": str(lost) if lost else "",
         "mapping": robot[Mapping].enabled if Mapping in robot else None,
         "floor": robot[Floors].current if Floors in robot else None,
-        "home": words.pose(home) if Docking in robot and (home := robot[Docking].home) else None,
+        "home": plain_values.pose(home) if Docking in robot and (home := robot[Docking].home) else None,
     }
 
 

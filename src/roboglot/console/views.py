@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from roboglot.console import drawings, words
+from roboglot.console import drawings, plain_values
 from roboglot.console.camera import Sightings
 from roboglot.console.frames import map_frame, path_frame, scan_frame
 from roboglot.console.settings import MAP_SECONDS
@@ -104,16 +104,16 @@ class RobotView:
         if where is None:
             return [None] * 6
         if not is_current(robot):
-            return [*words.pose(where), None, None, None]
+            return [*plain_values.pose(where), None, None, None]
         speed = robot[Base].velocity if Base in robot else None
-        rates = [words.number(v) for v in (speed.x, speed.y, speed.yaw)] if speed else [0.0, 0.0, 0.0]
-        return [*words.pose(where), *rates]
+        rates = [plain_values.number(v) for v in (speed.x, speed.y, speed.yaw)] if speed else [0.0, 0.0, 0.0]
+        return [*plain_values.pose(where), *rates]
 
     def state(self) -> dict[str, object]:
         """Return the slowly changing state, by key."""
         return state_of(self.robot) | {
             "drawings": drawings.drawings_of(self.robot),
-            "anchor": words.pose(self.anchor) if self.anchor else None,
+            "anchor": plain_values.pose(self.anchor) if self.anchor else None,
             "refused": self.refusals[-1] if self.refusals else None,
         }
 

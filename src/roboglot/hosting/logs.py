@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 
-from roboglot.hosting.visible import VisibleFormatter
+from roboglot.hosting.escaping import VisibleFormatter
 from roboglot.model.client_context import concerned
 from roboglot.values import dataclass
 

@@ -16,8 +16,8 @@ from roboglot.model.admission import Admission, Forbidden, Right
 from roboglot.model.client_context import set_client
 from roboglot.transport.connections import Connections
 from roboglot.transport.listening import listen
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.transport.metered import Metered
-from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort
 
 log = logging.getLogger(__name__)
@@ -41,7 +41,7 @@ class Gate:
     def __init__(self, admission: Admission, tls: Tls | None = None) -> None:
         self._admission, self._tls = admission, tls
         self._open: dict[asyncio.Transport, str] = {}  # identity by connection
-        self._seldom = Seldom(log)
+        self._log_limiter = LogLimiter(log)
         self._leave: Callable[[], None] | None = None
 
     def before(self, factory: Factory, name: str, right: Right | None = None, most: int = OPEN_MAX) -> Factory:
@@ -100,7 +100,7 @@ class Gate:
                 return None
         if not port.connections.enter(peer[0], admission.connections_max):
             count = port.connections.of(peer[0])
-            self._seldom.warning(peer[0], "%s: %s turned away, it has %d connections", port.name, peer[0], count)
+            self._log_limiter.warning(peer[0], "%s: %s turned away, it has %d connections", port.name, peer[0], count)
             return None
         self._open[transport] = who or ""
         return who or str(peer[0])

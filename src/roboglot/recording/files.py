@@ -19,8 +19,8 @@ from mcap.writer import CompressionType, Writer
 from zstandard import ZstdCompressor
 
 from roboglot.recording.entries import KINDS, NANO, Encode, Entry, encoding_of
+from roboglot.recording.latched_values import REPEATED, Standing
 from roboglot.recording.redaction import Redaction
-from roboglot.recording.standing import REPEATED, Standing
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)

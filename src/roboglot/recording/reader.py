@@ -21,8 +21,8 @@ from msgspec import DecodeError
 
 from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import DRIVER, SILENT, Direction, Exchange
+from roboglot.recording.latched_values import REPEATED
 from roboglot.recording.messages import decode_exchange, decode_input
-from roboglot.recording.standing import REPEATED
 from roboglot.values import dataclass
 from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
 

@@ -14,8 +14,8 @@ import zstandard
 
 from roboglot.recording.entries import NANO, Entry
 from roboglot.recording.files import Origin, PartWriter
+from roboglot.recording.latched_values import STANDING, STANDING_MAX
 from roboglot.recording.redaction import Redaction
-from roboglot.recording.standing import STANDING, STANDING_MAX
 
 BYTES_MAX = 64 << 20  # of compressed entries; older ones are dropped first
 BLOCK_SECONDS = 1.0

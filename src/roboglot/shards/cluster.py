@@ -21,15 +21,15 @@ from typing import Protocol
 import msgspec
 
 from roboglot.extras import explaining
-from roboglot.hosting.exclusive import lock_folder
+from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.actor import Condition, ShardActor
 from roboglot.shards.messages import Beat
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.supervisor import LOG_FILE, LOG_MAX, Shard, State
+from roboglot.storage.dead_programs import Silence
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry
 from roboglot.storage.residence import LEASE
-from roboglot.storage.silence import Silence
 
 TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
 

@@ -10,8 +10,8 @@ import msgspec
 from roboglot.hosting.local_socket import LocalServer
 from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.moving import move_robot
+from roboglot.shards.requests import SOCKET, Answer, Request, RobotRow, Row
 from roboglot.shards.supervisor import Shard
-from roboglot.shards.wishes import SOCKET, Answer, Request, RobotRow, Row
 
 
 class FleetDesk(LocalServer):

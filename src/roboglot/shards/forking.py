@@ -17,7 +17,7 @@ from typing import NamedTuple
 import msgspec
 
 from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, Warm, encode, pair
-from roboglot.shards.warmth import ENVIRONMENT
+from roboglot.shards.warm_up import ENVIRONMENT
 
 log = logging.getLogger(__name__)
 AGAIN_SECONDS = 5.0  # s between two attempts to start a nursery that does not become ready

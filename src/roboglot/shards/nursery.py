@@ -18,7 +18,7 @@ from collections.abc import Callable
 import msgspec
 
 from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, Warm, Wish, encode
-from roboglot.shards.warmth import ENVIRONMENT, EXIT_BROKEN, ended, fork, wake_at_ends, warm
+from roboglot.shards.warm_up import ENVIRONMENT, EXIT_BROKEN, ended, fork, wake_at_ends, warm
 
 LAST_SECONDS = 12.0  # s for shards to close when the nursery ends
 LINK_FD = 3  # of a shard

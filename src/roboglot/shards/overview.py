@@ -20,7 +20,7 @@ from roboglot.console.server import LIBRARIES, bound
 from roboglot.model.background import load
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.shards.fleet_host import FleetHost
-from roboglot.shards.glances import Glances
+from roboglot.shards.snapshots import Snapshots
 from roboglot.shards.supervisor import Shard
 
 log = logging.getLogger(__name__)
@@ -35,7 +35,7 @@ class Overview:
 
     def __init__(self, fleet_host: FleetHost, host: str, port: int = PORT) -> None:
         self._fleet_host, self._host, self._port = fleet_host, host, port
-        self._glances, self._assets, self._browsers = Glances(fleet_host), Assets(), Browsers("")
+        self._snapshots, self._assets, self._browsers = Snapshots(fleet_host), Assets(), Browsers("")
         self._server: asyncio.Server | None = None
         self._socket: socket.socket | None = None
         self._serving: asyncio.Task[None] | None = None
@@ -121,7 +121,7 @@ class Overview:
         if len(seen) > SEEN_MAX:
             raise Problem(400, f"a page shows {SEEN_MAX} robots at most")
         try:
-            states = await asyncio.gather(*map(self._glances.state, seen))
+            states = await asyncio.gather(*map(self._snapshots.state, seen))
         except LookupError as error:
             raise Problem(404, str(error.args[0])) from None
         worlds = [_world(shard) for shard in self._fleet_host.shards.values()]
@@ -129,7 +129,7 @@ class Overview:
 
     async def _send_picture(self, name: str, send: Send) -> None:
         try:
-            picture = await self._glances.picture(name)
+            picture = await self._snapshots.picture(name)
         except LookupError as error:
             raise Problem(404, str(error.args[0])) from None
         except Refused as refused:

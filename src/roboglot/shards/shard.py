@@ -19,10 +19,10 @@ import msgspec
 from roboglot.config import Config, config_of
 from roboglot.console.studio.programs import ClassHome
 from roboglot.hosting import open_files
-from roboglot.hosting.exclusive import FolderInUse
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.folder_lock import FolderInUse
 from roboglot.hosting.logs import set_up_logging
 from roboglot.hosting.process import end_in_any_case, prepare
-from roboglot.hosting.reasons import in_words
 from roboglot.protocols import sections
 from roboglot.shards.messages import Beat, News, Ready, Refusal, encode
 

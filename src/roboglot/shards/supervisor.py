@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from roboglot.hosting.exclusive import lock_folder
+from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.forking import Forks, NotWarm, Nursery
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
 from roboglot.shards.plan import FleetPlan, ShardPlan, save

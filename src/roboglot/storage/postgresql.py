@@ -22,11 +22,11 @@ import psycopg
 
 from roboglot.model.components.system.disk import Disk
 from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, Rows
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)
-seldom = Seldom(log)
+limited_log = LogLimiter(log)
 
 CONNECTIONS_MAX = 4
 CONNECT_MAX, STATEMENT_MAX, IDLE_MAX = 5, 10, 10  # s for connecting, for a statement, for an idle transaction
@@ -256,7 +256,7 @@ def in_one_line(error: Exception) -> str:
 
 def _failed(error: psycopg.Error) -> DatabaseError:
     """Log the error; return one that clients may see."""
-    seldom.warning("database", "the database failed: %s", in_one_line(error))
+    limited_log.warning("database", "the database failed: %s", in_one_line(error))
     away = isinstance(error, psycopg.OperationalError)
     return DatabaseError("the database cannot be reached" if away else "the database failed")
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from roboglot.storage.homes import Homes, Occupied
 from roboglot.storage.transactions import DatabaseError
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 
 log = logging.getLogger(__name__)
 PERIOD, HOLD, LEASE = 0.5, 2.5, 4.0  # s between renewals; see above
@@ -151,7 +151,7 @@ class Residence:
                 self._lost(robot)
 
     async def _renew_always(self) -> None:
-        seldom = Seldom(log)
+        seldom = LogLimiter(log)
         while True:
             await asyncio.sleep(PERIOD)
             try:

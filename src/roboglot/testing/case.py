@@ -10,8 +10,8 @@ from typing import ClassVar
 
 from roboglot.testing.artifacts import FOLDER, folder_of, save
 from roboglot.testing.blocking import Blocking
+from roboglot.testing.requirements import Wanted, WantedFault, wanted_of
 from roboglot.testing.server import RobotServer
-from roboglot.testing.wanted import Wanted, WantedFault, wanted_of
 
 
 class RobotTestCase(unittest.TestCase):

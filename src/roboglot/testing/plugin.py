@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from roboglot.testing import Forward
     from roboglot.testing.blocking import Blocking
     from roboglot.testing.case import RobotTestCase
+    from roboglot.testing.requirements import Wanted
     from roboglot.testing.server import RobotServer
-    from roboglot.testing.wanted import Wanted
 
 MARKERS = (
     "world(name, robots=('a',), body='universal', seed=1, speed=4.0, lockstep=False, shared=False, doors={}):"
@@ -155,7 +155,7 @@ def robot(fleet: Fleet) -> Robot:
 
 
 def _wanted(request: pytest.FixtureRequest) -> Wanted:
-    from roboglot.testing.wanted import wanted_by
+    from roboglot.testing.requirements import wanted_by
 
     try:
         return wanted_by(request.node.iter_markers())

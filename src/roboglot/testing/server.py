@@ -19,8 +19,8 @@ from roboglot.extras import explaining
 from roboglot.testing.addresses import free_addresses, free_port, give_back
 from roboglot.testing.blocking import PATIENCE, Loop
 from roboglot.testing.clients import Clients
-from roboglot.testing.wanted import Wanted
-from roboglot.testing.ways import LOOK_AGAIN, Ways, pass_time
+from roboglot.testing.requirements import Wanted
+from roboglot.testing.tracks import LOOK_AGAIN, Ways, pass_time
 
 if TYPE_CHECKING:
     from roboglot.config import RobotConfig
@@ -299,7 +299,7 @@ def _can_record() -> bool:
 @contextlib.contextmanager
 def serving(**values: object) -> Iterator[RobotServer]:
     """Start robots for a ``with``: ``with serving(world="empty", speed=8) as server``."""
-    from roboglot.testing.wanted import wanted_of
+    from roboglot.testing.requirements import wanted_of
 
     with RobotServer(wanted_of(values)) as server:
         yield server

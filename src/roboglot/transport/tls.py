@@ -15,11 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import cast
 
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
-seldom = Seldom(log)
+seldom = LogLimiter(log)
 
 HANDSHAKE_SECONDS_MAX = 5.0
 HANDSHAKE_BYTES_MAX = 64 * 1024  # from the client before the handshake is complete

@@ -51,7 +51,7 @@ def painted() -> EvidenceGrid:
 @pytest.mark.parametrize("driven", [0.06, 0.1, 0.15])
 def test_wheels_are_believed_where_robots_drive_along(painted: EvidenceGrid, driven: float) -> None:
     """The wheels are believed instead of a misled match, and no match that is misled as well."""
-    from roboglot.autonomy.slam.contest import contested
+    from roboglot.autonomy.slam.contradictions import contested
     from roboglot.autonomy.slam.matcher import FREE, fit
 
     scan, prior = scanned(driven), np.diag((0.02**2, 0.02**2, 0.01**2))
@@ -63,7 +63,7 @@ def test_wheels_are_believed_where_robots_drive_along(painted: EvidenceGrid, dri
 
 
 def test_wheels_that_slip_are_not_believed_alone(painted: EvidenceGrid) -> None:
-    from roboglot.autonomy.slam.contest import contested
+    from roboglot.autonomy.slam.contradictions import contested
     from roboglot.autonomy.slam.matcher import FREE, fit
 
     scan, prior = scanned(0.0), np.diag((0.02**2, 0.02**2, 0.01**2))
@@ -99,7 +99,7 @@ def left() -> EvidenceGrid:
 @pytest.mark.parametrize(("far", "step"), [(2.0, 0.03), (1.5, 0.0095)], ids=["few to few", "few to many"])
 def test_robot_that_leaves_moves_none_that_stands(left: EvidenceGrid, far: float, step: float) -> None:
     """Few points tell, but no noise makes those on the pillar prefer the wrong place."""
-    from roboglot.autonomy.slam.contest import contested
+    from roboglot.autonomy.slam.contradictions import contested
     from roboglot.autonomy.slam.matcher import FREE, fit
 
     scan = seen(LEFT, far, step)
@@ -112,7 +112,7 @@ def test_robot_that_leaves_moves_none_that_stands(left: EvidenceGrid, far: float
 @pytest.mark.parametrize(("scans", "believes_wheels"), [(6, True), (10, False)], ids=["just seen", "known well"])
 def test_what_was_just_seen_does_not_overrule_wheels(scans: int, believes_wheels: bool) -> None:
     """Six scans hardly outweigh ten that saw free floor there. A thing known well shows that the wheels slip."""
-    from roboglot.autonomy.slam.contest import contested
+    from roboglot.autonomy.slam.contradictions import contested
     from roboglot.autonomy.slam.matcher import FREE, fit
     from roboglot.autonomy.slam.painting import paint
 
@@ -129,7 +129,7 @@ def test_what_was_just_seen_does_not_overrule_wheels(scans: int, believes_wheels
 
 def test_past_that_was_overruled_does_not_testify(left: EvidenceGrid) -> None:
     """A standing robot that was misled for a moment returns to its place, and stays there."""
-    from roboglot.autonomy.slam.contest import WheelWitness
+    from roboglot.autonomy.slam.contradictions import WheelWitness
     from roboglot.autonomy.slam.matcher import FREE, fit
     from roboglot.autonomy.slam.odometry.learner import OdometryLearner
 

@@ -24,7 +24,7 @@ from roboglot.programs.errors import ProgramError
 from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.programs.tasks.states import TaskState
-from roboglot.shards.warmth import end_with
+from roboglot.shards.warm_up import end_with
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 

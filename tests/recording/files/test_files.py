@@ -22,9 +22,9 @@ from mcap.writer import Writer
 
 from roboglot.recording.entries import NANO, Entry
 from roboglot.recording.files import Attachment, Channel, Files, Limits, OpenChunk, Origin, PartWriter
-from roboglot.recording.mending import mend
 from roboglot.recording.reader import parts, read_messages, records
 from roboglot.recording.redaction import Redaction
+from roboglot.recording.repair import mend
 from roboglot.recording.ring import Ring
 from roboglot.recording.thread import WriterThread
 from tests.recording.files.doctor import Doctor

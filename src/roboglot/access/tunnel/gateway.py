@@ -34,14 +34,14 @@ from roboglot.model.robot import Robot
 from roboglot.model.tap import Direction, Exchange
 from roboglot.transport.connections import Connections
 from roboglot.transport.listening import listen
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.transport.metered import Metered
 from roboglot.transport.pipe import join
-from roboglot.transport.seldom import Seldom
 from roboglot.transport.tls import Tls, TlsPort, server_context
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
-seldom = Seldom(log)
+limited_log = LogLimiter(log)
 
 TUNNELS_MAX = 256
 TUNNELS_OF_ONE_MAX = 64  # per identity
@@ -143,7 +143,7 @@ class Gateway:
         try:
             await self._serve(link)
         except (TunnelLost, BadFrame, OSError, TimeoutError) as error:
-            seldom.info(host, "a tunnel of %s ended: %s", host, error or "no greeting came")
+            limited_log.info(host, "a tunnel of %s ended: %s", host, error or "no greeting came")
         except Unknown as unknown:
             link.send(FrameKind.REFUSED, 0, str(unknown).encode())
             link.transport.close()  # after the frames already queued
@@ -234,7 +234,9 @@ class _Entry(asyncio.Protocol):
         transport = cast(asyncio.Transport, made)
         host = (transport.get_extra_info("peername") or ("",))[0]
         if not self._connections.enter(host, self._guard.config.connections):
-            seldom.warning(host, "gateway: %s turned away, it has %d connections", host, self._connections.of(host))
+            limited_log.warning(
+                host, "gateway: %s turned away, it has %d connections", host, self._connections.of(host)
+            )
             transport.abort()
             return
         self._opened.add(transport)

@@ -17,7 +17,7 @@ from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.slam.adding import Adding
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, is_well_painted, supported
-from roboglot.autonomy.slam.contest import STOOD, WheelWitness, is_long
+from roboglot.autonomy.slam.contradictions import STOOD, WheelWitness, is_long
 from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.excursion import Excursions
 from roboglot.autonomy.slam.loops import LoopCloser

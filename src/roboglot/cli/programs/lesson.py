@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboglot.hosting.visible import visible
+from roboglot.hosting.escaping import visible
 
 if TYPE_CHECKING:
     from roboglot.console.studio.lessons import Grade, Lesson

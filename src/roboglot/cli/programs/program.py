@@ -21,8 +21,8 @@ from roboglot.cli.programs.stepping import Stepper
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.clients.visual import TextLink
 from roboglot.config import RobotConfig
-from roboglot.hosting.reasons import in_words
-from roboglot.hosting.visible import visible
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import visible
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.values import dataclass
 

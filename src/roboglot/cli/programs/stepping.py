@@ -11,7 +11,7 @@ from typing import Any
 
 from roboglot.clients.errors import LinkLost
 from roboglot.clients.visual import TextLink
-from roboglot.hosting.visible import visible
+from roboglot.hosting.escaping import visible
 
 HELP = "Enter: next statement, c: go on, q: end it"
 

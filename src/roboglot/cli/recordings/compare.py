@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboglot.hosting.reasons import in_words
+from roboglot.hosting.error_text import in_words
 
 if TYPE_CHECKING:
     from roboglot.model.tap import Exchange
@@ -83,7 +83,7 @@ async def _sessions(
     names: tuple[str, str], live: Sequence[bool], robot: str, door: str, *, commands: bool
 ) -> Sequence[Sequence[Exchange]]:
     """Return both sessions; robots are asked one after the other. Raises ClientError, ValueError, OSError."""
-    from roboglot.cli.recordings.reads import askable, reads
+    from roboglot.cli.recordings.read_only import askable, reads
     from roboglot.model.clock import RealClock
     from roboglot.recording.lines import Target
     from roboglot.recording.probing import asked_again, probe, reads_only

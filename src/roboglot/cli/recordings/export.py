@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from roboglot.hosting.reasons import in_words
-from roboglot.hosting.visible import visible
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import visible
 
 
 class Storage(StrEnum):

@@ -17,7 +17,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from roboglot.cli.recordings.reads import askable
+from roboglot.cli.recordings.read_only import askable
 from roboglot.config import load_config
 from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.tap import Exchange

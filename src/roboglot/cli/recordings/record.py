@@ -19,8 +19,8 @@ import typer
 from roboglot.cli.control import running
 from roboglot.cli.suggestions import Group
 from roboglot.config import default_data_folder
+from roboglot.hosting.error_text import in_words
 from roboglot.hosting.event_loop import run
-from roboglot.hosting.reasons import in_words
 from roboglot.protocols.record_desk import NAME, Answer, Request
 
 SWITCH = 0.0002  # s that the thread which writes keeps what passes waiting; Python's own 5 ms can be seen
@@ -177,8 +177,8 @@ def repair(
     to: Annotated[Path, typer.Argument(help="New file for the repaired recording.")],
 ) -> None:
     """Copy the readable part of a recording whose program was killed into a complete file with an index."""
-    from roboglot.recording.mending import mend
     from roboglot.recording.reader import BadRecording
+    from roboglot.recording.repair import mend
 
     try:
         count = mend(file, to)

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboglot.hosting.reasons import in_words
-from roboglot.hosting.visible import visible
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import visible
 
 if TYPE_CHECKING:
     from roboglot.config import Config

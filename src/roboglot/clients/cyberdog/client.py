@@ -39,7 +39,7 @@ from roboglot.clients.cyberdog.values import PUSHED, Value
 from roboglot.clients.errors import BadAnswer, ClientError
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.feed import Feed, Viewer
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.validation import read_answer
 from roboglot.wire.cyberdog.channel import APP_PORT, ROBOT_PORT
 from roboglot.wire.cyberdog.chapters.camera import BadSignal, read_signal
@@ -84,7 +84,7 @@ class CyberDogClient(
         clock: Clock | None = None,
     ) -> None:
         clock = clock or RealClock()
-        self._seldom = Seldom(log)
+        self._log_limiter = LogLimiter(log)
         Calls.__init__(self, DogLink(host, port, certificates, clock, app_port=app_port, pushed=self._pushed))
         self.signals = _feed()
         self._feeds: dict[int, Feed[Any]] = {int(code): _feed() for code in PUSHED}
@@ -137,7 +137,7 @@ class CyberDogClient(
             else:
                 log.debug("unknown push %d", code)
         except (msgspec.MsgspecError, NotJson, BadSignal) as error:
-            self._seldom.warning(str(code), "cannot read push %d: %s", code, error)
+            self._log_limiter.warning(str(code), "cannot read push %d: %s", code, error)
 
 
 def _feed() -> Feed[object]:

@@ -18,7 +18,7 @@ import msgspec
 from roboglot.console.desk import Desk
 from roboglot.console.http import Problem
 from roboglot.console.people.sessions import Session
-from roboglot.console.studio import class_wishes, classroom
+from roboglot.console.studio import class_requests, classroom
 from roboglot.console.studio.class_files import KeptLesson, LessonFile
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, Right
@@ -30,7 +30,7 @@ from roboglot.values import dataclass
 
 MINUTES_MAX = 600
 NAME_MAX = 30  # characters of a pupil's name
-Name = Annotated[str, msgspec.Meta(max_length=class_wishes.NAME_MAX)]
+Name = Annotated[str, msgspec.Meta(max_length=class_requests.NAME_MAX)]
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True):

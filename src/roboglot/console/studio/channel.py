@@ -22,7 +22,7 @@ import msgspec
 from roboglot.console import program_runs
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.studio.class_map import draw_map
-from roboglot.console.studio.class_wishes import Member
+from roboglot.console.studio.class_requests import Member
 from roboglot.console.studio.classroom import Room
 from roboglot.console.studio.mistakes import explain
 from roboglot.console.studio.programs import Programs

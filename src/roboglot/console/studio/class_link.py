@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from roboglot.console.studio.class_wishes import Member
+from roboglot.console.studio.class_requests import Member
 from roboglot.console.studio.classroom import Place, Tell
 from roboglot.model.errors import NotFound, Refused, RobotError
 

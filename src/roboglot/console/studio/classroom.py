@@ -16,7 +16,7 @@ from typing import Protocol
 import msgspec
 
 from roboglot.console.studio.class_files import Bag, ClassFiles
-from roboglot.console.studio.class_wishes import Doing, Member
+from roboglot.console.studio.class_requests import Doing, Member
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.errors import NotFound, Refused
 from roboglot.values import dataclass

@@ -18,10 +18,10 @@ from roboglot.programs.worker.environment import build_builtins
 from roboglot.programs.worker.frames import ERROR_MAX
 from roboglot.programs.worker.link import EXIT_MEMORY, HALT, NOTHING, HostLink
 from roboglot.programs.worker.modules import build_modules
+from roboglot.programs.worker.position import Whereabouts
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.programs.worker.roots import build_enums, build_roots
 from roboglot.programs.worker.variables import UNIT, Variables
-from roboglot.programs.worker.whereabouts import Whereabouts
 
 EXIT_DONE, EXIT_BROKEN, EXIT_UNTOLD = 0, 70, 72
 """Exit codes: success, a fault of ours, and (of the probe) a Python with an unknown layout of lists."""

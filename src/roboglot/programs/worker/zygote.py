@@ -26,8 +26,8 @@ from typing import Any
 
 from roboglot.programs.worker import child, lockdown
 from roboglot.programs.worker.frames import CONTROL_MAX
+from roboglot.programs.worker.position import Whereabouts
 from roboglot.programs.worker.seccomp import SOCKET_FD, SeccompUnavailable
-from roboglot.programs.worker.whereabouts import Whereabouts
 
 _DESCRIPTORS = 2
 _PROBE_CPU, _PROBE_MEMORY = 5, 64 * 1024 * 1024

@@ -27,7 +27,7 @@ from roboglot.protocols.ros2.intake import Intake
 from roboglot.protocols.ros2.table import PUBLISHED
 from roboglot.protocols.ros2.vocabulary import DOOR, TYPES
 from roboglot.protocols.turns import Turns
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.wire.ros2.zenoh import KEPT, RELIABLE, Node, Sender, topic_key
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ class Ros2Door:
         self._publishers: dict[str, zenoh.Publisher | AdvancedPublisher] = {}
         self._senders = defaultdict[str, Sender](Sender)
         self._numbers = 0
-        self._seldom = Seldom(log)
-        self._heard = Intake(PENDING_MAX, partial(self._seldom.warning, "full", FULL, robot.id))
+        self._log_limiter = LogLimiter(log)
+        self._heard = Intake(PENDING_MAX, partial(self._log_limiter.warning, "full", FULL, robot.id))
         self._turns = Turns(robot, f"{DOOR} {robot.id}:zenoh")
         self._called = False  # by a thread of Zenoh's, to take what was heard
         self._answering: asyncio.Task[None] | None = None

@@ -24,7 +24,7 @@ from roboglot.protocols.vda5050.context import Context
 from roboglot.protocols.vda5050.dispatch import answer
 from roboglot.protocols.vda5050.error_book import Error
 from roboglot.protocols.vda5050.intake import Intake, stops
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.wire.vda5050.versions import VERSIONS
 
 log = logging.getLogger(__name__)
@@ -57,7 +57,7 @@ class Vda5050Door:
         self._task: asyncio.Task[None] | None = None
         self._client: Any = None
         self._turns = Turns(robot, f"{self.name} {robot.id}:broker")
-        self._seldom = Seldom(log)
+        self._log_limiter = LogLimiter(log)
         self._sent: object = None  # the last state sent, rounded, and when (robot time)
         self._sent_at = 0.0
         self._rests = False  # hibernation was announced
@@ -102,7 +102,7 @@ class Vda5050Door:
             try:
                 await self._serve(host, port)
             except (aiomqtt.MqttError, OSError) as error:
-                self._seldom.warning(
+                self._log_limiter.warning(
                     "dial", "robot %s: no fleet control at %s:%d: %s", self._robot.id, host, port, error
                 )
             except SwitchedOff:
@@ -212,7 +212,7 @@ class Vda5050Door:
         except (aiomqtt.MqttError, OSError):
             raise
         except Exception:  # noqa: BLE001 - it is logged, with its traceback
-            self._seldom.error(name, "robot %s: sending %s to fleet control broke", self._robot.id, name)
+            self._log_limiter.error(name, "robot %s: sending %s to fleet control broke", self._robot.id, name)
 
     @property
     def _is_off(self) -> bool:

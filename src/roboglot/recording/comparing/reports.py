@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from xml.etree import ElementTree
 
-from roboglot.hosting.visible import xml_text
+from roboglot.hosting.escaping import xml_text
 from roboglot.recording.comparing.comparison import Comparison, Row
 
 STYLE = (

@@ -12,12 +12,12 @@ from typing import cast
 
 from roboglot.model.clock import Clock
 from roboglot.transport.listening import listen
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.transport.tls import Tls, TlsCall, TlsPort
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
-seldom = Seldom(log)
+limited_log = LogLimiter(log)
 CONNECT_SECONDS = 10.0
 CONNECTIONS_MAX = 256
 DELAYS_MAX = 100_000
@@ -236,7 +236,7 @@ class Crossing:
             await self._clock.wait_for(to.dial(made), CONNECT_SECONDS)
         except (OSError, TimeoutError) as error:
             why = (error.strerror or str(error) or "it takes too long").lower()
-            seldom.warning(to.host, "%s:%d cannot be reached for %s:%d: %s", to.host, to.port, *came.peer, why)
+            limited_log.warning(to.host, "%s:%d cannot be reached for %s:%d: %s", to.host, to.port, *came.peer, why)
             came.transport.abort()
             return
         if came.transport.is_closing():

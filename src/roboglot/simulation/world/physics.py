@@ -28,9 +28,9 @@ from roboglot.simulation.building.things import Things
 from roboglot.simulation.building.walls import Walls
 from roboglot.simulation.people.people import keyed
 from roboglot.simulation.people.person_state import STRIDE_MAX
+from roboglot.simulation.world.contact_switch import Meetings, rests
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.gliding import Gliding
-from roboglot.simulation.world.meetings import Meetings, rests
 from roboglot.simulation.world.rays import Rays
 from roboglot.simulation.world.scene import TIMESTEP, VISITORS_MAX, build, visitors
 

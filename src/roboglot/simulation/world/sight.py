@@ -21,7 +21,7 @@ from roboglot.simulation.building.props import Props
 from roboglot.simulation.building.terrain import slices_of
 from roboglot.simulation.building.things import Thing
 from roboglot.simulation.people.people import Walker
-from roboglot.simulation.world import gloss
+from roboglot.simulation.world import reflections
 from roboglot.simulation.world.description import Terrain, WorldDescription
 from roboglot.simulation.world.sweep import (
     Distances,
@@ -136,7 +136,7 @@ class Sight:
         )
         c, s = math.cos(hull.turned), math.sin(hull.turned)
         eye, there = np.array([[hull.x, hull.y]]), ways @ np.array([[c, s], [-s, c]])
-        found = gloss.seen(behind, glass, mirrors, edges, circles, eye, there)
+        found = reflections.seen(behind, glass, mirrors, edges, circles, eye, there)
         found[found > reach] = np.inf
         return found
 

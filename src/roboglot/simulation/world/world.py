@@ -47,7 +47,7 @@ from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.environment import Environment
 from roboglot.simulation.world.hands import Hands
-from roboglot.simulation.world.pace import Pace
+from roboglot.simulation.world.lag_monitor import Pace
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
 from roboglot.simulation.world.randomness import Chances

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import msgspec
 
-from roboglot.shards.warmth import ENVIRONMENT
+from roboglot.shards.warm_up import ENVIRONMENT
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, play_trial
 from roboglot.values import dataclass
 

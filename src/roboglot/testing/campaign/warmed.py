@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 import roboglot.testing.scenarios.runner  # noqa: F401 - for those that are forked from here
-from roboglot.shards.warmth import warm
+from roboglot.shards.warm_up import warm
 
 warm()

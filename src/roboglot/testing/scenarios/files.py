@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.spelling import instead
-from roboglot.testing.wanted import SPEED, Wanted, WantedFault
+from roboglot.testing.requirements import SPEED, Wanted, WantedFault
 from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 

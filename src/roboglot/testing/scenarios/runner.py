@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
-from roboglot.hosting.visible import xml_text
+from roboglot.hosting.escaping import xml_text
 from roboglot.testing.artifacts import folder_of, save
 from roboglot.testing.scenarios.checks import Checker
 from roboglot.testing.scenarios.files import Found

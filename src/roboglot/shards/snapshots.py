@@ -32,7 +32,7 @@ class _Newest(Generic[T]):
         return await asyncio.shield(task)
 
 
-class Glances:
+class Snapshots:
     """Polls the robots of one fleet, once for all pages."""
 
     def __init__(self, fleet_host: FleetHost, client: Callable[[str], ConsoleClient] = ConsoleClient) -> None:

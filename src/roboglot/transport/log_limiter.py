@@ -9,7 +9,7 @@ PERIOD = 10.0  # s
 KINDS_MAX = 1024
 
 
-class Seldom:
+class LogLimiter:
     """Logs through ``log``; repetitions of a key within PERIOD become debug lines."""
 
     def __init__(self, log: logging.Logger) -> None:

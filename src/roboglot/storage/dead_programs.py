@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 from roboglot.storage.homes import Homes
 from roboglot.storage.residence import LEASE, PERIOD, uptime
 from roboglot.storage.transactions import DatabaseError
-from roboglot.transport.seldom import Seldom
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -63,7 +63,7 @@ class Silence:
 
     async def look_always(self) -> None:
         """Check regularly, even after failures of the registry."""
-        seldom = Seldom(log)
+        seldom = LogLimiter(log)
         while True:
             try:
                 await self.look()

@@ -14,7 +14,7 @@ from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose
-from roboglot.simulation.world import gloss
+from roboglot.simulation.world import reflections
 from roboglot.storage.database import Database
 
 ROOM = """
@@ -45,7 +45,7 @@ async def ranges_at(file: Path, body: str) -> NDArray[np.float32]:
 
 
 async def test_glass_and_mirrors_matter_unless_sensors_are_clean(tmp_path: Path) -> None:
-    file = tmp_path / "gloss.toml"
+    file = tmp_path / "reflections.toml"
     file.write_text(ROOM)
     usual, clean = await ranges_at(file, "universal"), await ranges_at(file, "universal+clean")
     assert (usual[180], clean[180]) == (pytest.approx(2.94, abs=0.05), pytest.approx(2.94, abs=0.05))  # square
@@ -63,7 +63,7 @@ def test_where_nothing_is_met_there_is_nothing() -> None:
     none, eye, way = np.empty((0, 4)), np.zeros((1, 2)), np.array([[1.0, 0.0]])
     mirror = np.array([[2.0, 1.0, 2.0, -1.0]])  # seen from the left
     behind = np.array([np.inf])
-    assert np.isinf(gloss.seen(behind, none, mirror, none, none, eye, way)).all()
-    assert np.isinf(gloss.seen(behind, none, mirror[:, [2, 3, 0, 1]], none, none, eye, way)).all()
+    assert np.isinf(reflections.seen(behind, none, mirror, none, none, eye, way)).all()
+    assert np.isinf(reflections.seen(behind, none, mirror[:, [2, 3, 0, 1]], none, none, eye, way)).all()
     ball = np.array([[-3.0, 0.0, 0.5, 0.0]])
-    assert gloss.seen(behind, none, mirror, none, ball, eye, way) == pytest.approx([2.0 + 5.0 - 0.5])
+    assert reflections.seen(behind, none, mirror, none, ball, eye, way) == pytest.approx([2.0 + 5.0 - 0.5])
