@@ -9,7 +9,7 @@ STDERR = 2
 
 
 def hold_standard_files() -> None:
-    """Open those that are closed, before a library's file or a socket gets such a number, and is read as our input.
+    """Open closed standard files, before a library or a socket gets one of their numbers and is read as input.
 
     uvloop aborts if one of its own descriptors has such a number.
     """
@@ -35,9 +35,9 @@ def _start_warm(words: list[str]) -> None:
 
 
 def run() -> None:
-    """Load the command line and run it; SIGINT has Python's own handler again once it is loaded.
+    """Load the command line and run it; SIGINT gets Python's own handler back once that is loaded.
 
-    Loading leaves hardly any garbage: the collector, which would look at all of it many times, begins with a command.
+    Garbage collection starts with the command: imports leave hardly any garbage, and would be scanned many times.
     """
     gc.disable()
     hold_standard_files()

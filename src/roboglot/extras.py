@@ -151,7 +151,11 @@ def lazy(module: str) -> object:
 
 
 def open_uvicorn() -> None:
-    """Let modules of uvicorn be imported without its command line (1.5 MB), which comes once it is asked for."""
+    """Put a package ``uvicorn`` into ``sys.modules`` whose own ``__init__`` runs only when a name of it is used.
+
+    It imports uvicorn's command line (1.5 MB in each process), which the doors and the console do not use; Python has
+    no other way to import a package's modules without its ``__init__``.
+    """
     if "uvicorn" in sys.modules or (spec := find_spec("uvicorn")) is None or (loader := spec.loader) is None:
         return
     package = module_from_spec(spec)

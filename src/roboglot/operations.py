@@ -44,7 +44,7 @@ class BadParameters(ValueError):
 
 
 class Schema:
-    """Schema that a handler's signature is; read when it is first asked for, as most operations never are."""
+    """Schema of a handler, from its signature; read at the first use, as most operations are never called."""
 
     def __init__(self, handler: Callable[..., object]) -> None:
         self._handler = handler
@@ -72,12 +72,12 @@ class Schema:
 
 @dataclass(frozen=True, slots=True)
 class Operation(Generic[K]):
-    """One handler under its wire name: a coroutine function if it may wait, else a plain one, which answers at once.
+    """One handler under its wire name: a coroutine function if it may wait, else a plain one.
 
-    ``partial``: the missing part in plain words; empty if the operation is
-    complete. The coverage page counts only complete ones. ``right``: the right that a client needs; None, which a test
-    refuses, means ADMIN. ``needs``: components of the robot without which the handler refuses; ``some``: those that
-    only some values of its parameters need.
+    ``partial``: the missing part in plain words; empty if the operation is complete. The coverage page counts only
+    complete ones. ``right``: the right that a client needs; None, which a test refuses, means ADMIN. ``needs``:
+    components of the robot without which the handler refuses; ``some``: those that only some values of its parameters
+    need.
     """
 
     key: K

@@ -18,7 +18,7 @@ C = TypeVar("C", bound=type)
 
 
 class _Factory:
-    """Default of a parameter whose value a function makes."""
+    """Default of a parameter that has a default factory."""
 
     def __repr__(self) -> str:
         return "<factory>"
@@ -28,7 +28,7 @@ FACTORY = _Factory()
 
 
 class _Later:
-    """Method of a class that is made when it is looked up for the first time, and then replaces this."""
+    """Descriptor that compiles a method at its first use, and is then replaced by it."""
 
     __slots__ = ("_frozen", "_name", "_owner")
 
@@ -57,7 +57,7 @@ else:
         kw_only: bool = False,
         order: bool = False,
     ) -> C | Callable[[C], C]:
-        """Do what the library's decorator does with these options, as late as possible."""
+        """Act as the library's decorator, but compile methods at their first use."""
         if order:
             return dataclasses.dataclass(plain, frozen=frozen, slots=slots, eq=eq, kw_only=kw_only, order=True)
 
@@ -75,7 +75,7 @@ else:
 
 
 def make_initialisers() -> None:
-    """Make the ``__init__`` of all classes now, for processes that are forked from this one."""
+    """Compile ``__init__`` of all classes now, for processes that are forked from this one."""
     for found in gc.get_objects():
         if type(found) is _Later and found._name == "__init__" and vars(found._owner).get("__init__") is found:
             _Later.__get__(found, None)  # type: ignore[arg-type] # mypy takes it for what it is compared with
@@ -87,7 +87,7 @@ def _is_unhashable_by_eq(plain: type) -> bool:
 
 
 def _check(made: type, *, frozen: bool) -> None:
-    """Refuse what the library refuses, and what is not made here. Raises TypeError."""
+    """Raise TypeError for what the library refuses, and for what is not supported here."""
     for field in vars(made)["__dataclass_fields__"].values():
         if field._field_type is vars(dataclasses)["_FIELD_INITVAR"]:  # fields() leaves these out
             raise TypeError(f"{made.__name__}.{field.name} is an InitVar: use the library's dataclass")
@@ -105,7 +105,7 @@ def _check(made: type, *, frozen: bool) -> None:
 
 
 def _give_methods(made: type, own: set[str], *, frozen: bool, eq: bool) -> None:
-    """Give a class those methods that it has not defined."""
+    """Add the methods that a class does not define."""
     names = ["__init__", "__repr__"]
     if eq:
         names.append("__eq__")

@@ -128,7 +128,7 @@ class Tools:
         return Image(data=await _answer_of(self._console.fetch("robots", robot, "map.png")), format="png")
 
     async def go_to(self, x: Meters, y: Meters, robot: Robot = DEFAULT, wait: Wait = 60.0) -> dict[str, object]:
-        """Drive to a point of the map around obstacles; tells how it ended."""
+        """Drive to a point of the map around obstacles; return the outcome."""
         return await self._act(robot, "go_to", {"points": [[x, y]]}, wait)
 
     async def drive(

@@ -12,7 +12,7 @@ import sys
 import threading
 from collections.abc import Callable
 
-TYPE_CHECKING = False  # and no ``typing``: what starts warm is to be found in few milliseconds
+TYPE_CHECKING = False  # without importing ``typing``, as a warm start takes only some milliseconds
 if TYPE_CHECKING:
     from typing import NoReturn
 

@@ -58,7 +58,7 @@ def state_of(robot: Robot) -> dict[str, object]:
         "parts": [name for name, interface in PARTS.items() if interface in robot],
         "absent": [
             verb.key for verb in VERBS if any(part not in robot for part in verb.needs)
-        ],  # what it has no part for
+        ],  # verbs of missing parts
         "actions": [plain_values.action(action, robot.clock.time()) for action in robot.actions.running()],
         "history": [plain_values.action(action, robot.clock.time()) for action in reversed(robot.actions.history)],
         "control": _control(robot),

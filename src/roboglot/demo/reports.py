@@ -14,7 +14,7 @@ APART_DEGREES = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """``words``: as the protocol says it; ``pose``: the same in metres and rad, y left, counter-clockwise."""
+    """``words``: in the protocol's form; ``pose``: in metres and rad, y left, counter-clockwise."""
 
     protocol: str
     words: str

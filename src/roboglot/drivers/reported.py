@@ -97,7 +97,7 @@ class ReportedBattery(Battery):
 
 
 class ReportedDockContact(DockContact):
-    """Dock contact as reported: true while the robot says that it charges on its dock."""
+    """Dock contact as reported: true while the robot reports charging on its dock."""
 
     def __init__(self, reported: Callable[[], bool]) -> None:
         self._reported = reported

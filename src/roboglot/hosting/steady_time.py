@@ -1,4 +1,4 @@
-"""Unix time that goes on evenly: what is to last for a while is not ended or prolonged when the clock is set."""
+"""Unix time that setting the clock does not change, for sessions and rights of limited duration."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 
 
 class SteadyTime:
-    """The system's Unix time (s) when it was made, plus the time since, in which the machine may have slept."""
+    """Unix time (s) at its creation, plus the elapsed time, sleep of the machine included."""
 
     def __init__(self) -> None:
         self._ahead = time.time() - _uptime()

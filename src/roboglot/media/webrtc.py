@@ -146,7 +146,7 @@ class _SoundTrack(_PacketTrack[AudioPacket]):
 class VideoCall:
     """Call of one viewer. ``changed(state)`` receives aiortc's connection states, and "blind" after the last picture.
 
-    ``sound`` is also sent to a viewer that asks for it.
+    ``sound`` is also sent to a viewer that requests it.
     """
 
     def __init__(

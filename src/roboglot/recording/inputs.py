@@ -28,7 +28,7 @@ AT_ONCE = 1e-9  # s of robot time
 DRAINED = (TextLine, FrameLine, FoxgloveLine)  # connections of which answers are read, and not waited for
 Place = tuple[str, str, str]  # robot, door, the client's end
 Where = Callable[[Place], Line | None]
-Key = tuple[str, str, str]  # robot, door, and what is heard
+Key = tuple[str, str, str]  # robot, door or name, direction or kind
 Repeat = Callable[[Input], Awaitable[object]]
 
 
@@ -53,7 +53,7 @@ class Inputs:
         self._due = sorted(due, key=lambda one: one[0])  # an input precedes the exchange with the same number
         replies = enumerate(recording.exchanges)
         self._replies = [(n, one) for n, one in replies if one.direction is Direction.REPLY and is_of_client(one)]
-        self._answered = 0  # exchanges that should have been heard so far
+        self._answered = 0  # exchanges expected so far
         self._wanted: Counter[Key] = Counter()
         self._lines: dict[Place, Line] = {}
         self._calls: dict[tuple[Place, str, float], asyncio.Task[None]] = {}

@@ -49,7 +49,7 @@ def status_of(door: str, payload: bytes) -> str:
 
 
 class Line(ABC):
-    """``open`` and ``close`` it; ``ask`` sends one request and returns the answers. Raises ClientError.
+    """``open`` and ``close`` it; ``request`` sends one request and returns the answers. Raises ClientError.
 
     ``comes``: the robot notices the opening. ``own``: local address of this machine; empty: any.
     """
@@ -178,7 +178,7 @@ class FrameLine(Line):
         path = operation if operation.startswith("/") else FRAMES
         socket = await self._socket(path)
         await socket.send(payload.decode("utf-8", "replace"))
-        wanted, found = _frame_id(payload) or "", Answers()  # what has no id is answered with an empty one
+        wanted, found = _frame_id(payload) or "", Answers()  # a frame without id is answered with an empty one
         while len(found) < len(answers):
             frame = await self._next(socket, operation)
             if path != FRAMES or _frame_id(frame) == wanted:

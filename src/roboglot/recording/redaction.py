@@ -1,8 +1,8 @@
 """Redacts confidential data in messages: passwords, tokens, Wi-Fi keys, names and faces of people.
 
-Fields say what is confidential; their values are redacted from then on wherever they are quoted (``secrets.py``).
-Works on bytes: the rest of a message stays the same, byte for byte. Photos and films of real robots, which may show
-anyone, keep only their size.
+Fields determine which values are confidential; these are redacted from then on wherever they are quoted
+(``secrets.py``). Works on bytes: the rest of a message stays the same, byte for byte. Photos and films of real robots,
+which may show anyone, keep only their size.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ FIELDS = (
     "face_img",
     "host_face",
 )
-# Operations with people's or a network's name in a field that elsewhere says something else; by door and key.
+# Operations with a person's or network's name in a field that has another meaning elsewhere; by door and key.
 FIELDS_OF = {
     ("cyberdog", "1001"): ("name",),  # of the Wi-Fi
     ("cyberdog", "1021"): ("name",),  # of members
@@ -225,7 +225,7 @@ def _walk(value: object, found: list[bool]) -> None:
 
 
 def _people_by_place(fields: Sequence[re.Match[bytes]], payload: bytes) -> list[re.Match[bytes]]:
-    """Return people's descriptions in what is no JSON: in one object (no brace between), fields in any order."""
+    """Return people's descriptions in text other than JSON: in one object (no brace between), fields in any order."""
     objects: dict[bytes, list[list[re.Match[bytes]]]] = {}  # by their form of quotes
     for field in fields:
         found = objects.setdefault(field[1], [])

@@ -76,7 +76,7 @@ def join(where: str) -> None:
             )
             return
         address = f"{where}:{CLIENT_PORT}" if where.startswith("ray://") and where.count(":") == 1 else where
-        with warnings.catch_warnings(action="ignore"):  # the error says it
+        with warnings.catch_warnings(action="ignore"):  # the error has the reason
             ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
     except Exception as error:  # noqa: BLE001 - Ray raises bare ones, too
         lines = str(error).strip().splitlines() or [type(error).__name__]

@@ -142,7 +142,7 @@ class Database:
             self._connection.execute("PRAGMA query_only=OFF")
 
     def close(self) -> None:
-        """Finish what is queued, then close the file."""
+        """Finish queued work, then close the file."""
         if self._reader is not None:
             self._reader.close()
         self._thread.submit(self._connection.close).result()
@@ -177,7 +177,7 @@ class _Reader:
                 self._connection.execute("ROLLBACK")
 
     def close(self) -> None:
-        """Finish what is queued, then close the file."""
+        """Finish queued work, then close the file."""
         self.thread.submit(self._close).result()  # behind a first read, which opens it
         self.thread.shutdown()
 

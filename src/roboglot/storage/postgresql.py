@@ -181,7 +181,7 @@ class PostgreSQL:
         return connection
 
     def close(self) -> None:
-        """Finish what is queued, then close the connections."""
+        """Finish queued work, then close the connections."""
         self._threads.shutdown()
         self._readers.shutdown()
         for connection in self._opened:

@@ -32,7 +32,7 @@ Handler = Callable[[R, grpc.aio.ServicerContext], Coroutine[object, object, None
 
 
 async def _nothing(*_: object) -> None:
-    """Answer no more."""
+    """Send nothing further."""
 
 
 _end_stream, _end_call = (getattr(cygrpc, name, _nothing) for name in _TAKES)
@@ -46,7 +46,7 @@ class Answers(Protocol[R]):
 
 @dataclass(frozen=True, slots=True)
 class _Ended:
-    """The handler behind a streaming one, its messages' encoding, and what is held while the last one is sent."""
+    """A streaming handler's inner handler, its message encoding, and the context held while sending the last one."""
 
     answers: Callable[..., Awaitable[object]]
     encode: Callable[..., bytes]

@@ -44,7 +44,7 @@ class NotTrusted(ConnectionError):
 
 
 class Refused(ConnectionError):
-    """The gateway does not let this client in; the message says why."""
+    """The gateway refuses this client; the message has the reason."""
 
 
 class Trust(Protocol):

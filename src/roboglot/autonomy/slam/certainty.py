@@ -98,7 +98,7 @@ class Look:
 
     @property
     def is_exact(self) -> bool:
-        """Return whether nearly all points are close to surfaces, and hardly a ray contradicts the pose."""
+        """Return whether nearly all points are close to surfaces, and almost no ray contradicts the pose."""
         return self.exact >= EXACT and self.hidden <= EXACT_HIDDEN and self.crossing <= SURE_CROSSING
 
     def is_outdone_by(self, other: Look) -> bool:

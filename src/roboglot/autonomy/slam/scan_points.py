@@ -82,7 +82,7 @@ class ScanReader:
         self._rays_of = rays_of
 
     def read(self, scan: LaserScan) -> ScanPoints:
-        """Return the scan's points, computed once; empty if hardly a ray has an echo."""
+        """Return the scan's points, computed once; empty if almost no ray has an echo."""
         if self._last is None or self._last[0] is not scan:
             self._last = scan, self._compute(scan)
         return self._last[1]

@@ -184,7 +184,7 @@ class Slam:
         stands = way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD
         if stands and not (self._is_unsure or belief.asked):
             return
-        # What is known to stand there says nothing about the map.
+        # Objects known to stand there are no evidence on the map.
         scan = belief.reader.read(event.scan).beside(belief.map_to_odom.compose(odometry), belief.others)
         if len(scan.points) < POINTS_MIN:
             belief.quality *= 1.0 - QUALITY_GAIN

@@ -23,7 +23,7 @@ from roboglot.hosting.error_text import in_words
 from roboglot.hosting.event_loop import run
 from roboglot.protocols.record_desk import NAME, Answer, Request
 
-SWITCH = 0.0002  # s that the thread which writes keeps what passes waiting; Python's own 5 ms can be seen
+SWITCH = 0.0002  # s that the writing thread may hold the interpreter's lock; Python's own 5 ms delay messages
 PATIENCE = 30.0  # s: a long ring takes a while to write
 EPILOG = "A URL instead of a command records a real robot: roboglot record slamware://192.168.11.1 --listen 127.0.0.9"
 

@@ -1,6 +1,6 @@
-"""Starts a command in the warm parent of this installation, and stands for it: signals go in, its status comes out.
+"""Starts a command in the warm parent of this installation, forwards signals to it, and ends with its status.
 
-Without a parent the command starts cold, as ever, and a parent is started for the next one. ``python -m
+Without a parent the command starts cold, and a parent is started for the next one. ``python -m
 roboglot.cli.warm.command -c CODE`` is ``python -c CODE`` of a warm interpreter, for workers of pytest-xdist.
 """
 
@@ -29,7 +29,7 @@ def run(kind: str, words: list[str]) -> int | None:
     """Run a command in the parent; return its exit status, negative for a signal. None: there is no parent."""
     if not installation.is_wanted(os.environ):
         return None
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # what comes from now on is for the command
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # signals from now on are for the command
     try:
         path = installation.socket_path(os.environ)
         parent = _connected(path, kind, words)
@@ -45,7 +45,7 @@ def run(kind: str, words: list[str]) -> int | None:
 
 
 def end_like(status: int) -> None:
-    """End this process as the one it stood for."""
+    """End this process with the status of the command."""
     if status < 0:
         with contextlib.suppress(OSError, ValueError):  # some signals have no default action that ends
             signal.signal(-status, signal.SIG_DFL)
@@ -55,7 +55,7 @@ def end_like(status: int) -> None:
 
 
 def launch(path: str) -> None:
-    """Start a parent for the next command, unless one is being started. It ends by itself."""
+    """Start a parent for the next command, unless one is starting. It ends by itself."""
     import subprocess
 
     with contextlib.suppress(OSError), open(f"{path}.log", "wb") as log:
@@ -81,7 +81,7 @@ def _is_locked(path: str) -> bool:
 
 
 def _connected(path: str, kind: str, words: list[str]) -> socket.socket | None:
-    """Return a connection on which the command was started; None if no parent has these sources. Raises OSError."""
+    """Start the command and return its connection; None without a parent of these sources. Raises OSError."""
     descriptors = _inherited()  # first: a socket would get the number of one that is closed
     wish = ascii(_wish(kind, words, descriptors)).encode()  # a parent that is connected waits for it
     parent = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -132,7 +132,7 @@ def surroundings() -> dict[str, object]:
 
 
 def _stand_for_it(parent: socket.socket, mask: set[int | signal.Signals]) -> int:
-    """Pass signals on, those of ``mask`` excepted, until the command has ended; return its status."""
+    """Forward signals, except those of ``mask``, until the command has ended; return its status."""
 
     def pass_on(number: int, _: object) -> None:
         with contextlib.suppress(OSError):
@@ -159,7 +159,7 @@ def _stand_for_it(parent: socket.socket, mask: set[int | signal.Signals]) -> int
 
 
 def main(words: list[str]) -> None:
-    """Be ``python`` with these arguments, of which ``-u`` is of no use and ``-c CODE`` is the last but its words."""
+    """Act as ``python`` with these arguments: ``-u`` has no effect, ``-c CODE`` is followed by its own arguments."""
     code = words[words.index("-c") + 1 :]
     status = run(CODE, code)
     if status is None:

@@ -1,4 +1,4 @@
-"""The installation as a warm parent has loaded it: its socket's folder, its name there, and the state of its sources.
+"""Identity of an installation for its warm parent: folder and name of the socket, and a stamp of the sources.
 
 Imports little, because every command that may start warm reads it first.
 """
@@ -61,7 +61,7 @@ def name_of(environment: Mapping[str, str]) -> str:
 
 
 def rights_of(process: int | str) -> list[str]:
-    """Return what a process may do, and the namespaces that it is in. Raises OSError."""
+    """Return the credentials and namespaces of a process. Raises OSError."""
     with open(f"/proc/{process}/status", encoding="utf-8", errors="replace") as status:
         rights = [line for line in status if line.startswith(CREDENTIALS)]
     ours = [kind for kind in NAMESPACES if os.path.exists(f"/proc/self/ns/{kind}")]

@@ -31,7 +31,7 @@ from roboglot.cli.warm.command import CODE, DESCRIPTORS_MAX, LENGTH, MESSAGE_MAX
 from roboglot.shards.warm_up import ENVIRONMENT, ended, fork, modules_of, wake_at_ends, warm
 
 IDLE = 300.0  # s
-SLOW_MAX = 2.0  # s for a caller to say what it wants
+SLOW_MAX = 2.0  # s for a caller to send its request
 LAST_SECONDS = 3.0  # s between SIGTERM and SIGKILL for a command that has lost its caller
 CALLERS_MAX = 64
 COMMANDS = ("program", "test", "lesson")
@@ -43,7 +43,7 @@ OPEN_MAX = 1 << 16
 
 
 class Wanted(TypedDict):
-    """A command and what it would have inherited from its caller."""
+    """A command and everything that it inherits from its caller."""
 
     stamp: str
     kind: str
@@ -128,7 +128,7 @@ class WarmParent:
             caller.close()
 
     def _read(self, caller: socket.socket, descriptors: list[int]) -> Wanted:
-        """Return what a caller wants; its descriptors are added. Raises OSError, ValueError."""
+        """Read a caller's request and descriptors. Raises OSError, ValueError."""
         credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, PEER.size)
         pid, uid, _ = PEER.unpack(credentials)
         if uid != os.getuid() or installation.rights_of(pid) != self._rights:
@@ -157,7 +157,7 @@ class WarmParent:
         return pid
 
     def _forward_signals(self, descriptor: int) -> bool:
-        """Send the command the signals that its caller got; return False if the caller has gone."""
+        """Forward the caller's signals to its command; return False if the caller has gone."""
         pid, caller = self._callers[descriptor]
         try:
             numbers = caller.recv(64)
@@ -202,7 +202,7 @@ class WarmParent:
 
 
 def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], None]) -> NoReturn:
-    """Become the command, in the fork, with all that its caller would have given it; ``run`` runs it."""
+    """Turn the fork into the command with everything inherited from its caller, and call ``run``."""
     try:
         _take(descriptors, wanted["descriptors"])
         for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}:
@@ -231,7 +231,7 @@ def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], No
 
 
 def _take(descriptors: list[int], numbers: list[int]) -> None:
-    """Give descriptors the numbers (ascending) that they had at the caller's, and close all others."""
+    """Move descriptors to the numbers (ascending) that they have in the caller, and close all others."""
     copies = [fcntl.fcntl(given, fcntl.F_DUPFD, numbers[-1] + 1) for given in descriptors]
     for copy, number in zip(copies, numbers, strict=True):
         os.dup2(copy, number)
@@ -240,7 +240,7 @@ def _take(descriptors: list[int], numbers: list[int]) -> None:
 
 
 def _signal(pid: int, number: int) -> None:
-    """Signal a command that was not reaped yet, so that its number is its own; its group, where a terminal would."""
+    """Signal a command not reaped yet, whose pid is thus valid; its group, as a terminal would."""
     with contextlib.suppress(OSError, ValueError):
         if number == signal.SIGTERM:
             os.kill(pid, number)

@@ -15,7 +15,7 @@ READ_MAX = 65536  # bytes at a time
 
 
 class EventLink:
-    """Hands each event's text to ``heard``, as the bytes of one line."""
+    """Calls ``heard`` with each event's text, as the bytes of one line."""
 
     def __init__(self, clock: Clock, port: int, heard: Callable[[bytes], None]) -> None:
         self._clock, self._port, self._heard = clock, port, heard

@@ -14,7 +14,7 @@ Listener = Callable[[Telemetry], object]
 
 
 class Listeners:
-    """Listeners of one client, until ``close``; ``noting``, where there is one, keeps what was heard."""
+    """Listeners of one client, until ``close``; ``noting``, if set, records received messages."""
 
     def __init__(self) -> None:
         self.noting: Noting | None = None

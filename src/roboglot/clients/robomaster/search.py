@@ -14,7 +14,7 @@ BACK_OFF = (0.5, 1.0, 2.0, 5.0)  # s between attempts to reconnect; the last val
 
 
 class Search:
-    """``attempt`` connects, or raises ClientError; ``found`` tells whether the link stands then."""
+    """``attempt`` connects, or raises ClientError; ``found`` returns whether the link is up."""
 
     def __init__(
         self, clock: Clock, host: str, attempt: Callable[[], Awaitable[object]], found: Callable[[], bool]

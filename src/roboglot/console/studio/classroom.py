@@ -112,7 +112,7 @@ class Seated(Protocol):
     """One page's place in a classroom."""
 
     async def take(self, wish: Member, *, may_teach: bool) -> None:
-        """Do what the page wishes. Raises NotFound, Refused, unless its ``post`` hears that."""
+        """Execute a page's request. Raises NotFound and Refused, or posts them."""
 
     def at(self, robot: str) -> None:
         """The page works with this robot from now on."""
@@ -134,7 +134,7 @@ class Room(Protocol):
         """Have a class for this program's own world."""
 
     async def close(self, code: str) -> None:
-        """End a class, with what was handed in."""
+        """End a class and delete its hand-ins."""
 
     async def admit(self, code: str, name: str) -> Place:
         """Return the world of a pupil with a class's code. Raises NotFound, Refused."""
@@ -170,7 +170,7 @@ class Classroom:
         await self.begin(name, code)
 
     async def close(self, code: str) -> None:
-        """End it, with what was handed in."""
+        """End the class and delete its hand-ins."""
         await self.end(code)
 
     async def begin(self, name: str, code: str = "", only: str = "") -> Class:
@@ -197,7 +197,7 @@ class Classroom:
                 log.error("cannot store class %s: %s", kept.code, error)
 
     async def end(self, code: str) -> None:
-        """Forget a class, with what was handed in; pages in it hear that."""
+        """Delete a class with its hand-ins; its pages are notified."""
         if (ended := self.classes.pop(code, None)) is None:
             return
         for seat in [*ended.teachers, *(pupil.seat for pupil in ended.pupils.values() if pupil.seat is not None)]:
@@ -269,7 +269,7 @@ class Seat:
             self._class.notify_teachers()
 
     async def take(self, wish: Member, *, may_teach: bool) -> None:
-        """Do what the page wishes. Raises NotFound, Refused."""
+        """Execute a page's request. Raises NotFound, Refused."""
         match wish.do:
             case "open":
                 await self._open(wish, may_teach)

@@ -43,7 +43,7 @@ class Happening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Wrong(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A typical mistake, and the kind of the check that finds it ("ends" also for what is no program)."""
+    """A typical mistake, and the kind of the check that finds it ("ends" also for an invalid program)."""
 
     program: str
     fails: str

@@ -199,7 +199,7 @@ class AppLink:
                 if not heard:
                     began -= HEARTBEAT_PERIOD * early_share(self._address)
                 heard, last = True, self._clock.time()
-                if not known:  # it found the app, which has heard it
+                if not known:  # the app was found and has answered
                     self._note(ticks)
                 self._set_connected(True)
                 self._answer(self._asking[:asked], True)

@@ -30,7 +30,7 @@ class Calls(Protocol):
 def add_calls(
     server: grpc.aio.Server, calls: Calls, holding: Callable[[], AbstractContextManager[None]] = nullcontext
 ) -> None:
-    """Have ``server`` serve ``calls``, ``holding`` what is held while a last answer is sent."""
+    """Have ``server`` serve ``calls``; ``holding`` is held while a last answer is sent."""
     read = reading(pb.SendRequest.FromString)
     written, chunk, result = pb.RecResponse.SerializeToString, pb.FileChunk, pb.Result
     answering = ending_with_last(calls.sendMsg, written, holding)

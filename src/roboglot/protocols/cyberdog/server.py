@@ -99,7 +99,7 @@ class CyberDogDoor:
         self._context.app.start()
 
     async def close(self) -> None:
-        """Stop listening, end all streams and what they commanded."""
+        """Stop listening, end all streams and the actions that they commanded."""
         while self._cleanup:
             self._cleanup.pop()()
         if self._resting:

@@ -1,4 +1,4 @@
-"""The three calls of the gRPC service: who calls, whose turn it is, and what is sent."""
+"""The three calls of the gRPC service: identifies callers, waits for their turns, and sends answers."""
 
 from __future__ import annotations
 

@@ -22,5 +22,5 @@ class Messages:
 
     @staticmethod
     def partly() -> dict[str, str]:
-        """Return what is sent in part."""
+        """Return the partly sent messages."""
         return {"fetchAssetResponse": "refusals only: there are no files to fetch"}

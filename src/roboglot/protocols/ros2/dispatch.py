@@ -19,7 +19,7 @@ Read = Callable[[bytes, str], object]  # CDR and type; raises ValueError
 
 
 async def answer(context: Context, key: str, data: bytes | None, read: Read) -> tuple[int, str]:
-    """Do what one message asks for; returns the level and the text of why not, empty if it was done.
+    """Execute one message; return level and text of the failure, empty on success.
 
     ``data`` is None for a message that was too long to be kept.
     """

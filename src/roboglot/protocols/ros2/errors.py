@@ -1,4 +1,4 @@
-"""The one place where the model's errors become ROS's: levels of lines of ``/rosout``, for topics have no answers."""
+"""Levels of the model's errors in ``/rosout``, as topics have no answers."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ LEVELS: dict[type[RobotError], int] = {
 
 
 def level_of(error: RobotError) -> int:
-    """Return how bad ``error``, or its nearest ancestor in the table, is; rcl's levels are Python's."""
+    """Return the level of ``error``, by its nearest ancestor in the table; rcl's levels are Python's."""
     return next(LEVELS[kind] for kind in type(error).__mro__ if kind in LEVELS)

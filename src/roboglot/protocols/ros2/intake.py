@@ -1,4 +1,4 @@
-"""Messages that wait for their turn: heard in Zenoh's threads, answered in the event loop."""
+"""Queue of messages: received in Zenoh's threads, answered in the event loop."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Intake:
         return len(self._heard)
 
     def put(self, key: str, data: bytes | None) -> None:
-        """Add a message, in any thread. None: it was too long to be kept."""
+        """Add a message, in any thread. None stands for one that was too long."""
         with self._lock:
             waiting = self._waiting[key]
             full = len(waiting) >= (1 if key == VELOCITY else self._most)
@@ -44,14 +44,14 @@ class Intake:
             self._drop(key)
 
     def pop(self) -> tuple[str, bytes | None]:
-        """Return the oldest message, which waits no more."""
+        """Remove and return the oldest message."""
         with self._lock:
             key, data = self._heard.pop(next(iter(self._heard)))
             self._waiting[key].popleft()
         return key, data
 
     def stops(self) -> bool:
-        """Return whether a velocity of zero waits."""
+        """Return whether a velocity of zero is queued."""
         with self._lock:
             return any(_stops(key, data) for key, data in self._heard.values())
 

@@ -48,7 +48,7 @@ NODE = "roboglot"
 
 
 class Ros2Door:
-    """One robot's; closed unless it is asked for."""
+    """ROS 2 door of one robot; closed unless enabled."""
 
     name = DOOR
 
@@ -130,7 +130,7 @@ class Ros2Door:
         return config
 
     async def close(self) -> None:
-        """Publish no more, and stop what was commanded here."""
+        """Stop publishing, and cancel the actions commanded here."""
         for task in tuple(self._tasks):
             task.cancel()
         if self._sampler is not None:
@@ -180,7 +180,7 @@ class Ros2Door:
         self._tokens.append(self._session.declare_subscriber(key_of_all, on_sample))
 
     def receive(self, key: str, data: bytes) -> None:
-        """Take a message as if it had come from Zenoh, where the door is open."""
+        """Handle a message as if it had come from Zenoh, if the door is open."""
         self._heard.put(key, data)
         self._take()
 
@@ -188,7 +188,7 @@ class Ros2Door:
         return f"/{self._namespace}/{name}" if self._namespace else f"/{name}"
 
     def _take(self) -> None:
-        """Answer what was heard."""
+        """Answer received messages."""
         self._called = False
         self._turns.look()
         if self._session is not None and (self._answering is None or self._answering.done()):
@@ -249,7 +249,7 @@ class Ros2Door:
             self._publish(self._words.picture(self._now(), f"{self._robot.id}/camera", picture), "image/compressed")
 
     def _put(self, entry: Entry) -> None:
-        """Publish what a recording would keep, as far as ROS has a type for it."""
+        """Publish an entry of a recording, if ROS has a type for it."""
         if entry.kind == "battery":  # a recording contains changes only; ROS expects it periodically
             self._battery = entry
         if entry.kind in PUBLISHED:

@@ -32,5 +32,5 @@ class Messages:
 
     @staticmethod
     def partly() -> dict[str, str]:
-        """Return what is published in part."""
+        """Return the partly published topics."""
         return {"joint_states": "the gimbal alone, of robots that have one"}

@@ -1,4 +1,4 @@
-"""ROS's words for robots: types of what is listened to, poses and velocities out of its messages."""
+"""Types of subscribed messages, and poses and velocities read from them."""
 
 from __future__ import annotations
 

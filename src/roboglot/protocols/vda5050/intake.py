@@ -1,4 +1,4 @@
-"""Messages of fleet control that wait for their turn. While many wait, the broker keeps the others.
+"""Queue of fleet control's messages. While it is long, the broker keeps further ones.
 
 Of a longer message than is read, only the beginning is kept. Bytes that are no MQTT end the connection: paho would take
 them up again at every look, and aiomqtt would leave the socket open.
@@ -50,7 +50,7 @@ class _Beginning(bytearray):
 
 
 class Intake(asyncio.Queue["aiomqtt.Message"]):
-    """The queue of an aiomqtt client. ``waiting``: what is in it."""
+    """Queue of an aiomqtt client. ``waiting``: its messages."""
 
     _look: Callable[[], None]
     _disconnected: asyncio.Future[None]

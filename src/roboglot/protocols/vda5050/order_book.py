@@ -1,6 +1,6 @@
 """The robot's order: rules for accepting messages, remaining nodes and edges, states of actions.
 
-Follows chapter 6.1 of the standard. Knows no robot and no clock: who drives says what was reached.
+Follows chapter 6.1 of the standard. Knows no robot and no clock: the driving code reports reached nodes.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def forget_oldest(states: dict[str, ActionState]) -> None:
 
 @dataclass(slots=True)
 class OrderBook:
-    """``nodes`` and ``edges`` are what is still to be passed; the first node is passed when the order is taken."""
+    """``nodes`` and ``edges`` have yet to be passed; the first node is passed when the order is taken."""
 
     order_id: str = ""
     update_id: int = 0

@@ -126,7 +126,7 @@ class End(asyncio.Protocol):
         self.other: End | None = None
         self.look: Callable[[bytes], None] | None = None
         self.waiting = bytearray()
-        self._ended = False  # its peer says no more
+        self._ended = False  # its peer sends no more
         self.gone: Callable[[End], None] = lambda _: None
         self.lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 

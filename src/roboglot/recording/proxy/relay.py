@@ -82,7 +82,7 @@ class Book:
         return now
 
     def close(self) -> None:
-        """Write what is queued and close the file."""
+        """Write the queue and close the file."""
         self.thread.close()
 
 

@@ -115,7 +115,7 @@ class _Message:
 
     @property
     def payload(self) -> bytes:
-        """The body without its compression: what it hides could not be redacted."""
+        """The decompressed body, since compressed data cannot be redacted."""
         return unpacked(self.packing, bytes(self.body))
 
 
@@ -219,7 +219,7 @@ class FrameSniffer(Sniffer):
             self._frames(came, client=False)
 
     def _agree(self, head: bytes) -> None:
-        """Read frames from now on, compressed ones if the robot's answer says so."""
+        """Read frames from now on, compressed ones if the robot's answer accepts that."""
         from wsproto.connection import Connection, ConnectionType
         from wsproto.extensions import Extension, PerMessageDeflate
 

@@ -1,4 +1,4 @@
-"""A tick of all robots of a world: first kind by kind what is computed together, then robot by robot."""
+"""A tick of all robots of a world: first parts computed together, kind by kind, then robot by robot."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Agenda:
 class Rounds:
     """Control and sensing of the robots. ``tick``: s.
 
-    ``controls`` and ``senses``: what is done for all robots together, in every tick; the caller does ``senses``.
+    ``controls`` and ``senses``: functions for all robots together, in every tick; the caller runs ``senses``.
     """
 
     def __init__(self, rows: Rows, tick: float) -> None:

@@ -52,11 +52,11 @@ class Crowd:
             physics.move_person(walker.body, walker.pose, walker.floor)
 
     def meet(self, free: Free, sound: Sound) -> None:
-        """Use these from now on: ``free`` finds ways past others, ``sound`` makes what people say and clap heard."""
+        """Use these from now on: ``free`` finds ways past others, ``sound`` plays people's speech and claps."""
         self._free, self._sound = free, sound
 
     def load_kernels(self) -> None:
-        """Let the compiled kernel do what it can from now on; everyone's way stays the same."""
+        """Use the compiled kernel where possible from now on; all paths stay the same."""
         with loading():
             from roboglot.kernels import ticks
 

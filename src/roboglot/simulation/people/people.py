@@ -165,7 +165,7 @@ class Walker(PersonState):
             self.doing = None
 
     def _note(self, seconds: float) -> None:
-        """Note for the kernel what comes next."""
+        """Update the kernel's row of the next step."""
         if isinstance(self.doing, Walk) and self._dodging is None:
             self.note_walk(self.doing.to, self.doing.speed or self.person.speed, seconds)
         else:

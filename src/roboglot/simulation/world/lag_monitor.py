@@ -18,7 +18,7 @@ class Pace:
     def __init__(self, speed: Callable[[], float], *, skips: bool) -> None:
         self._speed = speed
         self._lost_by = "%.1f s of robot time skipped" if skips else "robot time fell behind by %.1f s"
-        self._window: tuple[float, float] | None = None  # what was simulated and lost at its start
+        self._window: tuple[float, float] | None = None  # simulated and lost time at its start
         self._full = 0.0  # s lost before the machine became too slow
         self._warned: float | None = None  # the share of the wanted pace in the last warning; None: no warning
         self._calm = 0

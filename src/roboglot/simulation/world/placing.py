@@ -74,7 +74,7 @@ class Places:
         raise ValueError(f"there is no room for another robot on floor {floor}")
 
     def _check(self, wanted: Pose, floor: int, radius: float) -> None:
-        """Raise ValueError if a robot cannot start there, with what is in the way and a place nearby."""
+        """Raise ValueError, naming the obstacle and a place nearby, if a robot cannot start there."""
         self.check_inside(wanted, floor)
         if obstacle := self.in_the_way(wanted, floor, radius):
             free = self._near(wanted, floor, radius)

@@ -124,7 +124,7 @@ class Ticking:
         self._steps = round(self._seconds / step)
 
     def end(self, left: Left, stamp: float, meanwhile: Callable[[float], None] | None = None) -> None:
-        """Do what is left of a tick (stamp, s); ``meanwhile``: see ``Physics.step``."""
+        """Complete a tick (stamp, s); ``meanwhile``: see ``Physics.step``."""
         stage, count, seconds, physics = left.stage, left.count, self._seconds, self._physics
         if stage == DONE:
             return

@@ -1,4 +1,4 @@
-"""Checks of the world at the end of a scenario; each returns what is wrong, or an empty text."""
+"""Checks of the world at the end of a scenario; each returns the mismatch, or an empty text."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Given(_Strict, frozen=True, forbid_unknown_fields=True):
-    """The world, its robots, and what is broken from the start; as in the test kit's marker ``world``."""
+    """The world, its robots and initial faults; as in the test kit's marker ``world``."""
 
     world: str = "office"
     robots: Annotated[tuple[str, ...], msgspec.Meta(min_length=1, max_length=16)] = ("a",)

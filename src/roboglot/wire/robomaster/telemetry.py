@@ -198,7 +198,7 @@ def _floats(words: Sequence[str], count: int) -> list[float]:
 
 
 def number_of(word: str) -> float:
-    """Return a number of a robot's. Raises ValueError, also for what is not finite or too large."""
+    """Parse a number. Raises ValueError, also for one that is not finite or too large."""
     number = float(word)
     if not abs(number) <= NUMBER_MAX:
         raise ValueError(f"no number of a robot's: {word}")

@@ -120,10 +120,10 @@ class Untaken:
 
 @dataclass(frozen=True, slots=True)
 class OrderRequest:
-    """An order to place: ``target`` and ``stops`` are display names or ids of places on the map.
+    """Request for an order; ``target`` and ``stops`` are display names or ids of places on the map.
 
     Of a ROUND: ``waits`` (s) at each of ``stops`` and at ``target``, 0: until the operation is ended; ``tasks``:
-    what there is to do there, in anybody's words. ``remote``: it comes from afar, whatever the work mode says; not with
+    free text on the work there. ``remote``: ordered from afar, allowed in every work mode; not with
     a battery below ``level_no_cloud``. ``number``: the order's own number, if it has one already.
     """
 
@@ -139,7 +139,7 @@ class OrderRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """A request and what became of it; ``changed_at`` in seconds since 1970.
+    """A request and its outcome; ``changed_at`` in seconds since 1970.
 
     ``client`` and ``owner``: the one who ordered, and the identity that it proved; empty: the robot itself.
     """
@@ -185,9 +185,9 @@ class Policy:
 
 
 class Delivery(Component):
-    """One order after the other. Publishes ``DeliveryReported``. Orders and policy survive a crash.
+    """Delivery service; carries out orders one after the other. Publishes ``DeliveryReported``.
 
-    An order that ran when the robot went down begins again, but for the boxes and stops that have a result.
+    Orders and policy survive a crash; an interrupted order starts again, without boxes and stops that have a result.
     """
 
     @property
@@ -198,7 +198,7 @@ class Delivery(Component):
     @property
     @abstractmethod
     def current(self) -> Order | None:
-        """The one under way."""
+        """The order in progress; None if there is none."""
 
     @property
     @abstractmethod
@@ -208,31 +208,31 @@ class Delivery(Component):
     @property
     @abstractmethod
     def policy(self) -> Policy:
-        """The rules now."""
+        """Current rules."""
 
     @abstractmethod
     async def set_policy(self, policy: Policy) -> None:
-        """Other rules, from now on; returns when safe on disk."""
+        """Set the rules; return once they are on disk."""
 
     @abstractmethod
     async def accept(self, *requests: OrderRequest) -> Sequence[Order]:
-        """Queue them, all or none.
+        """Queue orders, all or none.
 
-        NotFound for a place or box that is not there; Refused by the work mode, a low battery, a box that another
-        order has or a full queue; InvalidGoal for a takeout without a box.
+        Raises NotFound for an unknown place or box, Refused by the work mode, for a low battery, a box of another order
+        or a full queue, and InvalidGoal for a takeout without a box.
         """
 
     @abstractmethod
     async def cancel(self, id: str | None = None) -> None:
-        """End the order of that id or number as CANCELED, or all; the robot brakes. NotFound for an unknown one."""
+        """Cancel the order of that id or number, or all; the robot brakes. Raises NotFound."""
 
     @abstractmethod
     async def disown(self, owner: str) -> None:
-        """Cancel the orders of an identity that may no longer drive; the robot brakes, and does not go to rest."""
+        """Cancel the orders of an identity that may no longer drive; the robot brakes and stays there."""
 
     @abstractmethod
     async def finish(self) -> None:
-        """End all as SUCCEEDED."""
+        """End all orders as SUCCEEDED."""
 
     @property
     @abstractmethod
@@ -241,16 +241,16 @@ class Delivery(Component):
 
     @abstractmethod
     async def execute(self, on: bool) -> None:
-        """Hold the robot where it is (a person is at its screen), or go on; without orders it goes to rest then."""
+        """Hold the robot (a person is at its screen), or continue; without orders it then goes to rest."""
 
     @abstractmethod
     async def start_pickup(self) -> None:
-        """Report that a person at the target begins to take things. Refused unless the robot stands there."""
+        """Report that a person begins to take goods. Raises Refused unless the robot stands at the target."""
 
     @abstractmethod
     async def end_pickup(self) -> None:
-        """He has taken what is in this box, or on the tray: its door shuts. Refused unless at the target."""
+        """Report that the box or tray was emptied; the box closes. Raises Refused unless at the target."""
 
     @abstractmethod
     async def end_operation(self) -> None:
-        """Whatever there was to do at this stop is done. Refused unless the robot stands at a stop."""
+        """Report that the work at this stop is done. Raises Refused unless the robot stands at a stop."""

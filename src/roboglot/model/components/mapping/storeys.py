@@ -1,4 +1,4 @@
-"""Places on other floors, and riding there. Provided by the store of the building's maps; empty without one."""
+"""Places on other floors, and rides to them. Provided by the store of the building's maps; empty without one."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ class StoreyPlace:
 
 
 class StoreyMaps(Protocol):
-    """The store of a building's maps, as seen by the robot. Floors go by their names there."""
+    """Interface of the store of a building's maps; floors are identified by name."""
 
     @property
     def current(self) -> str:
-        """The floor that the robot is on."""
+        """Floor of the robot."""
 
     def places(self) -> list[StoreyPlace]:
-        """Return those of all other floors, in the order of the floors."""
+        """Return the places of all other floors, in the order of the floors."""
 
     def home(self) -> str:
-        """The floor of the dock that the robot goes home to."""
+        """Floor of the robot's home dock."""
 
     def go_to(self, floor: str, source: str) -> Action:
         """Ride to a floor and switch to its map, places and docks. Raises InvalidGoal for an unknown floor."""

@@ -1,1 +1,1 @@
-"""The service definition and what grpcio-tools generated from it (docs/protocols/cyberdog.md says how)."""
+"""The service definition and the code generated from it by grpcio-tools (docs/protocols/cyberdog.md says how)."""
