@@ -19,8 +19,8 @@ from pathlib import Path
 
 from _claim import Claims
 
+from roboglot.control.lease_server import NAME
 from roboglot.hosting.local_socket import ask
-from roboglot.protocols.lease_desk import NAME
 from roboglot.testing.process import served
 
 FIRST = "127.34.0.1"

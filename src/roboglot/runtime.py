@@ -22,6 +22,8 @@ from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.recordings import Recordings
 from roboglot.console.server import Console
 from roboglot.console.studio.programs import FOLDER, ClassHome, Programs, Studio
+from roboglot.control.lease_server import LeaseServer
+from roboglot.control.record_server import RecordServer
 from roboglot.extras import own_version
 from roboglot.fleet import build_fleet, clock_of, origin_of
 from roboglot.hosting.folder_lock import lock_folder
@@ -37,8 +39,6 @@ from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols import DOORS, open_doors
 from roboglot.protocols.browsers import own_names
 from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, Site
-from roboglot.protocols.lease_desk import LeaseDesk
-from roboglot.protocols.record_desk import RecordDesk
 from roboglot.rehearsal import Rehearsals, scene_of
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_database, open_registry
@@ -155,9 +155,9 @@ class Runtime:
         self.guard = self._build_guard() if config.access.on else None
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
-        self.leases = LeaseDesk(config.data, self.fleet.robots, self.fleet.world.hands)
+        self.leases = LeaseServer(config.data, self.fleet.robots, self.fleet.world.hands)
         self._recorder: Recorder | None = None
-        self._record_desk = RecordDesk(config.data, lambda: self.recorder)
+        self._record_server = RecordServer(config.data, lambda: self.recorder)
         self._types = doors
         self._programs: dict[str, Programs] = {}
         self._rehearsals = Rehearsals(memory_together=together)
@@ -323,7 +323,7 @@ class Runtime:
                 await self._recorder.discard()
             raise
         await self.leases.open()
-        await self._record_desk.open()
+        await self._record_server.open()
         if self.guard is not None and self.config.access.gateway:
             self._gateway = self._build_gateway(self.guard)
             await self._gateway.start()
@@ -342,7 +342,7 @@ class Runtime:
             await _in_time("the console", self.console.close())
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
         await _in_time("control of the robots", self.leases.close())
-        await self._record_desk.close()
+        await self._record_server.close()
         if self.clock.repeats:  # from here on robot time needed to stop depends on the machine
             await self._close_recorder()
         await _in_time("the fleet", self.fleet.close())

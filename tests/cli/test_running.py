@@ -10,9 +10,9 @@ import pytest
 
 from roboglot.cli.control import running
 from roboglot.cli.control.lease import wish
+from roboglot.control import lease_server
+from roboglot.control.record_server import Answer, Request
 from roboglot.hosting.local_socket import LocalServer
-from roboglot.protocols import lease_desk
-from roboglot.protocols.record_desk import Answer, Request
 
 
 @pytest.mark.parametrize(
@@ -43,22 +43,22 @@ async def test_commands_reach_the_worlds_of_a_fleet(tmp_path: Path) -> None:
     for world, robot in {"w1": "a1", "w2": "a2", "w10": "a10"}.items():
 
         async def answer(line: bytes, robot: str = robot) -> bytes:
-            request = msgspec.json.decode(line, type=lease_desk.Request)
+            request = msgspec.json.decode(line, type=lease_server.Request)
             asked.append((request.do, robot))
-            return msgspec.json.encode(lease_desk.Answer([lease_desk.Control(robot, "", "", 0.0, "", "", "")]))
+            return msgspec.json.encode(lease_server.Answer([lease_server.Control(robot, "", "", 0.0, "", "", "")]))
 
         (tmp_path / "shards" / world / "data").mkdir(parents=True)
-        servers.append(LocalServer(tmp_path / "shards" / world / "data" / lease_desk.NAME, "lease", answer))
+        servers.append(LocalServer(tmp_path / "shards" / world / "data" / lease_server.NAME, "lease", answer))
         await servers[-1].open()
     try:
-        stopped = await asyncio.to_thread(wish, "stop", lease_desk.Request("stop", all=True), tmp_path)
+        stopped = await asyncio.to_thread(wish, "stop", lease_server.Request("stop", all=True), tmp_path)
         assert [control.robot for control in stopped.robots] == ["a1", "a2", "a10"]
         assert sorted(asked) == [("stop", "a1"), ("stop", "a10"), ("stop", "a2")]
         asked.clear()
-        await asyncio.to_thread(wish, "reset", lease_desk.Request("reset", "a2"), tmp_path)
+        await asyncio.to_thread(wish, "reset", lease_server.Request("reset", "a2"), tmp_path)
         assert [(verb, robot) for verb, robot in asked if verb != "look"] == [("reset", "a2")]
         with pytest.raises(SystemExit, match=r"roboglot stop: there is no robot 'b'; there are a1, a2, a10"):
-            await asyncio.to_thread(wish, "stop", lease_desk.Request("stop", "b"), tmp_path)
+            await asyncio.to_thread(wish, "stop", lease_server.Request("stop", "b"), tmp_path)
     finally:
         for server in servers:
             await server.close()
@@ -70,25 +70,25 @@ async def test_every_world_that_refuses_is_named(tmp_path: Path) -> None:
     for world, error in {"w1": "robot a1: no link", "w2": "", "w3": "robot a3: no link", "w4": ""}.items():
 
         async def answer(line: bytes, robot: str = f"a{world[1:]}", error: str = error) -> bytes:
-            verb = msgspec.json.decode(line, type=lease_desk.Request).do
-            controls = [lease_desk.Control(robot, "", "", 0.0, "", "", "")]
-            return msgspec.json.encode(lease_desk.Answer(controls, "" if verb == "look" else error))
+            verb = msgspec.json.decode(line, type=lease_server.Request).do
+            controls = [lease_server.Control(robot, "", "", 0.0, "", "", "")]
+            return msgspec.json.encode(lease_server.Answer(controls, "" if verb == "look" else error))
 
         (tmp_path / "shards" / world / "data").mkdir(parents=True)
-        servers.append(LocalServer(tmp_path / "shards" / world / "data" / lease_desk.NAME, "lease", answer))
+        servers.append(LocalServer(tmp_path / "shards" / world / "data" / lease_server.NAME, "lease", answer))
         await servers[-1].open()
-    gone = tmp_path / "shards/w4/data" / lease_desk.NAME
+    gone = tmp_path / "shards/w4/data" / lease_server.NAME
     await servers.pop().close()
     gone.touch()  # as a killed world leaves it
     try:
         with pytest.raises(SystemExit) as ended:
-            await asyncio.to_thread(wish, "stop", lease_desk.Request("stop", all=True), tmp_path)
+            await asyncio.to_thread(wish, "stop", lease_server.Request("stop", all=True), tmp_path)
         assert str(ended.value).splitlines() == [
             "roboglot stop: robot a1: no link",
             "roboglot stop: robot a3: no link",
             f"roboglot stop: no `roboglot up` answers in {gone.parent}",
         ]
-        stopped = await asyncio.to_thread(wish, "stop", lease_desk.Request("stop", "a2"), tmp_path)
+        stopped = await asyncio.to_thread(wish, "stop", lease_server.Request("stop", "a2"), tmp_path)
         assert [control.robot for control in stopped.robots] == ["a2"]
     finally:
         for server in servers:

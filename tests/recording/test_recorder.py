@@ -18,10 +18,10 @@ from roboglot import runtime
 from roboglot.cli.control import running
 from roboglot.cli.recordings.record import _show
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
+from roboglot.control.record_server import NAME, Answer, Request
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.model.tap import Direction
-from roboglot.protocols.record_desk import NAME, Answer, Request
 from roboglot.recording.files import PartWriter
 from roboglot.recording.reader import pair, read_messages, read_recording
 from roboglot.runtime import Runtime

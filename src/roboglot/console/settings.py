@@ -1,7 +1,5 @@
 """Limits of the console. Input is treated as hostile: each length, rate and count is limited."""
 
-from __future__ import annotations
-
 VIEWERS_MAX = 32  # open pages
 MESSAGE_MAX = 64 * 1024  # bytes per message from a page
 BODY_MAX = 256 * 1024  # bytes per request body

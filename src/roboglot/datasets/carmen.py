@@ -11,15 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.datasets.drive_log import (
-    RAYS_MAX,
-    SCANS_MAX,
-    BadDriveLog,
-    DriveLog,
-    RecordedScan,
-    echoes,
-    no_echo,
-)
+from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan, echoes, no_echo
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 from roboglot.values import dataclass

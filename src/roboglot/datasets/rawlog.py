@@ -17,14 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.datasets.drive_log import (
-    FILE_BYTES_MAX,
-    RAYS_MAX,
-    SCANS_MAX,
-    BadDriveLog,
-    DriveLog,
-    RecordedScan,
-)
+from roboglot.datasets.drive_log import FILE_BYTES_MAX, RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
 from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 from roboglot.values import dataclass

@@ -13,15 +13,7 @@ from roboglot.demo.clients.phone import Phone
 from roboglot.demo.clients.robomaster import RoboMasterClient
 from roboglot.demo.clients.slamware import SlamwareClient
 from roboglot.demo.picture import Track, draw
-from roboglot.demo.reports import (
-    Report,
-    agree,
-    apart,
-    from_cyberdog,
-    from_program,
-    from_robomaster,
-    from_slamware,
-)
+from roboglot.demo.reports import Report, agree, apart, from_cyberdog, from_program, from_robomaster, from_slamware
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.maps import OccupancyGrid
 from roboglot.wire.slamware.chapters.slam.explore_map import decode_explore_map

@@ -6,12 +6,7 @@ import logging
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import replace
 
-from roboglot.model.components.mapping.annotations import (
-    Annotations,
-    Area,
-    Line,
-    MapAnnotations,
-)
+from roboglot.model.components.mapping.annotations import Annotations, Area, Line, MapAnnotations
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Point

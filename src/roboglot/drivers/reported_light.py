@@ -8,12 +8,7 @@ from collections.abc import Collection, Mapping
 from roboglot.clients.errors import RefusedByRobot
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.clock import Clock
-from roboglot.model.components.interaction.light import (
-    WHITE,
-    Colour,
-    LightEffect,
-    ZoneState,
-)
+from roboglot.model.components.interaction.light import WHITE, Colour, LightEffect, ZoneState
 from roboglot.model.components.interaction.light_effects import ShownLight
 from roboglot.model.errors import InvalidGoal
 

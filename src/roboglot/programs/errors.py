@@ -1,7 +1,5 @@
 """Errors of operations on a task or a module. Doors map these types to their protocol's own numbers."""
 
-from __future__ import annotations
-
 
 class ProgramError(Exception):
     """An operation was not done; the message gives the reason in words for the user."""

@@ -8,13 +8,7 @@ from collections.abc import Callable
 import msgspec
 
 from roboglot.model.clock import Clock
-from roboglot.model.components.mapping.annotations import (
-    AREAS_MAX,
-    LINES_MAX,
-    MARKS_MAX,
-    Annotations,
-    MapAnnotations,
-)
+from roboglot.model.components.mapping.annotations import AREAS_MAX, LINES_MAX, MARKS_MAX, Annotations, MapAnnotations
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import AnnotationsChanged, EventStream
 from roboglot.storage.transactions import Connection, Transactions

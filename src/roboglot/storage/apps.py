@@ -6,12 +6,7 @@ from collections.abc import Sequence
 from typing import BinaryIO
 
 from roboglot.model.clock import Clock
-from roboglot.model.components.system.apps import (
-    APP_BYTES_MAX,
-    APPS_MAX,
-    App,
-    Apps,
-)
+from roboglot.model.components.system.apps import APP_BYTES_MAX, APPS_MAX, App, Apps
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.storage.transactions import Connection, Transactions

@@ -6,13 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from roboglot.model.clock import Clock
-from roboglot.model.components.interaction.members import (
-    MEMBERS_MAX,
-    NAME_MAX,
-    PRINT_MAX,
-    Member,
-    Members,
-)
+from roboglot.model.components.interaction.members import MEMBERS_MAX, NAME_MAX, PRINT_MAX, Member, Members
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import EventStream, MembersChanged
 from roboglot.storage.transactions import AlreadyThere, Connection, Transactions

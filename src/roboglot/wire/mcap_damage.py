@@ -1,7 +1,5 @@
 """Errors of reading an MCAP file that is damaged or truncated: its writer was killed, or still writes."""
 
-from __future__ import annotations
-
 import struct
 
 import zstandard

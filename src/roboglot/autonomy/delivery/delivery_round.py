@@ -9,13 +9,7 @@ from roboglot.autonomy.delivery.drive import DeliveryDrive, Failed
 from roboglot.autonomy.delivery.handover import Handover, Signal, Signals
 from roboglot.autonomy.delivery.order_book import OrderBook, OrderChanges
 from roboglot.model.components.logistics.cargo import Cargo
-from roboglot.model.components.logistics.delivery import (
-    Failure,
-    Order,
-    OrderKind,
-    OrderStage,
-    PickUp,
-)
+from roboglot.model.components.logistics.delivery import Failure, Order, OrderKind, OrderStage, PickUp
 from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
 

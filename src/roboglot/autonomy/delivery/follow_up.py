@@ -8,14 +8,7 @@ from roboglot.autonomy.delivery.drive import DeliveryDrive
 from roboglot.autonomy.delivery.order_book import OrderBook
 from roboglot.autonomy.delivery.readiness import Readiness
 from roboglot.autonomy.delivery.rules import BOXED, RECEPTION, place_of_type
-from roboglot.model.components.logistics.delivery import (
-    Failure,
-    Order,
-    OrderKind,
-    OrderRequest,
-    OrderStatus,
-    Untaken,
-)
+from roboglot.model.components.logistics.delivery import Failure, Order, OrderKind, OrderRequest, OrderStatus, Untaken
 from roboglot.model.events import DeliveryNews
 from roboglot.model.robot import Robot
 

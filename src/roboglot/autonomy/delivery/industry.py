@@ -10,12 +10,7 @@ import msgspec
 
 from roboglot.autonomy.delivery.rules import place_named
 from roboglot.model.components.logistics.delivery import OrderStatus
-from roboglot.model.components.logistics.industry import (
-    Call,
-    CallKind,
-    Industry,
-    RoundTemplate,
-)
+from roboglot.model.components.logistics.industry import Call, CallKind, Industry, RoundTemplate
 from roboglot.model.components.system.ledger import Ledger
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.robot import Robot

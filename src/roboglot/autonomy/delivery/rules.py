@@ -6,14 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 
 from roboglot.model.components.logistics.cargo import Cargo
-from roboglot.model.components.logistics.delivery import (
-    BoxChoice,
-    Order,
-    OrderKind,
-    OrderRequest,
-    Policy,
-    WorkMode,
-)
+from roboglot.model.components.logistics.delivery import BoxChoice, Order, OrderKind, OrderRequest, Policy, WorkMode
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.mapping.storeys import StoreyPlace, Storeys
 from roboglot.model.errors import InvalidGoal, NotFound, Refused

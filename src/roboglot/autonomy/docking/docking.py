@@ -9,12 +9,7 @@ import math
 
 import numpy as np
 
-from roboglot.autonomy.docking.dock_finder import (
-    SEARCH_REACH,
-    Echoes,
-    dock_fronts,
-    find_dock,
-)
+from roboglot.autonomy.docking.dock_finder import SEARCH_REACH, Echoes, dock_fronts, find_dock
 from roboglot.autonomy.docking.known_dock import KnownDock
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.navigation.course import Goal

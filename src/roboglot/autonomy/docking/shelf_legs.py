@@ -13,12 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.docking.mark_finder import (
-    LEG_HALF,
-    SIDE_MIN,
-    SQUARE,
-    legs_of,
-)
+from roboglot.autonomy.docking.mark_finder import LEG_HALF, SIDE_MIN, SQUARE, legs_of
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.autonomy.slam.scan_points import ScanReader

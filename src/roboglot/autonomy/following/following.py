@@ -7,12 +7,7 @@ from collections.abc import Callable
 from dataclasses import field
 
 from roboglot.autonomy.following.thing_finder import moved_thing, thing_at
-from roboglot.autonomy.following.trail import (
-    Points,
-    Trail,
-    gap,
-    room,
-)
+from roboglot.autonomy.following.trail import Points, Trail, gap, room
 from roboglot.autonomy.navigation.base_actions import PERIOD, start_on_base
 from roboglot.autonomy.slam.scan_points import ScanReader
 from roboglot.model.actions import Action

@@ -10,12 +10,7 @@ from msgspec.structs import astuple
 
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.navigation.latency_prediction import Foresight
-from roboglot.autonomy.navigation.speed_profile import (
-    APPROACH_GAIN,
-    Ramp,
-    cruise_speed,
-    trapezoid_time,
-)
+from roboglot.autonomy.navigation.speed_profile import APPROACH_GAIN, Ramp, cruise_speed, trapezoid_time
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.displacement import Carried
 from roboglot.model.actions import Action, ActionStatus

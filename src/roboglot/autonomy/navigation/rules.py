@@ -13,13 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.evidence import RESOLUTION
-from roboglot.model.components.mapping.annotations import (
-    Annotations,
-    Area,
-    AreaKind,
-    Line,
-    LineKind,
-)
+from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind, Line, LineKind
 from roboglot.model.components.motion.navigation import Tracks
 from roboglot.model.geometry import Point
 from roboglot.values import dataclass

@@ -11,14 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.slam.evidence import (
-    CELLS_MAX,
-    GRID_MAX,
-    PER_STEP,
-    RESOLUTION,
-    EvidenceGrid,
-    is_too_large,
-)
+from roboglot.autonomy.slam.evidence import CELLS_MAX, GRID_MAX, PER_STEP, RESOLUTION, EvidenceGrid, is_too_large
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.maps import OccupancyGrid
 

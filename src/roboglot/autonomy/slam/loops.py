@@ -15,12 +15,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import EvidenceGrid
-from roboglot.autonomy.slam.matcher import (
-    FREE,
-    Match,
-    fit,
-    place,
-)
+from roboglot.autonomy.slam.matcher import FREE, Match, fit, place
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.autonomy.slam.straightening import Edge, Straightening

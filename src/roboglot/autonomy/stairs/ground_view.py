@@ -9,13 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.slam.scan_points import ScanReader
-from roboglot.autonomy.stairs.finder import (
-    FLOOR,
-    STEP_MAX,
-    StepEdge,
-    find_drop,
-    find_riser,
-)
+from roboglot.autonomy.stairs.finder import FLOOR, STEP_MAX, StepEdge, find_drop, find_riser
 from roboglot.model.components.motion.stair_alignment import StairDirection
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry

@@ -12,7 +12,7 @@ import typer
 
 from roboglot.cli.control import running
 from roboglot.config import default_data_folder
-from roboglot.protocols.lease_desk import NAME, Answer, Control, Request
+from roboglot.control.lease_server import NAME, Answer, Control, Request
 from roboglot.spelling import instead
 
 PATIENCE = 10.0  # s to wait until the robot has braked

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from roboglot.cli.control.lease import Data, wish
-from roboglot.protocols.lease_desk import Request
+from roboglot.control.lease_server import Request
 
 
 def command(

@@ -19,9 +19,9 @@ import typer
 from roboglot.cli.control import running
 from roboglot.cli.suggestions import Group
 from roboglot.config import default_data_folder
+from roboglot.control.record_server import NAME, Answer, Request
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.event_loop import run
-from roboglot.protocols.record_desk import NAME, Answer, Request
 
 SWITCH = 0.0002  # s that the writing thread may hold the interpreter's lock; Python's own 5 ms delay messages
 PATIENCE = 30.0  # s: a long ring takes a while to write

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, cast
 import msgspec
 
 from roboglot.console import desk, program_runs, teleop
+from roboglot.control import lease_server
 from roboglot.model.client_context import set_client
 from roboglot.model.errors import RobotError
 from roboglot.model.inputs import noted_stage
 from roboglot.model.inputs.outside import ANSWER, Input
 from roboglot.operations import BadParameters
 from roboglot.programs.errors import ProgramError
-from roboglot.protocols import lease_desk
 from roboglot.protocols.robomaster.ports import pilot_port
 from roboglot.recording.lines import Answers, Line, TextLine
 
@@ -126,7 +126,7 @@ class Repeater:
                 teleop.Pad(self._robots[given.robot], values["source"]).let_go(values["why"])
             case pilot_port.PILOT:
                 pilot_port.do_again(self._robots[given.robot], given)
-            case lease_desk.LEASE:
+            case lease_server.LEASE:
                 wish = {"do": given.name, "robot": given.robot, "who": values["who"]}
-                request = msgspec.convert(wish, lease_desk.Request)
+                request = msgspec.convert(wish, lease_server.Request)
                 await self._runtime.leases.do(request, self._robots[given.robot])

@@ -20,12 +20,12 @@ from roboglot.console.http import Problem
 from roboglot.console.people.sessions import Session
 from roboglot.console.studio import class_requests, classroom
 from roboglot.console.studio.class_files import KeptLesson, LessonFile
+from roboglot.control.lease_server import LEASE
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, Right
 from roboglot.model.components.system.lease import TEACHER, Lease
 from roboglot.model.errors import Forbidden, NotFound, Refused, RobotError
 from roboglot.model.robot import Robot
-from roboglot.protocols.lease_desk import LEASE
 from roboglot.values import dataclass
 
 MINUTES_MAX = 600

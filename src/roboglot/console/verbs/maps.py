@@ -15,14 +15,7 @@ import msgspec
 from roboglot.console.drawings import NAMES
 from roboglot.console.verbs.robots import SOURCE, VERBS, Meters, Name, Radians, Spot, Started, started
 from roboglot.media.ros_map import encode_ros_map
-from roboglot.model.components.mapping.annotations import (
-    Annotations,
-    Area,
-    AreaKind,
-    Line,
-    LineKind,
-    MapAnnotations,
-)
+from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind, Line, LineKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping

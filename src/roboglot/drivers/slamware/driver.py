@@ -7,13 +7,7 @@ from dataclasses import replace
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.driver import Driver
-from roboglot.drivers.reported import (
-    ReportedBattery,
-    ReportedDockContact,
-    ReportedImu,
-    ReportedLidar,
-    ReportedOdometry,
-)
+from roboglot.drivers.reported import ReportedBattery, ReportedDockContact, ReportedImu, ReportedLidar, ReportedOdometry
 from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
 from roboglot.drivers.slamware.chapters.motion.base import SlamwareBase
 from roboglot.drivers.slamware.chapters.motion.docking import SlamwareDocking

@@ -1,20 +1,8 @@
 """Events: frozen facts in the past tense, on one bounded stream. Doors turn them into pushes and reports."""
 
 from roboglot.model.events.delivery import DeliveryNews, DeliveryReported
-from roboglot.model.events.equipment import (
-    BeadFired,
-    BoxChanged,
-    JackChanged,
-    SoundPlayed,
-    Spoke,
-)
-from roboglot.model.events.lift import (
-    LiftArrived,
-    LiftCalled,
-    LiftDoorClosed,
-    LiftDoorOpened,
-    LiftFailed,
-)
+from roboglot.model.events.equipment import BeadFired, BoxChanged, JackChanged, SoundPlayed, Spoke
+from roboglot.model.events.lift import LiftArrived, LiftCalled, LiftDoorClosed, LiftDoorOpened, LiftFailed
 from roboglot.model.events.mapping import (
     AnnotationsChanged,
     LocalizationLost,
@@ -57,12 +45,7 @@ from roboglot.model.events.senses import (
     CliffDetected,
     Touched,
 )
-from roboglot.model.events.stream import (
-    QUEUE_MAX,
-    Event,
-    EventStream,
-    Subscription,
-)
+from roboglot.model.events.stream import QUEUE_MAX, Event, EventStream, Subscription
 from roboglot.model.events.upkeep import (
     BluetoothConnected,
     BluetoothLost,

@@ -25,19 +25,8 @@ from typing import Any, TypeVar
 import msgspec
 
 from roboglot.programs.engine.checking import Checking
-from roboglot.programs.engine.events import (
-    Answer,
-    ExitReason,
-    Limits,
-    Stops,
-)
-from roboglot.programs.engine.launcher import (
-    EngineError,
-    EngineSilent,
-    Launcher,
-    SandboxUnavailable,
-    Worker,
-)
+from roboglot.programs.engine.events import Answer, ExitReason, Limits, Stops
+from roboglot.programs.engine.launcher import EngineError, EngineSilent, Launcher, SandboxUnavailable, Worker
 from roboglot.programs.engine.memory_budget import MemoryBudget
 from roboglot.programs.engine.processor_group import ProcessorGroup
 from roboglot.programs.engine.run import Run

@@ -13,14 +13,7 @@ from collections.abc import Callable, Iterable
 
 from roboglot.programs.engine.calls import CallRate, Calls
 from roboglot.programs.engine.event_queue import Inbox
-from roboglot.programs.engine.events import (
-    Answer,
-    Event,
-    ExitReason,
-    Failed,
-    Finished,
-    Limits,
-)
+from roboglot.programs.engine.events import Answer, Event, ExitReason, Failed, Finished, Limits
 from roboglot.programs.engine.launcher import Worker
 from roboglot.programs.engine.messages import (
     NAME_MAX,

@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 from roboglot.model.components.energy.battery import Battery
-from roboglot.model.components.interaction.light import (
-    Colour,
-    Light,
-    LightEffect,
-    ZoneState,
-)
+from roboglot.model.components.interaction.light import Colour, Light, LightEffect, ZoneState
 from roboglot.model.errors import InvalidGoal, NotFound, RobotError
 from roboglot.programs.functions.enums import (
     EYE_EFFECTS,

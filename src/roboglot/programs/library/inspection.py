@@ -6,12 +6,7 @@ import asyncio
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 
-from roboglot.programs.engine.engine import (
-    Engine,
-    EngineError,
-    EngineSilent,
-    SandboxUnavailable,
-)
+from roboglot.programs.engine.engine import Engine, EngineError, EngineSilent, SandboxUnavailable
 from roboglot.programs.errors import EngineTimeout, EngineUnavailable, InvalidBody, ProgramProblems
 from roboglot.programs.language import BUILTINS, MODULES, Problem, ProblemKind
 from roboglot.programs.worker.prelude import Prelude

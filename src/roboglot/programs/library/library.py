@@ -18,13 +18,7 @@ from roboglot.programs.errors import (
     RecursiveModule,
 )
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
-from roboglot.programs.library.modules import (
-    ModuleOperation,
-    ModuleState,
-    function_of,
-    in_the_body,
-    next_module_state,
-)
+from roboglot.programs.library.modules import ModuleOperation, ModuleState, function_of, in_the_body, next_module_state
 from roboglot.programs.stores import ListedProgram, ProgramStore, StoredProgram
 from roboglot.programs.tasks.states import TaskOperation
 from roboglot.task_conditions import BadCondition, parse_interface

@@ -13,30 +13,14 @@ from datetime import datetime, tzinfo
 from zlib import crc32
 
 from roboglot.model.robot import Robot
-from roboglot.programs.engine.engine import (
-    Engine,
-    EngineError,
-    EngineSilent,
-    SandboxUnavailable,
-)
-from roboglot.programs.engine.events import (
-    Answer,
-    ExitReason,
-    Limits,
-    Stops,
-)
+from roboglot.programs.engine.engine import Engine, EngineError, EngineSilent, SandboxUnavailable
+from roboglot.programs.engine.events import Answer, ExitReason, Limits, Stops
 from roboglot.programs.engine.journal import Header, Journal, header_of
 from roboglot.programs.errors import CannotExecute, EngineTimeout, ProgramError, StoreError
 from roboglot.programs.functions import ability_set
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LogEntry, StoredProgram, Stores
-from roboglot.programs.tasks.reports import (
-    Audience,
-    Insight,
-    Pace,
-    TaskReport,
-    done,
-)
+from roboglot.programs.tasks.reports import Audience, Insight, Pace, TaskReport, done
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, state_after
 from roboglot.programs.tasks.task_run import Outcome, RunListeners, TaskRun, in_units
 from roboglot.values import dataclass

@@ -24,21 +24,10 @@ from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LOG_MAX, ListedProgram, LogEntry, StoredProgram, Stores
 from roboglot.programs.tasks.owners import act_for_owner
 from roboglot.programs.tasks.recovery import settle
-from roboglot.programs.tasks.reports import (
-    RunFigures,
-    TaskReport,
-    Whereabouts,
-    done,
-)
+from roboglot.programs.tasks.reports import RunFigures, TaskReport, Whereabouts, done
 from roboglot.programs.tasks.robot_modes import check_mode
 from roboglot.programs.tasks.runner import Background, Runner, RunTerms
-from roboglot.programs.tasks.states import (
-    DEBUG,
-    TaskOperation,
-    TaskState,
-    next_state,
-    state_after,
-)
+from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, next_state, state_after
 from roboglot.programs.tasks.timetable import Timetable
 from roboglot.programs.tasks.turns import Turns
 

@@ -17,16 +17,7 @@ from roboglot.model.client_context import set_client
 from roboglot.model.errors import RobotError
 from roboglot.model.inputs.metering import metered
 from roboglot.model.robot import Robot
-from roboglot.programs.engine.events import (
-    Call,
-    ExitReason,
-    Failed,
-    Finished,
-    Halted,
-    Output,
-    Replayed,
-    Stops,
-)
+from roboglot.programs.engine.events import Call, ExitReason, Failed, Finished, Halted, Output, Replayed, Stops
 from roboglot.programs.engine.journal import Journal
 from roboglot.programs.engine.run import Run
 from roboglot.programs.engine.usage import usage_of

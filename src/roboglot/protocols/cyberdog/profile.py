@@ -3,8 +3,6 @@
 Fields that only one of them has are sent in both profiles: clients ignore fields that they do not know.
 """
 
-from __future__ import annotations
-
 from enum import StrEnum
 
 

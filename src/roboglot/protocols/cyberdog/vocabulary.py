@@ -9,12 +9,7 @@ import numpy as np
 
 from roboglot.model.components.mapping.map_library import Label
 from roboglot.model.components.motion.feet import Foot
-from roboglot.model.components.motion.gaits import (
-    FOOT_LIFT_MAX,
-    FOOT_LIFT_MIN,
-    GAITS,
-    Gait,
-)
+from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
 from roboglot.model.components.motion.legs import BodyPose, FootLift
 from roboglot.model.geometry import Orientation, Point, Pose, Twist
 from roboglot.model.maps import OccupancyGrid

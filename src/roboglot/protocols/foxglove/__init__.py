@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.protocols.door import (
-    Chapters,
-    ClosedDoor,
-    Contract,
-    Door,
-    DoorType,
-    Implementation,
-    PortSetting,
-    Site,
-)
+from roboglot.protocols.door import Chapters, ClosedDoor, Contract, Door, DoorType, Implementation, PortSetting, Site
 from roboglot.protocols.foxglove.config import FoxgloveConfig
 from roboglot.wire.contracts import contract
 

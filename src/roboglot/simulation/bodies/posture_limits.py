@@ -6,21 +6,9 @@ import math
 from collections.abc import Sequence
 from itertools import groupby
 
-from roboglot.model.components.motion.feet import (
-    FOOTFALL_SECONDS_MIN,
-    FOOTFALLS_MAX,
-    Foot,
-    Footfall,
-    Foothold,
-)
+from roboglot.model.components.motion.feet import FOOTFALL_SECONDS_MIN, FOOTFALLS_MAX, Foot, Footfall, Foothold
 from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN
-from roboglot.model.components.motion.legs import (
-    STEPS_MAX,
-    BodyPose,
-    FootLift,
-    LegLimits,
-    Step,
-)
+from roboglot.model.components.motion.legs import STEPS_MAX, BodyPose, FootLift, LegLimits, Step
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import STILL, Orientation, Point, Twist
 from roboglot.simulation.bodies.performing import Body

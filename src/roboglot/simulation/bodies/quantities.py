@@ -1,7 +1,5 @@
 """Bounded numbers of body files. SI units."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from msgspec import Meta

@@ -10,17 +10,7 @@ from collections.abc import Iterator
 from enum import StrEnum
 
 from roboglot.model.geometry import Pose
-from roboglot.simulation.world.description import (
-    Box,
-    Cylinder,
-    Floor,
-    Lift,
-    Material,
-    Person,
-    Shelf,
-    Spot,
-    Wall,
-)
+from roboglot.simulation.world.description import Box, Cylinder, Floor, Lift, Material, Person, Shelf, Spot, Wall
 from roboglot.values import dataclass
 
 DOCK_WIDTH, DOCK_DEPTH, DOCK_HEIGHT = 0.36, 0.12, 0.45

@@ -6,12 +6,7 @@ import math
 from collections.abc import Hashable
 
 from roboglot.model.geometry import Pose
-from roboglot.simulation.building.blueprint import (
-    Solid,
-    SolidKind,
-    shelf_solids,
-    solids_of,
-)
+from roboglot.simulation.building.blueprint import Solid, SolidKind, shelf_solids, solids_of
 from roboglot.simulation.building.overlap import overlap, reach_of
 from roboglot.simulation.building.props import Props
 from roboglot.simulation.world.description import Shelf, WorldDescription

@@ -9,16 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose
-from roboglot.model.perception import (
-    JOINTS,
-    Box,
-    FaceSeen,
-    GestureSeen,
-    Joint,
-    PersonSeen,
-    RobotSeen,
-    SkeletonSeen,
-)
+from roboglot.model.perception import JOINTS, Box, FaceSeen, GestureSeen, Joint, PersonSeen, RobotSeen, SkeletonSeen
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.detectors.glance import PIXEL_NOISE, Floats, Glance
 from roboglot.simulation.people import figure

@@ -14,17 +14,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.people import figure
 from roboglot.simulation.people.figure import Floats
 from roboglot.simulation.people.person_state import PersonState
-from roboglot.simulation.people.routine import (
-    Clap,
-    Exercise,
-    Feel,
-    Look,
-    Say,
-    Show,
-    Step,
-    Wait,
-    Walk,
-)
+from roboglot.simulation.people.routine import Clap, Exercise, Feel, Look, Say, Show, Step, Wait, Walk
 from roboglot.simulation.sound.voice import speaking_time
 from roboglot.simulation.world.description import Person
 

@@ -13,17 +13,7 @@ from roboglot.model.perception import Emotion, Gesture, Sport
 from roboglot.model.stage import StagePerson
 from roboglot.simulation.building.blueprint import Solid, person_solid
 from roboglot.simulation.people.people import Walker
-from roboglot.simulation.people.routine import (
-    Clap,
-    Exercise,
-    Feel,
-    Look,
-    Say,
-    Show,
-    Step,
-    Wait,
-    Walk,
-)
+from roboglot.simulation.people.routine import Clap, Exercise, Feel, Look, Say, Show, Step, Wait, Walk
 
 S = TypeVar("S", bound=msgspec.Struct)
 

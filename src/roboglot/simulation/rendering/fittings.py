@@ -23,16 +23,7 @@ from roboglot.simulation.components.interaction.blaster import BlasterSection
 from roboglot.simulation.components.motion.arm import ArmSection
 from roboglot.simulation.components.motion.gimbal_axes import GimbalSection
 from roboglot.simulation.components.motion.gripper import GripperSection
-from roboglot.simulation.rendering.shapes import (
-    Floats,
-    Mesh,
-    Paint,
-    box,
-    card,
-    joined,
-    mesh_of,
-    turned,
-)
+from roboglot.simulation.rendering.shapes import Floats, Mesh, Paint, box, card, joined, mesh_of, turned
 
 BAR = 0.018  # m: half the thickness of an arm's bars
 PAW, SHANK = 0.018, 0.16  # m: half a paw; minimum lengths of thigh and shank

@@ -9,28 +9,13 @@ from itertools import pairwise
 
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import TagKind
-from roboglot.simulation.building.blueprint import (
-    Rectangle,
-    Solid,
-    SolidKind,
-    holes_of,
-)
+from roboglot.simulation.building.blueprint import Rectangle, Solid, SolidKind, holes_of
 from roboglot.simulation.building.cards import PrintedTag
 from roboglot.simulation.building.tags import fixed_tags
 from roboglot.simulation.people import figure
 from roboglot.simulation.rendering.figures import SHIRTS, person
 from roboglot.simulation.rendering.floor_plan import Plan
-from roboglot.simulation.rendering.shapes import (
-    EVERYWHERE,
-    Mesh,
-    Paint,
-    Rgb,
-    box,
-    card,
-    joined,
-    mesh_of,
-    turned,
-)
+from roboglot.simulation.rendering.shapes import EVERYWHERE, Mesh, Paint, Rgb, box, card, joined, mesh_of, turned
 from roboglot.simulation.rendering.textures import Masks, Texture, code_symbol
 from roboglot.simulation.world.description import (
     Colour,

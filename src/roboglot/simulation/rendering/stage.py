@@ -25,22 +25,8 @@ from roboglot.simulation.people.people import Walker
 from roboglot.simulation.rendering.figures import ROBOTS, can, person, robot
 from roboglot.simulation.rendering.fittings import bead, car, fittings
 from roboglot.simulation.rendering.floor_plan import Plan, plan_of
-from roboglot.simulation.rendering.interior import (
-    CEILING,
-    GROUNDS,
-    SKY,
-    interior,
-    movable,
-    printed,
-    symbols_of,
-)
-from roboglot.simulation.rendering.shapes import (
-    UNTURNED,
-    Mesh,
-    joined,
-    paint_row,
-    posed,
-)
+from roboglot.simulation.rendering.interior import CEILING, GROUNDS, SKY, interior, movable, printed, symbols_of
+from roboglot.simulation.rendering.shapes import UNTURNED, Mesh, joined, paint_row, posed
 from roboglot.simulation.rendering.textures import Masks
 from roboglot.simulation.rendering.views import REACH, Eye, Figure, Ground, Instant, Scene
 from roboglot.simulation.world.beads import Beads

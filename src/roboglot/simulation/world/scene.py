@@ -16,28 +16,12 @@ from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import DRIVE_GAIN, wheel_places
 from roboglot.simulation.bodies.hull_legs import LEG_GAIN, TORSO
 from roboglot.simulation.bodies.support import FOOT, GRAVITY, HANGS, MOVES, STANDS
-from roboglot.simulation.building.blueprint import (
-    Rectangle,
-    Solid,
-    SolidKind,
-    holes_of,
-    shaft_of,
-    slabs_of,
-    solids_of,
-)
+from roboglot.simulation.building.blueprint import Rectangle, Solid, SolidKind, holes_of, shaft_of, slabs_of, solids_of
 from roboglot.simulation.building.props import AWAY, keys_of
 from roboglot.simulation.building.terrain import Ground, pieces_of
 from roboglot.simulation.components.sensing.bumper import BumperSection
 from roboglot.simulation.world.declarations import BadFile
-from roboglot.simulation.world.description import (
-    SOLIDS_MAX,
-    Floor,
-    Lift,
-    Person,
-    Terrain,
-    Thing,
-    WorldDescription,
-)
+from roboglot.simulation.world.description import SOLIDS_MAX, Floor, Lift, Person, Terrain, Thing, WorldDescription
 
 TIMESTEP = 0.02 / 3  # s: a third of a tick, and of a contact's time constant
 SLAB = 0.2

@@ -23,12 +23,7 @@ from roboglot.simulation.building.things import Thing
 from roboglot.simulation.people.people import Walker
 from roboglot.simulation.world import reflections
 from roboglot.simulation.world.description import Terrain, WorldDescription
-from roboglot.simulation.world.sweep import (
-    Distances,
-    blur,
-    directions,
-    sweep,
-)
+from roboglot.simulation.world.sweep import Distances, blur, directions, sweep
 
 KEPT_MAX = 64
 Rows = NDArray[np.float64]  # n x 4

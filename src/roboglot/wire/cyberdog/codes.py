@@ -1,7 +1,5 @@
 """The numbers of the protocol: message codes, in-band errors, tasks and their feedback. Knows no messages."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -1,7 +1,5 @@
 """Values of ``feedback.state`` (0.2.1.2.2.1 of the manual). The shipped firmware's 80xx numbers are not used."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -11,13 +11,7 @@ from roboglot.autonomy.navigation.base_actions import start_on_base
 from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.navigation import GridNavigation
-from roboglot.autonomy.navigation.sweeping.lanes import (
-    Stretch,
-    SweptPart,
-    open_stretches,
-    parts,
-    zigzag,
-)
+from roboglot.autonomy.navigation.sweeping.lanes import Stretch, SweptPart, open_stretches, parts, zigzag
 from roboglot.autonomy.navigation.sweeping.swept import Swept
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.annotations import Area, AreaKind

@@ -8,12 +8,7 @@ from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.robomaster import motion
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.arm import (
-    ARM,
-    Arm,
-    ArmPosition,
-    ArmReach,
-)
+from roboglot.model.components.motion.arm import ARM, Arm, ArmPosition, ArmReach
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 

@@ -17,12 +17,7 @@ from roboglot.extras import lazy
 from roboglot.media.h264 import VideoPacket
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import Clock
-from roboglot.model.components.sensing.camera import (
-    EXPOSURE_MAX,
-    Camera,
-    Frame,
-    Mount,
-)
+from roboglot.model.components.sensing.camera import EXPOSURE_MAX, Camera, Frame, Mount
 from roboglot.model.errors import InvalidGoal, Unconnected
 from roboglot.model.feed import Feed, Viewer
 from roboglot.model.geometry import wrap_angle

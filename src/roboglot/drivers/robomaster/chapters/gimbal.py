@@ -12,14 +12,7 @@ from roboglot.drivers.robomaster import motion
 from roboglot.drivers.robomaster.state import ReportedState
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.gimbal import (
-    GIMBAL,
-    FollowMode,
-    Gimbal,
-    GimbalAngles,
-    GimbalFrame,
-    GimbalLimits,
-)
+from roboglot.model.components.motion.gimbal import GIMBAL, FollowMode, Gimbal, GimbalAngles, GimbalFrame, GimbalLimits
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import wrap_angle
 from roboglot.model.robot import Robot

@@ -8,13 +8,7 @@ from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.slamware.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
-from roboglot.model.components.logistics.cargo import (
-    BoxState,
-    Cargo,
-    Compartment,
-    DoorState,
-    Stock,
-)
+from roboglot.model.components.logistics.cargo import BoxState, Cargo, Compartment, DoorState, Stock
 from roboglot.model.errors import Blocked, Expired, NotFound
 from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot

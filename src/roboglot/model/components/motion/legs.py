@@ -7,12 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
-from roboglot.model.components.motion.feet import (
-    Foot,
-    Footfall,
-    Foothold,
-    FootState,
-)
+from roboglot.model.components.motion.feet import Foot, Footfall, Foothold, FootState
 from roboglot.model.components.motion.gaits import Gait
 from roboglot.model.components.motion.motions import Motion
 from roboglot.model.components.motion.posture import Posture

@@ -1,7 +1,5 @@
 """States of the link to a real robot."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 
 

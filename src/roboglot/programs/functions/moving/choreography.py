@@ -6,12 +6,7 @@ import math
 from dataclasses import replace
 
 from roboglot.model.components.motion.feet import Foot, Footfall
-from roboglot.model.components.motion.legs import (
-    BodyPose,
-    FootLift,
-    Legs,
-    Step,
-)
+from roboglot.model.components.motion.legs import BodyPose, FootLift, Legs, Step
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Orientation, Twist
 from roboglot.programs.functions.moving.attitudes import held

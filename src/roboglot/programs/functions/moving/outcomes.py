@@ -6,15 +6,7 @@ from collections.abc import Coroutine
 
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.system.health import MOTOR_ALARM, Health
-from roboglot.model.errors import (
-    Busy,
-    ComponentMissing,
-    EmergencyStopped,
-    Expired,
-    InvalidGoal,
-    Refused,
-    RobotError,
-)
+from roboglot.model.errors import Busy, ComponentMissing, EmergencyStopped, Expired, InvalidGoal, Refused, RobotError
 from roboglot.programs.functions.results import StateCode, state
 from roboglot.programs.functions.session import Session
 from roboglot.programs.worker.values import Record

@@ -9,19 +9,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from roboglot.model.components.motion.feet import (
-    TROT,
-    Foot,
-    Footfall,
-    Foothold,
-)
+from roboglot.model.components.motion.feet import TROT, Foot, Footfall, Foothold
 from roboglot.model.components.motion.gaits import FOOT_LIFT_MIN
-from roboglot.model.components.motion.legs import (
-    STEPS_MAX,
-    BodyPose,
-    Legs,
-    Step,
-)
+from roboglot.model.components.motion.legs import STEPS_MAX, BodyPose, Legs, Step
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import STILL, Orientation, Point, Twist
 from roboglot.programs.functions.moving.attitudes import held

@@ -11,13 +11,7 @@ from roboglot.operations import Right
 from roboglot.protocols import ros_commands
 from roboglot.protocols.foxglove.context import Context, Published
 from roboglot.protocols.foxglove.table import TABLE
-from roboglot.protocols.foxglove.vocabulary import (
-    PoseStamped,
-    PoseWithCovarianceStamped,
-    RosTwist,
-    pose,
-    twist,
-)
+from roboglot.protocols.foxglove.vocabulary import PoseStamped, PoseWithCovarianceStamped, RosTwist, pose, twist
 from roboglot.validation import why_invalid
 
 PUBLISHED_MAX = 100

@@ -10,13 +10,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.operations import Right
 from roboglot.protocols.ros2.context import Context
 from roboglot.protocols.ros2.table import TABLE
-from roboglot.protocols.ros2.vocabulary import (
-    PoseStamped,
-    PoseWithCovarianceStamped,
-    TwistMessage,
-    pose,
-    twist,
-)
+from roboglot.protocols.ros2.vocabulary import PoseStamped, PoseWithCovarianceStamped, TwistMessage, pose, twist
 from roboglot.protocols.ros_commands import drive, go, place
 
 

@@ -7,20 +7,8 @@ import uuid
 from datetime import UTC, datetime
 from typing import Literal
 
-from roboglot.model.components.logistics.delivery import (
-    Delivery,
-    Order,
-    OrderKind,
-    OrderStage,
-    OrderStatus,
-)
-from roboglot.model.components.logistics.industry import (
-    Call,
-    CallKind,
-    Industry,
-    Operation,
-    RoundTemplate,
-)
+from roboglot.model.components.logistics.delivery import Delivery, Order, OrderKind, OrderStage, OrderStatus
+from roboglot.model.components.logistics.industry import Call, CallKind, Industry, Operation, RoundTemplate
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.system.link import require_heard

@@ -11,12 +11,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from roboglot.model.components.interaction.armor import (
-    SENSITIVITY_MAX,
-    Armor,
-    HitKind,
-    PlatePlace,
-)
+from roboglot.model.components.interaction.armor import SENSITIVITY_MAX, Armor, HitKind, PlatePlace
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.events import ArmorHit, EventStream
 from roboglot.simulation.bodies.hull import Hull, rotation

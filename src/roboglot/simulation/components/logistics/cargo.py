@@ -8,13 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action
-from roboglot.model.components.logistics.cargo import (
-    BoxState,
-    Cargo,
-    Compartment,
-    DoorState,
-    Stock,
-)
+from roboglot.model.components.logistics.cargo import BoxState, Cargo, Compartment, DoorState, Stock
 from roboglot.model.errors import Blocked, NotFound, Refused
 from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot

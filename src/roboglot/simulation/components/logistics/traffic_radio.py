@@ -7,13 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from roboglot.model.components.logistics.traffic_radio import (
-    CLAIM_MAX,
-    CLAIMS_MAX,
-    WAY_MAX,
-    Announcement,
-    TrafficRadio,
-)
+from roboglot.model.components.logistics.traffic_radio import CLAIM_MAX, CLAIMS_MAX, WAY_MAX, Announcement, TrafficRadio
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.hull import Hull

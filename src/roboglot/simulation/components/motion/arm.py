@@ -7,12 +7,7 @@ import math
 from msgspec import Struct
 
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.arm import (
-    ARM,
-    Arm,
-    ArmPosition,
-    ArmReach,
-)
+from roboglot.model.components.motion.arm import ARM, Arm, ArmPosition, ArmReach
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move

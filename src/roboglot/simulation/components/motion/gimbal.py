@@ -12,14 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.motion.gimbal import (
-    GIMBAL,
-    FollowMode,
-    Gimbal,
-    GimbalAngles,
-    GimbalFrame,
-    GimbalLimits,
-)
+from roboglot.model.components.motion.gimbal import GIMBAL, FollowMode, Gimbal, GimbalAngles, GimbalFrame, GimbalLimits
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import move

@@ -7,12 +7,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.gripper import (
-    GRIPPER,
-    LEVEL_MAX,
-    Gripper,
-    GripperStatus,
-)
+from roboglot.model.components.motion.gripper import GRIPPER, LEVEL_MAX, Gripper, GripperStatus
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move

@@ -9,13 +9,7 @@ from collections.abc import Sequence
 from roboglot.model.actions import Action
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.network import Network
-from roboglot.model.components.system.system_log import (
-    LINE_MAX,
-    LINES_MAX,
-    SYSTEM_LOG,
-    SystemLog,
-    Upload,
-)
+from roboglot.model.components.system.system_log import LINE_MAX, LINES_MAX, SYSTEM_LOG, SystemLog, Upload
 from roboglot.model.errors import Refused
 from roboglot.model.events import (
     ActionChanged,

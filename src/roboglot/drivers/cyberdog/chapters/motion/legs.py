@@ -15,22 +15,8 @@ from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.feet import Foot, Footfall, FootState
-from roboglot.model.components.motion.gaits import (
-    FOOT_LIFT_MAX,
-    FOOT_LIFT_MIN,
-    GAITS,
-    Gait,
-)
-from roboglot.model.components.motion.legs import (
-    LEGS,
-    BodyPose,
-    Choreography,
-    FootLift,
-    LegLimits,
-    Legs,
-    Posture,
-    Step,
-)
+from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
+from roboglot.model.components.motion.legs import LEGS, BodyPose, Choreography, FootLift, LegLimits, Legs, Posture, Step
 from roboglot.model.components.motion.motions import Motion as Figure
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import LEVEL, STILL, Orientation

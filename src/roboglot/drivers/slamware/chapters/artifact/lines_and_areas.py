@@ -7,12 +7,7 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.local_entries import Drawing, key_of, without_id
-from roboglot.model.components.mapping.annotations import (
-    Area,
-    AreaKind,
-    Line,
-    LineKind,
-)
+from roboglot.model.components.mapping.annotations import Area, AreaKind, Line, LineKind
 from roboglot.model.geometry import Point
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters import artifact as wire

@@ -12,12 +12,7 @@ from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import location, robot_errors
 from roboglot.extras import lazy
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.navigation import (
-    Navigation,
-    NavigationFeedback,
-    NavigationOptions,
-    Tracks,
-)
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions, Tracks
 from roboglot.model.errors import InvalidGoal, Refused, Unreachable
 from roboglot.model.geometry import POSITION_MAX, Path, Point
 from roboglot.wire.slamware import geometry

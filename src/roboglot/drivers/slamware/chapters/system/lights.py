@@ -6,12 +6,7 @@ from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.reported_light import ReportedLight
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.clock import Clock
-from roboglot.model.components.interaction.light import (
-    DARK,
-    Colour,
-    LightEffect,
-    ZoneState,
-)
+from roboglot.model.components.interaction.light import DARK, Colour, LightEffect, ZoneState
 from roboglot.wire.slamware.chapters.system.devices import Channel, Half, LightColour, LightControl, Mode
 
 LAMPS = 20  # of each strip; assumed

@@ -34,15 +34,7 @@ from roboglot.protocols.cyberdog.chapters.people.following import (
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import TABLE
-from roboglot.wire.cyberdog.codes import (
-    Accepted,
-    Code,
-    MachineState,
-    StopResult,
-    TaskResult,
-    TaskState,
-    TaskType,
-)
+from roboglot.wire.cyberdog.codes import Accepted, Code, MachineState, StopResult, TaskResult, TaskState, TaskType
 from roboglot.wire.cyberdog.text import Int32
 
 STREAM_MAX = 7200.0  # s for which one stream stays open for its result

@@ -7,10 +7,7 @@ from collections.abc import Coroutine
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.legs import (
-    Legs,
-    Posture,
-)
+from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
@@ -37,11 +34,7 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
 from roboglot.protocols.cyberdog.chapters.motion.readiness import machine_state, posture_of, refusal_of
 from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.values import dataclass
-from roboglot.wire.cyberdog.chapters.motion.motion import (
-    Motion,
-    MotionCode,
-    SwitchStatus,
-)
+from roboglot.wire.cyberdog.chapters.motion.motion import Motion, MotionCode, SwitchStatus
 from roboglot.wire.cyberdog.codes import MachineState
 
 DURATION_MAX = 60.0  # s: the longest walk by a result command, which only an emergency stop ends

@@ -16,12 +16,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.perception import SpeechHeard
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.motion.gait import NOTHING_SPECIAL, Gaits
-from roboglot.protocols.cyberdog.chapters.system.stored_settings import (
-    MICROPHONE,
-    VOICE_CONTROL,
-    kept,
-    wake_words,
-)
+from roboglot.protocols.cyberdog.chapters.system.stored_settings import MICROPHONE, VOICE_CONTROL, kept, wake_words
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion, MotionCode
 
 log = logging.getLogger(__name__)

@@ -6,10 +6,7 @@ from typing import Annotated
 
 import msgspec
 
-from roboglot.model.components.system.firmware import (
-    Firmware,
-    FirmwareState,
-)
+from roboglot.model.components.system.firmware import Firmware, FirmwareState
 from roboglot.model.errors import InvalidGoal
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call, follow

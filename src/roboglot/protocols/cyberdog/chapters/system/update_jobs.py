@@ -10,12 +10,7 @@ import logging
 from collections.abc import Awaitable, Callable, Mapping
 
 from roboglot.model.components.system.disk import Disk
-from roboglot.model.components.system.firmware import (
-    FIRMWARE,
-    Firmware,
-    FirmwareProgress,
-    FirmwareState,
-)
+from roboglot.model.components.system.firmware import FIRMWARE, Firmware, FirmwareProgress, FirmwareState
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, RobotError
 from roboglot.model.events import FirmwareChanged
 from roboglot.model.robot import Robot

@@ -9,12 +9,7 @@ import logging
 import msgspec
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.system.firmware import (
-    Firmware,
-    FirmwarePackage,
-    FirmwareProgress,
-    FirmwareState,
-)
+from roboglot.model.components.system.firmware import Firmware, FirmwarePackage, FirmwareProgress, FirmwareState
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.model.events import FirmwareChanged

@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from roboglot.model.components.mapping.annotations import (
-    Area,
-    AreaKind,
-    Line,
-    LineKind,
-)
+from roboglot.model.components.mapping.annotations import Area, AreaKind, Line, LineKind
 from roboglot.model.components.mapping.map_memory import Drawings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose

@@ -13,12 +13,7 @@ from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.delivery.box_log import OPEN
-from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
-    box_of,
-    entries_of,
-    name_of,
-    orientation_and_type,
-)
+from roboglot.protocols.slamware.chapters.delivery.vocabulary import box_of, entries_of, name_of, orientation_and_type
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import HttpError

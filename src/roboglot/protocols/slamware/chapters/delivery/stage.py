@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 from roboglot.model.actions import Action
-from roboglot.model.components.logistics.delivery import (
-    Delivery,
-    Order,
-    OrderStage,
-    Phase,
-)
+from roboglot.model.components.logistics.delivery import Delivery, Order, OrderStage, Phase
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.system.health import FaultLevel, Health
 from roboglot.operations import Right

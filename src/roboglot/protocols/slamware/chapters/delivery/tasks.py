@@ -7,21 +7,11 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from roboglot.model.components.logistics.delivery import (
-    Delivery,
-    Order,
-    OrderRequest,
-    OrderStatus,
-)
+from roboglot.model.components.logistics.delivery import Delivery, Order, OrderRequest, OrderStatus
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.errors import ComponentMissing, RobotError
 from roboglot.operations import Right
-from roboglot.protocols.slamware.chapters.delivery.vocabulary import (
-    KIND_WORDS,
-    NO_TASKS,
-    request_of,
-    task_of,
-)
+from roboglot.protocols.slamware.chapters.delivery.vocabulary import KIND_WORDS, NO_TASKS, request_of, task_of
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, NoContent
 from roboglot.wire.slamware.chapters.delivery import (

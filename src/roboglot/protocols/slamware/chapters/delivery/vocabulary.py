@@ -6,12 +6,7 @@ from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 
 from roboglot.model.actions import Action
-from roboglot.model.components.logistics.cargo import (
-    BoxState,
-    Compartment,
-    DoorState,
-    Stock,
-)
+from roboglot.model.components.logistics.cargo import BoxState, Compartment, DoorState, Stock
 from roboglot.model.components.logistics.delivery import (
     BoxChoice,
     Failure,

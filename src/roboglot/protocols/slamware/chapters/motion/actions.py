@@ -23,14 +23,7 @@ from roboglot.model.components.system.link import require_current
 from roboglot.model.errors import InvalidGoal, RobotError, Unreachable
 from roboglot.model.geometry import Point
 from roboglot.operations import Right
-from roboglot.protocols.slamware.chapters.motion import (
-    homing,
-    jacking,
-    moves,
-    relocalizing,
-    rides,
-    tags,
-)
+from roboglot.protocols.slamware.chapters.motion import homing, jacking, moves, relocalizing, rides, tags
 from roboglot.protocols.slamware.chapters.motion.errands import part_of
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError

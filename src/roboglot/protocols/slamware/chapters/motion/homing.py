@@ -11,11 +11,7 @@ from roboglot.model.errors import Blocked, DockNotFound, NotFound, Unreachable
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
-from roboglot.protocols.slamware.chapters.motion.home_docks import (
-    BOUND,
-    NAME,
-    known_docks,
-)
+from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, NAME, known_docks
 from roboglot.protocols.slamware.chapters.motion.moves import navigate, navigation_options
 from roboglot.protocols.slamware.context import Context
 from roboglot.wire.slamware.chapters.motion import GoHome, GoHomeOptions, MoveOptions, ReturnToParkingOptions

@@ -11,12 +11,7 @@ from enum import StrEnum
 
 import msgspec
 
-from roboglot.model.components.mapping.annotations import (
-    Annotations,
-    Area,
-    AreaKind,
-    MapAnnotations,
-)
+from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot

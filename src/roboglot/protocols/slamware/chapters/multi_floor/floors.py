@@ -14,13 +14,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.operations import Right
-from roboglot.protocols.slamware.chapters.motion.home_docks import (
-    BOUND,
-    NAME,
-    before,
-    home_dock,
-    settle_home,
-)
+from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, NAME, before, home_dock, settle_home
 from roboglot.protocols.slamware.chapters.multi_floor.elevators import elevator_around
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName
 from roboglot.protocols.slamware.context import Context

@@ -10,12 +10,7 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 
-from roboglot.model.components.mapping.annotations import (
-    Annotations,
-    Area,
-    Line,
-    LineKind,
-)
+from roboglot.model.components.mapping.annotations import Annotations, Area, Line, LineKind
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest

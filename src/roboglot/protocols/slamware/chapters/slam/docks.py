@@ -16,13 +16,7 @@ from roboglot.model.errors import DockNotFound, InvalidGoal, NotFound
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
-from roboglot.protocols.slamware.chapters.motion.home_docks import (
-    NAME,
-    Docks,
-    change_docks,
-    home_dock,
-    known_docks,
-)
+from roboglot.protocols.slamware.chapters.motion.home_docks import NAME, Docks, change_docks, home_dock, known_docks
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.protocols.slamware.vocabulary import entry_of, pose3d, pose_of

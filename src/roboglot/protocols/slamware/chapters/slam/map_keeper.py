@@ -31,18 +31,8 @@ from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
-from roboglot.protocols.slamware.chapters.motion.home_docks import (
-    before,
-    home_dock,
-    known_docks,
-    settle_home,
-)
-from roboglot.protocols.slamware.chapters.slam.composite import (
-    FloorMap,
-    FloorName,
-    composite_of,
-    floors_of,
-)
+from roboglot.protocols.slamware.chapters.motion.home_docks import before, home_dock, known_docks, settle_home
+from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 from roboglot.wire.slamware.chapters.slam.stcm import Layer, decode_stcm, encode_stcm

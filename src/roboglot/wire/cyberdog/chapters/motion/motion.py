@@ -1,7 +1,5 @@
 """Numbers of motions with their own rules, and codes of results. Knows no robot."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -1,4 +1,4 @@
-"""Recording desk of the machine's owner: starts and stops recordings, marks moments and reports progress."""
+"""Server of ``roboglot record``: starts and stops recordings, marks moments and reports progress."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NAME = "record.sock"  # in the data folder
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
-    """Request to the desk. ``text``: the path to record to, or to save the last minutes to; the words of a mark."""
+    """Request. ``text``: the path to record to, or to save the last minutes to; the words of a mark."""
 
     do: Literal["look", "start", "stop", "mark", "save"] = "look"
     text: str = ""
@@ -38,8 +38,8 @@ class Answer(msgspec.Struct):
     error: str = ""
 
 
-class RecordDesk(LocalServer):
-    """Recording desk of one program; ``recorder`` makes its recorder on first use."""
+class RecordServer(LocalServer):
+    """Recording server of one program; ``recorder`` makes its recorder on first use."""
 
     def __init__(self, folder: Path, recorder: Callable[[], Recorder]) -> None:
         self._recorder = recorder

@@ -1,6 +1,6 @@
-"""Control desk of the machine's owner: shows the mover of each robot, gives and takes control, stops and resets.
+"""Server of ``roboglot lease``, ``stop`` and ``reset``: shows and changes control of the robots of one program.
 
-A socket in the data folder that only its owner can open; a line of JSON comes, a line of JSON goes. Knows no door.
+A socket in the data folder that only its owner can open: one line of JSON per request and answer. Knows no door.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LEASE = "lease"  # the kind of recorded inputs from this socket
 
 
 class Request(msgspec.Struct, forbid_unknown_fields=True):
-    """Request to the desk; ``robot``, or ``all``, is needed except to look; ``who`` is given control."""
+    """Request; ``robot``, or ``all``, is required except to look; ``who`` is given control."""
 
     do: Literal["look", "take", "give", "release", "stop", "reset"] = "look"
     robot: str = ""
@@ -55,8 +55,8 @@ class Answer(msgspec.Struct):
     error: str = ""
 
 
-class LeaseDesk(LocalServer):
-    """Control desk of all robots of one program."""
+class LeaseServer(LocalServer):
+    """Server for all robots of one program."""
 
     def __init__(self, folder: Path, robots: Mapping[str, Robot], stage: Stage | None = None) -> None:
         self._robots, self._stage = robots, stage

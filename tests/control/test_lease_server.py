@@ -13,6 +13,7 @@ import pytest
 from roboglot.cli.control import running
 from roboglot.cli.control.lease import command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
+from roboglot.control.lease_server import NAME, Answer, Control, LeaseServer, Request
 from roboglot.hosting.local_socket import CALLERS_MAX, LINE_MAX
 from roboglot.model.client_context import acting_for
 from roboglot.model.clock import LockstepClock
@@ -25,7 +26,6 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Busy, Refused
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Description, Robot
-from roboglot.protocols.lease_desk import NAME, Answer, Control, LeaseDesk, Request
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.slamware.config import SlamwareConfig
@@ -49,7 +49,7 @@ async def _ask(path: Path, request: Request) -> Answer:
 @pytest.fixture
 async def desk(robot: Robot, world: World, tmp_path: Path) -> AsyncIterator[Path]:
     """The desk's folder."""
-    made = LeaseDesk(tmp_path, world.robots, world.hands)
+    made = LeaseServer(tmp_path, world.robots, world.hands)
     await made.open()
     yield tmp_path
     await made.close()
@@ -109,7 +109,7 @@ async def test_without_socket_robots_are_there_all_the_same(
 ) -> None:
     folder = tmp_path / ("long" * 30)
     folder.mkdir()
-    made = LeaseDesk(folder, {"a": robot})
+    made = LeaseServer(folder, {"a": robot})
     await made.open()
     assert "path is too long" in caplog.text
     await made.close()
@@ -187,7 +187,7 @@ async def test_control_survives_a_restart(tmp_path: Path) -> None:
         robot.add(Settings, StoredSettings(database, "a"))
         robot.add(Health, Health(robot.clock, robot.events))
         robot.add(Lease, Lease(robot))
-        desk = LeaseDesk(tmp_path, {"a": robot})
+        desk = LeaseServer(tmp_path, {"a": robot})
         await desk.open()
         try:
             yield robot, tmp_path / NAME
