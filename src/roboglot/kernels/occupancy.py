@@ -305,7 +305,8 @@ def outside(ends: FloatArray, x: float, y: float, yaw: float, discs: FloatArray)
     for i in range(len(ends)):
         at_x, at_y = cos * ends[i, 0] - sin * ends[i, 1] + x, sin * ends[i, 0] + cos * ends[i, 1] + y
         for k in range(len(discs)):
-            found[i] &= np.hypot(at_x - discs[k, 0], at_y - discs[k, 1]) > discs[k, 2]
+            dx, dy = at_x - discs[k, 0], at_y - discs[k, 1]
+            found[i] &= dx * dx + dy * dy > discs[k, 2] * discs[k, 2]
     return found
 
 

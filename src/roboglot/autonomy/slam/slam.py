@@ -381,8 +381,9 @@ class Slam:
 
     def _straighten(self, odometry: Pose, stamp: float) -> None:
         """Continue straightening after a closed loop; at the end, move the belief to the corrected pose."""
-        belief, pose = self._belief, self._belief.map_to_odom.compose(odometry)
-        if (straightened := self._loops.advance(pose)) is None:
+        belief, loops = self._belief, self._loops
+        pose = belief.map_to_odom.compose(odometry) if loops.straightening else None
+        if pose is None or (straightened := loops.advance(pose)) is None:
             return
         belief.move_to(straightened, odometry)
         self._witness.forget()

@@ -50,8 +50,11 @@ class Courtesy:
         """Return whether to move aside now; to be called at every step."""
         traffic = self._traffic
         stands = follower.speed < STANDS and follower.stop_at - follower.along < 0.4
-        ruled = stands and traffic.meeting is not None and traffic.meeting.stands_in_it
-        return self._is_due(ruled, stands and self._lookout.blocked and traffic.is_faced(self._course.belief.pose))
+        if not stands:
+            self._ruled_since = self._faced_since = math.inf
+            return False
+        ruled = traffic.meeting is not None and traffic.meeting.stands_in_it
+        return self._is_due(ruled, self._lookout.blocked and traffic.is_faced(self._course.belief.pose))
 
     def is_due_without_route(self) -> bool:
         """Return whether to give way without a route of its own: this robot may block the others' routes."""

@@ -52,7 +52,7 @@ class Agenda:
 
     def due(self, tick: int) -> bool:
         """Return whether something may be due in a later tick."""
-        return tick in self._due
+        return tick in self._due or bool(self._left)
 
     def _change(self, number: int) -> None:
         """Note that a duty of a schedule began or ended."""
@@ -128,6 +128,9 @@ class Rounds:
         tick = self._ticks
         for compute in self._ahead:
             compute(tick)
+        if not self._sensed.due(tick):
+            self._sensed.skip(tick)
+            return
         for number in self._sensed.begin(tick):  # one robot at a time: its data stay in the cache
             robots[number].sense(tick, stamp)
             yield

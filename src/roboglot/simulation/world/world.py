@@ -280,7 +280,8 @@ class World:
         robots = tuple(self._population.simulated.values())  # steps lie apart: one may join meanwhile
         beads, rounds, ticking = self._environment.beads, self._rounds, self._ticking
         followed = rounds.control(robots, lean=ticking.lean and not beads.flying)
-        yield
+        if followed:
+            yield
         self.faults.step(self.time)
         self.building.step(self.time, TICK)
         left = ticking.run(self._most(), self._ticks - 1, self._origin, followed=followed)
