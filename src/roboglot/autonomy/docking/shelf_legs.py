@@ -24,6 +24,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
 
+Floats = NDArray[np.float64]
 REACH = 1.1  # m from base_link within which a lifted object's legs stand
 NEAREST = 10  # legs tried as corners
 SHELVES_MAX = 32  # places of removed shelves that are remembered
@@ -34,10 +35,10 @@ class Load:
     """Load on the jack, and the former places (map, m) of removed shelves that the map still shows."""
 
     radius: float = 0.0  # m around base_link that the shelf occupies
-    gone: list[NDArray[np.float64]] = field(default_factory=list)  # (n, 2): the legs of each removed shelf
+    gone: list[Floats] = field(default_factory=list)  # (n, 2): the legs of each removed shelf
     grid: EvidenceGrid | None = None  # the map to which ``gone`` refers
 
-    def gone_from(self, grid: EvidenceGrid) -> NDArray[np.float64]:
+    def gone_from(self, grid: EvidenceGrid) -> Floats:
         """Return the former places (n, 2) of legs that ``grid`` may still show."""
         return np.concatenate(self.gone) if self.gone and grid is self.grid else np.empty((0, 2))
 
@@ -66,7 +67,7 @@ class CarriedLegs:
             reader.carried = reader.carried.reshape(-1, 2)
             self._take_up(reader.carried)
 
-    def _take_up(self, legs: NDArray[np.float64]) -> None:
+    def _take_up(self, legs: Floats) -> None:
         load, belief = self._load, self._belief
         if not len(legs):
             return
@@ -75,7 +76,7 @@ class CarriedLegs:
             load.grid, load.gone = belief.map, []
         load.gone = [*load.gone, _on_map(legs, belief.pose)][-SHELVES_MAX:]
 
-    def _set_down(self, legs: NDArray[np.float64]) -> None:
+    def _set_down(self, legs: Floats) -> None:
         """Forget removed shelves near the place of the shelf that was set down."""
         here = _on_map(legs, self._belief.pose)
         if len(here):
@@ -105,8 +106,8 @@ def _around(corners: list[Point]) -> bool:
     return min(turns) > 0.0 or max(turns) < 0.0
 
 
-def _on_map(legs: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
+def _on_map(legs: Floats, pose: Pose) -> Floats:
     c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-    turned: NDArray[np.float64] = legs @ np.array([[c, s], [-s, c]])
+    turned: Floats = legs @ np.array([[c, s], [-s, c]])
     turned += (pose.x, pose.y)
     return turned

@@ -48,6 +48,7 @@ OFF_MAP = 30.0  # m beyond the known map within which a goal may lie
 ROOM = 20  # cells of margin around start and goal that the grid must hold
 ROUGH_CELLS = 16_000  # of the coarse grid on which many routes are measured at once
 
+Floats = NDArray[np.float64]
 Window = tuple[NDArray[np.int16], NDArray[np.float32], NDArray[np.uint8], Point]
 
 
@@ -78,8 +79,8 @@ class PlanningTask:
         self._check_near()
         bare = self.cost(rules)
         cost = self._shunning(bare)
-        legs: list[NDArray[np.float64]] = []
-        start, driven = self.start, dict[tuple[Point, Point], NDArray[np.float64]]()  # a patrol repeats
+        legs: list[Floats] = []
+        start, driven = self.start, dict[tuple[Point, Point], Floats]()  # a patrol repeats
         for number, goal in enumerate(self.goals, start=1):
             leg = driven.get((start, goal))
             if leg is None:
@@ -116,7 +117,7 @@ class PlanningTask:
             if off > OFF_MAP:
                 raise Unreachable(f"({goal.x:z.2f}, {goal.y:z.2f}) lies {off:.0f} m off the map")
 
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Floats:
         """Return rough distances between start and goals (n + 1, n + 1; m); inf: unreachable.
 
         Several cells count as one, which is open if one of them is: obstacles are inflated by the hull's radius.
@@ -138,7 +139,7 @@ class PlanningTask:
         for number, (row, column) in zip(there, at.tolist(), strict=True):
             found[number, there] = ways_from(rough, row, column)[at[:, 0], at[:, 1]] * (side * RESOLUTION)
         straight = np.array([[a.distance_to(b) for b in stops] for a in stops])
-        lengths: NDArray[np.float64] = np.maximum(np.minimum(found, found.T), straight)
+        lengths: Floats = np.maximum(np.minimum(found, found.T), straight)
         return lengths
 
     def floor(self) -> tuple[NDArray[np.bool_], GridFrame]:
@@ -183,14 +184,14 @@ class PlanningTask:
         reach = (self.radius - SQUEEZE) / RESOLUTION
         reopen(cost, self.evidence, self.seen, self.since, self.trodden, reach, 1.0 + NEAR_COST + UNKNOWN_COST)
 
-    def _open_way_out(self, cost: NDArray[np.float32], leg: NDArray[np.float64]) -> None:
+    def _open_way_out(self, cost: NDArray[np.float32], leg: Floats) -> None:
         """Open the first leg's way out of a narrow place, such as a dock, for later legs."""
         here, there = Point(*leg[0].tolist()), Point(*leg[min(1, len(leg) - 1)].tolist())
         if here.distance_to(there) <= ESCAPE_MAX:
             _mark_line(self.trodden, self.corner, here, there)
             self._reopen(cost)
 
-    def _leg(self, cost: NDArray[np.float32], start: Point, goal: Point, name: str) -> NDArray[np.float64]:
+    def _leg(self, cost: NDArray[np.float32], start: Point, goal: Point, name: str) -> Floats:
         """Return the vertices (n, 2; map, m) from ``start`` to ``goal``. Raises Unreachable."""
         first = self._open_cell(cost, start, ESCAPE_MAX)
         last = self._open_cell(cost, goal, self.tolerance + HALF_DIAGONAL)
@@ -272,7 +273,7 @@ class Planner:
         """Radius around base_link that must stay free, of the hull or the load on the jack, m."""
         return max(self._hull, self._load.radius)
 
-    def observe(self, scan: ScanPoints, pose: Pose, now: float) -> NDArray[np.float64]:
+    def observe(self, scan: ScanPoints, pose: Pose, now: float) -> Floats:
         """Remember obstacles of a scan; return its near echoes in map (n, 2; m)."""
         grid = self._belief.map
         gone = self._load.gone_from(grid)
@@ -299,11 +300,11 @@ class Planner:
             for seen in memories:
                 np.minimum(seen[window], np.float32(until), out=seen[window])
 
-    def observe_low(self, view: LowView, echoes: NDArray[np.float64], pose: Pose, now: float) -> NDArray[np.float64]:
+    def observe_low(self, view: LowView, echoes: Floats, pose: Pose, now: float) -> Floats:
         """Remember obstacles off the lidar's plane that ``echoes`` (map) do not show; return them in map (n, 2; m)."""
         return self._low.observe(self._belief.map, view, echoes, pose, now)
 
-    def low_around(self, pose: Pose, reach: float, now: float) -> NDArray[np.float64]:
+    def low_around(self, pose: Pose, reach: float, now: float) -> Floats:
         """Return the remembered low obstacles within ``reach`` m, in map (n, 2; m)."""
         return self._low.around(self._belief.map, pose, reach, now - OBSTACLE_SECONDS)
 
@@ -332,7 +333,7 @@ class Planner:
         begin = pose if last is None or last.distance_to(pose) > TREAD_MAX else last
         _mark_line(trodden, grid.corner, begin.point, pose.point)
 
-    def free_way(self, path: NDArray[np.float64], points: NDArray[np.float64], pose: Pose, margin: float) -> float:
+    def free_way(self, path: Floats, points: Floats, pose: Pose, margin: float) -> float:
         """Return the distance along ``path`` until a point is within ``margin`` m of the hull, m; inf: none is."""
         return float(free_way(path, points, pose.x, pose.y, self.radius + margin))
 

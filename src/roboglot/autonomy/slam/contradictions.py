@@ -25,6 +25,7 @@ from roboglot.kernels.matching import gaps
 from roboglot.model.geometry import Pose
 from roboglot.values import dataclass
 
+Floats = NDArray[np.float64]
 CONTRADICTION = 0.015  # m between both poses from which they are compared
 ALONG, STILL = 0.05, 0.004  # m per m driven, m: the error of wheels without slip in one step
 POINTS_MAX = 300
@@ -81,7 +82,7 @@ class WheelWitness:
         self._past.append(Moment(stamp, self._wheels, pose, way, self._variance))
 
     def contest(
-        self, grid: EvidenceGrid, scan: ScanPoints, before: Pose, best: Match, prior: NDArray[np.float64], step: Pose
+        self, grid: EvidenceGrid, scan: ScanPoints, before: Pose, best: Match, prior: Floats, step: Pose
     ) -> Match | None:
         """Return the pose by the wheels, if it is more credible than the ``best`` match; else None.
 
@@ -127,7 +128,7 @@ def contested(
     scan: ScanPoints,
     before: Pose,
     best: Match,
-    prior: NDArray[np.float64],
+    prior: Floats,
     way: float,
     sigma: float,
 ) -> Match | None:
@@ -162,7 +163,7 @@ def contested(
     return driven
 
 
-def _fresh(grid: EvidenceGrid, places: NDArray[np.float64]) -> int:
+def _fresh(grid: EvidenceGrid, places: Floats) -> int:
     """Return how many of ``places`` (n, 2; map, m) lie on surfaces that few scans have seen.
 
     Such a surface that fits the scan's pose alone belongs to a thing that moves along: if it stood still, the surface
@@ -174,7 +175,7 @@ def _fresh(grid: EvidenceGrid, places: NDArray[np.float64]) -> int:
     return int(np.count_nonzero(most < FIRM))
 
 
-def _by_walls(grid: EvidenceGrid, scan: ScanPoints, before: Pose, tight: NDArray[np.float64]) -> Match:
+def _by_walls(grid: EvidenceGrid, scan: ScanPoints, before: Pose, tight: Floats) -> Match:
     """Return the wheels' pose, corrected by walls only; the match is judged by the whole scan."""
     points = scan.points[:: math.ceil(len(scan.points) / MATCH_POINTS_MAX)]
     walls = np.ascontiguousarray(points[on_walls(points)])
@@ -183,11 +184,9 @@ def _by_walls(grid: EvidenceGrid, scan: ScanPoints, before: Pose, tight: NDArray
     return fit(grid, scan, before, tight, iterations=0)
 
 
-def _off(grid: EvidenceGrid, scan: ScanPoints, points: NDArray[np.float64], pose: Pose) -> NDArray[np.float64]:
+def _off(grid: EvidenceGrid, scan: ScanPoints, points: Floats, pose: Pose) -> Floats:
     """Return each point's distance (m) from the map's surfaces with base_link at ``pose``."""
     corner, sensor = grid.corner, np.array((scan.sensor.x, scan.sensor.y))
     x, y = pose.x - corner.x, pose.y - corner.y
-    off: NDArray[np.float64] = gaps(
-        grid.slots, grid.surfaces, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION
-    )[:, 0]
+    off: Floats = gaps(grid.slots, grid.surfaces, grid.evidence, points, x, y, pose.yaw, sensor, RESOLUTION)[:, 0]
     return np.minimum(off, GAP_MAX)

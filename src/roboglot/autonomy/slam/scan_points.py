@@ -12,6 +12,7 @@ from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.sensing import LaserScan
 from roboglot.values import dataclass
 
+Floats = NDArray[np.float64]
 RAYS_MAX = 8192
 NEARBY = 12.0  # m
 DESKEW_FROM = 0.01  # m or rad of motion during one turn of the lidar from which rays are corrected
@@ -26,15 +27,15 @@ class ScanPoints:
     Rays without an echo end at the scan's ``clear_range``.
     """
 
-    ends: NDArray[np.float64]
+    ends: Floats
     hit: NDArray[np.uint8]
-    points: NDArray[np.float64]
+    points: Floats
     sensor: Point
 
-    def in_frame(self, pose: Pose, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def in_frame(self, pose: Pose, points: Floats) -> Floats:
         """Return ``points`` (n, 2; base_link) in the frame in which base_link is at ``pose``."""
         c, s = np.cos(pose.yaw), np.sin(pose.yaw)
-        turned: NDArray[np.float64] = points @ np.array([[c, s], [-s, c]])
+        turned: Floats = points @ np.array([[c, s], [-s, c]])
         turned += (pose.x, pose.y)
         return turned
 
@@ -50,7 +51,7 @@ class ScanPoints:
         ends, hit = np.ascontiguousarray(self.ends[kept]), np.ascontiguousarray(self.hit[kept])
         return ScanPoints(ends, hit, np.ascontiguousarray(ends[hit > 0]), self.sensor)
 
-    def nearby(self, most: int) -> NDArray[np.float64]:
+    def nearby(self, most: int) -> Floats:
         """Return at most ``most`` of the points within NEARBY m, evenly chosen (n, 2; base_link)."""
         near = self.points[np.hypot(self.points[:, 0], self.points[:, 1]) < NEARBY]
         return np.ascontiguousarray(near[:: max(1, -(-len(near) // most))])
@@ -71,9 +72,9 @@ class ScanReader:
         self._odometry = odometry  # gives the robot's motion while the lidar turns
         self._last: tuple[LaserScan, ScanPoints] | None = None
         self._key: object = None
-        self.carried: NDArray[np.float64] | None = None  # (n, 2): the legs of the load around the robot, base_link, m
+        self.carried: Floats | None = None  # (n, 2): the legs of the load around the robot, base_link, m
         self._directions = (np.empty(0), np.empty(0))  # x and y components of each ray
-        self._rays_of: Callable[..., tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.float64]]] | None = None
+        self._rays_of: Callable[..., tuple[Floats, NDArray[np.uint8], Floats]] | None = None
 
     def load_kernel(self) -> None:
         """Use the compiled kernel from now on: identical results in a fifth of the time."""
@@ -127,7 +128,7 @@ def is_covered(ranges: NDArray[np.float32]) -> bool:
     return bool(np.count_nonzero(np.isnan(ranges)) > (1.0 - ECHO_SHARE_MIN) * len(ranges))
 
 
-def _deskewed(ends: NDArray[np.float64], velocity: Twist, increment: float) -> NDArray[np.float64]:
+def _deskewed(ends: Floats, velocity: Twist, increment: float) -> Floats:
     """Return ``ends`` (n, 2), taken ``increment`` s apart, in base_link at the time of the first."""
     seconds = increment * np.arange(len(ends))
     yaw = velocity.yaw * seconds

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from roboglot.model.perception import TagKind
 from roboglot.simulation.building.printed_codes import april, qr
 
+Floats = NDArray[np.float64]
 SIZE = 256
 SMALLEST = 2
 SPARES_MAX = 32  # symbols requested later; more than can hang at the same time
@@ -74,7 +75,7 @@ class Masks:
 
 
 @cache
-def _surface(painter: Callable[[], NDArray[np.float64]]) -> Mask:
+def _surface(painter: Callable[[], Floats]) -> Mask:
     return _with_copies(painter())
 
 
@@ -94,7 +95,7 @@ def _symbol(name: str) -> Mask:
             return _with_copies(_letters(name))
 
 
-def _with_copies(mask: NDArray[np.float64]) -> Mask:
+def _with_copies(mask: Floats) -> Mask:
     """Return a mask (256 x 256, 0..255) and its halves down to SMALLEST as one row; a texel holds neighbours, too."""
     parts = []
     while len(mask) >= SMALLEST:
@@ -105,12 +106,12 @@ def _with_copies(mask: NDArray[np.float64]) -> Mask:
     return np.concatenate(parts)
 
 
-def _grid() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _grid() -> tuple[Floats, Floats]:
     rows, columns = np.mgrid[0:SIZE, 0:SIZE].astype(np.float64) / SIZE
     return rows, columns
 
 
-def _noise(cells: int, seed: int, strength: float) -> NDArray[np.float64]:
+def _noise(cells: int, seed: int, strength: float) -> Floats:
     """Return smooth random hills around 0 that match at the edges."""
     random = np.random.Generator(np.random.PCG64(seed)).standard_normal((cells, cells))
     random = np.concatenate((random, random[:1]))
@@ -120,11 +121,11 @@ def _noise(cells: int, seed: int, strength: float) -> NDArray[np.float64]:
     part = (at - low)[:, None]
     rows = random[low] * (1 - part) + random[low + 1] * part
     part = part.T
-    smooth: NDArray[np.float64] = strength * (rows[:, low] * (1 - part) + rows[:, low + 1] * part)
+    smooth: Floats = strength * (rows[:, low] * (1 - part) + rows[:, low + 1] * part)
     return smooth
 
 
-def _tiles() -> NDArray[np.float64]:
+def _tiles() -> Floats:
     """Four tiles by four with joints."""
     rows, columns = _grid()
     joint = ((rows * 4) % 1 < 0.03) | ((columns * 4) % 1 < 0.03)
@@ -132,13 +133,13 @@ def _tiles() -> NDArray[np.float64]:
     return np.where(joint, 220.0, 20 + tone + _noise(64, 1, 6))
 
 
-def _carpet() -> NDArray[np.float64]:
+def _carpet() -> Floats:
     rows, columns = _grid()
     squares = (np.floor(rows * 4) + np.floor(columns * 4)) % 2
     return 70 + 40 * squares + _noise(128, 2, 22) + _noise(16, 3, 8)
 
 
-def _wood() -> NDArray[np.float64]:
+def _wood() -> Floats:
     """Boards along the first axis, eight of them, with grain."""
     rows, columns = _grid()
     board = np.floor(rows * 8)
@@ -150,14 +151,14 @@ def _wood() -> NDArray[np.float64]:
     return np.where(((rows * 8) % 1 < 0.05) | ends, 235.0, shade + grain)
 
 
-def _wall() -> NDArray[np.float64]:
+def _wall() -> Floats:
     """Plaster from the floor (with a skirting board) to the ceiling, darker in the edges."""
     rows, _ = _grid()
     edges = 70 * np.exp(-rows / 0.05) + 45 * np.exp(-(1 - rows) / 0.06)
     return np.where(rows < 0.03, 255.0, 8 + edges + _noise(64, 7, 3) + _noise(8, 8, 4))
 
 
-def _ceiling() -> NDArray[np.float64]:
+def _ceiling() -> Floats:
     """Four by four panels, one of them a lamp."""
     rows, columns = _grid()
     joint = ((rows * 4) % 1 < 0.03) | ((columns * 4) % 1 < 0.03)
@@ -165,7 +166,7 @@ def _ceiling() -> NDArray[np.float64]:
     return np.where(joint, 90.0, np.where(lamp, 255.0, 140 + _noise(64, 9, 5)))
 
 
-def _shelf() -> NDArray[np.float64]:
+def _shelf() -> Floats:
     """Four boards with books in many shades."""
     rows, columns = _grid()
     random = np.random.Generator(np.random.PCG64(10))
@@ -176,7 +177,7 @@ def _shelf() -> NDArray[np.float64]:
     return np.where(within < 0.1, 120.0, np.where(columns < 0.015, 120.0, books))
 
 
-def _drawers() -> NDArray[np.float64]:
+def _drawers() -> Floats:
     """Two by three fronts with handles."""
     rows, columns = _grid()
     y, x = (rows * 3) % 1, (columns * 2) % 1
@@ -185,14 +186,14 @@ def _drawers() -> NDArray[np.float64]:
     return np.where(gap, 230.0, np.where(handle, 200.0, 30 + _noise(32, 11, 5)))
 
 
-def _window() -> NDArray[np.float64]:
+def _window() -> Floats:
     """A frame (mask 0) around two panes; the sky grows brighter upwards."""
     rows, columns = _grid()
     frame = (np.abs(rows - 0.5) > 0.45) | (np.abs(columns - 0.5) > 0.46) | (np.abs(columns - 0.5) < 0.02)
     return np.where(frame, 0.0, 150 + 105 * rows)
 
 
-def _cardboard() -> NDArray[np.float64]:
+def _cardboard() -> Floats:
     """Brown paper with tape across."""
     rows, columns = _grid()
     edge = (np.minimum(rows, 1 - rows) < 0.02) | (np.minimum(columns, 1 - columns) < 0.02)
@@ -200,7 +201,7 @@ def _cardboard() -> NDArray[np.float64]:
     return np.where(edge, 200.0, np.where(tape, 120.0, 20 + _noise(64, 12, 6)))
 
 
-def _letters(text: str) -> NDArray[np.float64]:
+def _letters(text: str) -> Floats:
     """Return up to three characters, as large as possible."""
     from PIL import Image, ImageDraw, ImageFont
 
@@ -211,21 +212,21 @@ def _letters(text: str) -> NDArray[np.float64]:
     return np.asarray(image, dtype=np.float64)[::-1]
 
 
-def _heart() -> NDArray[np.float64]:
+def _heart() -> Floats:
     rows, columns = _grid()
     x, y = (columns - 0.5) * 3.0, (rows - 0.45) * 3.0
     return np.where((x**2 + y**2 - 1) ** 3 < x**2 * y**3, 255.0, 0.0)
 
 
-def _code(kind: str, text: str) -> NDArray[np.float64]:
+def _code(kind: str, text: str) -> Floats:
     """Return the code's black and white squares."""
     squares = april(int(text)) if kind == TagKind.APRIL else qr(text)
     index = np.arange(SIZE) * len(squares) // SIZE
-    mask: NDArray[np.float64] = squares[::-1][index][:, index].astype(np.float64) * 255.0
+    mask: Floats = squares[::-1][index][:, index].astype(np.float64) * 255.0
     return mask
 
 
-def _arrow() -> NDArray[np.float64]:
+def _arrow() -> Floats:
     """Return an arrow that points up (row 0 is at the bottom)."""
     rows, columns = _grid()
     off = np.abs(columns - 0.5)
@@ -233,7 +234,7 @@ def _arrow() -> NDArray[np.float64]:
     return np.where(head | ((rows > 0.1) & (rows <= 0.5) & (off < 0.13)), 255.0, 0.0)
 
 
-_PAINTERS: dict[Texture, Callable[[], NDArray[np.float64]]] = {
+_PAINTERS: dict[Texture, Callable[[], Floats]] = {
     Texture.TILES: _tiles,
     Texture.CARPET: _carpet,
     Texture.WOOD: _wood,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 PASSED = 0  # a kind of shape that the kernel skips
+Floats = NDArray[np.float64]
 UNSEEN = 5  # MuJoCo's group for geoms that rays pass through
 SEEN = np.array([group != UNSEEN for group in range(6)], np.uint8)
 COMPILED = (2, 3, 5, 6)  # MuJoCo's numbers of the shapes that the kernel supports: all but ramps, which are meshes
@@ -29,8 +30,8 @@ class Rays:
 
         self._model, self._data, self._mujoco = model, data, mujoco
         self._kinds: dict[Hull, NDArray[np.int32]] = {}  # of all shapes except those of the observing robot
-        self._kernel: Callable[..., NDArray[np.float64]] | None = None
-        self._look: Callable[..., NDArray[np.float64]] | None = None
+        self._kernel: Callable[..., Floats] | None = None
+        self._look: Callable[..., Floats] | None = None
         self.reading: Callable[..., NDArray[np.float32]] = _reading
         self._outdated = False  # whether people and props may have moved since the physics placed all shapes
 
@@ -54,9 +55,7 @@ class Rays:
 
             self._kernel, self._look, self.reading = cast, look, reading
 
-    def cast(
-        self, origins: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
-    ) -> NDArray[np.float64]:
+    def cast(self, origins: Floats, directions: Floats, reach: float, viewer: Hull) -> Floats:
         """Return distances (m) along ``directions`` (n x 3, of length 1); inf where nothing is nearer than ``reach``.
 
         The directions are split evenly among the ``origins`` (m x 3), in order.
@@ -68,9 +67,7 @@ class Rays:
             return np.concatenate([self._cast_slowly(origin, ways, reach, viewer) for origin, ways in parts])
         return self._kernel(*self._solids(viewer), origins, directions, reach)
 
-    def look(
-        self, eyes: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
-    ) -> NDArray[np.float64]:
+    def look(self, eyes: Floats, directions: Floats, reach: float, viewer: Hull) -> Floats:
         """Return the same for ``eyes`` and ``directions`` in the viewer's base_link."""
         turn, (x, y, z) = rotation(viewer.tilt, viewer.turned), (viewer.x, viewer.y, viewer.elevation)
         if self._look is None:
@@ -87,9 +84,7 @@ class Rays:
         model, data = self._model, self._data
         return kinds, data.geom_xpos, data.geom_xmat, model.geom_size, model.geom_rbound
 
-    def _cast_slowly(
-        self, origin: NDArray[np.float64], directions: NDArray[np.float64], reach: float, viewer: Hull
-    ) -> NDArray[np.float64]:
+    def _cast_slowly(self, origin: Floats, directions: Floats, reach: float, viewer: Hull) -> Floats:
         """Return the same from MuJoCo, which supports every shape."""
         count = len(directions)
         found, distances = np.empty(count, np.int32), np.empty(count)
@@ -101,7 +96,7 @@ class Rays:
         distances[(found < 0) | (distances > reach)] = np.inf
         return distances
 
-    def meet(self, origin: NDArray[np.float64], way: NDArray[np.float64], viewer: Hull) -> tuple[float, str] | None:
+    def meet(self, origin: Floats, way: Floats, viewer: Hull) -> tuple[float, str] | None:
         """Return the first hit on the straight ``way`` from ``origin`` (3 each, m): share of the way, and name."""
         self._place_shapes()
         found = np.zeros(1, np.int32)
@@ -121,9 +116,9 @@ class Rays:
 
 
 def _reading(
-    ways: NDArray[np.float64],
-    shares: NDArray[np.float64],
-    noise: NDArray[np.float64],
+    ways: Floats,
+    shares: Floats,
+    noise: Floats,
     sigmas: tuple[float, float],
     limits: tuple[float, float, float],
 ) -> NDArray[np.float32]:
