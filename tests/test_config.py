@@ -83,6 +83,7 @@ def test_address_moves_first_robot_of_a_file(tmp_path: Path) -> None:
         ("address = '127.0.0.5'", r"address is a setting of one robot: it stands below \[\[robots\]\]"),
         ("[slamware]\nprt = 1", r"slamware\.prt is not a setting"),
         ("[[robots]]\nnamex = 'a'", r"robots\.namex is not a setting"),
+        ("[[robots]]\nstart = {x = 1, y = 1, yw = 2}", r"robots\.start\.yw is not a setting; did you mean 'yaw'"),
         ("seed = 'x'", "seed"),
         ("robots = []", "between 1 and"),
         ("[[robots]]\nname='a'\n[[robots]]\nname='a'", "two robots have the name a"),

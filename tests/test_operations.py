@@ -34,6 +34,18 @@ async def test_words_from_the_wire_become_types() -> None:
     assert (operation.summary, operation.partial, operation.names) == ("Move a bit.", "cannot fly", ("x", "count"))
 
 
+def test_exact_table_guesses_at_unknown_parameters() -> None:
+    commands: OperationTable[str] = OperationTable("exact", exact=True)
+
+    @commands.on("move")
+    async def move(_: str, *, degrees: float = 0.0) -> float:
+        return degrees
+
+    assert commands["move"].parse({"degrees": "3"}) == {"degrees": 3.0}
+    with pytest.raises(BadParameters, match=r"^degree is unknown; did you mean 'degrees'\?$"):
+        commands["move"].parse({"degree": 3})
+
+
 @pytest.mark.parametrize(
     ("given", "count"), [("000", 0), ("0", 0), ("007", 7), ("-03", -3), ("010", 10), ("00", 0), ("0x1", None)]
 )

@@ -392,9 +392,7 @@ def _refuse_unknown(
             if not prefix and key in {field.name for field in dataclasses.fields(RobotConfig)}:
                 raise ValueError(f"{key} is a setting of one robot: it stands below [[robots]]")
             raise ValueError(f"{prefix + key} is not a setting{instead(key, fields)}")
-        nested = fields[key]
-        if isinstance(value, dict) and isinstance(nested, type) and dataclasses.is_dataclass(nested):
-            _refuse_unknown(value, nested, f"{prefix}{key}.")
-        for entry in value if key == "robots" and isinstance(value, list) else ():
-            if isinstance(entry, dict):
-                _refuse_unknown(entry, RobotConfig, "robots.")
+        nested = {"robots": RobotConfig, "start": StartConfig}.get(key, fields[key])
+        for entry in value if isinstance(value, list) else [value]:
+            if isinstance(entry, dict) and isinstance(nested, type) and dataclasses.is_dataclass(nested):
+                _refuse_unknown(entry, nested, f"{prefix}{key}.")

@@ -46,8 +46,8 @@ class BadParameters(ValueError):
 class Schema:
     """Schema of a handler, from its signature; read at the first use, as most operations are never called."""
 
-    def __init__(self, handler: Callable[..., object]) -> None:
-        self._handler = handler
+    def __init__(self, handler: Callable[..., object], *, exact: bool = False) -> None:
+        self._handler, self._exact = handler, exact
 
     @cached_property
     def signature(self) -> inspect.Signature:
@@ -57,7 +57,7 @@ class Schema:
     @cached_property
     def parameters(self) -> type[msgspec.Struct]:
         """Struct of the parameters after the first."""
-        return _parameters_of(self._handler.__qualname__, self.signature)
+        return _parameters_of(self._handler.__qualname__, self.signature, self._exact)
 
     def without_zeros(self, values: Mapping[str, object]) -> Mapping[str, object]:
         """Return ``values`` without the zeros before a number ("000", "-07"), which JSON does not allow."""
@@ -113,7 +113,7 @@ class Operation(Generic[K]):
         return (self.handler.__doc__ or "").strip().partition("\n")[0]
 
     def parse(self, values: Mapping[str, object], kinds: Mapping[str, str] = KINDS) -> dict[str, object]:
-        """Convert and check wire values by name; unknown names are ignored, and zeros before a number.
+        """Convert and check wire values by name; zeros before a number are ignored, and unknown names if not ``exact``.
 
         Raises BadParameters, in the words of ``kinds`` for types.
         """
@@ -122,21 +122,24 @@ class Operation(Generic[K]):
         except msgspec.ValidationError as error:
             if (plain := self.schema.without_zeros(values)) != values:
                 return self.parse(plain, kinds)
-            raise BadParameters(why_invalid(error, kinds=kinds)) from None
+            raise BadParameters(why_invalid(error, kinds=kinds, wanted=self.parameters)) from None
         return {name: getattr(checked, name) for name in self.names}
 
     async def call(self, context: object, values: Mapping[str, object]) -> Any:
         """Parse ``values`` and run the handler with ``context`` first."""
-        parsed = self.parse(values) if self.parameters.__struct_fields__ else {}
+        parsed = self.parse(values) if values or self.parameters.__struct_fields__ else {}
         answer = self.handler(context, **parsed)
         return await answer if isinstance(answer, CoroutineType) else answer
 
 
 class OperationTable(Generic[K]):
-    """All operations of one protocol; a name declared twice fails at import."""
+    """All operations of one protocol; a name declared twice fails at import.
 
-    def __init__(self, name: str, right: Right | None = None) -> None:
-        self.name = name
+    ``exact``: unknown parameters are refused; protocols whose newer clients may send more ignore them.
+    """
+
+    def __init__(self, name: str, right: Right | None = None, *, exact: bool = False) -> None:
+        self.name, self._exact = name, exact
         self._right = right  # for all operations that declare none
         self._operations: dict[K, Operation[K]] = {}
 
@@ -152,7 +155,7 @@ class OperationTable(Generic[K]):
 
         def register(handler: Handler) -> Handler:
             _refuse_untyped(handler)
-            schema = Schema(handler)
+            schema = Schema(handler, exact=self._exact)
             for key in keys:
                 if key in self._operations:
                     raise ValueError(f"{self.name}: {key!r} is declared twice")
@@ -203,11 +206,11 @@ def _refuse_untyped(handler: Callable[..., object]) -> None:
             raise TypeError(f"{handler.__qualname__}: parameter {name} has no type")
 
 
-def _parameters_of(name: str, signature: inspect.Signature) -> type[msgspec.Struct]:
+def _parameters_of(name: str, signature: inspect.Signature, exact: bool) -> type[msgspec.Struct]:
     """Return a struct type with a handler's parameters after the first."""
     _, *parameters = signature.parameters.values()
     fields: list[tuple[str, object] | tuple[str, object, object]] = []
     for parameter in parameters:
         field = (parameter.name, parameter.annotation)
         fields.append(field if parameter.default is parameter.empty else (*field, parameter.default))
-    return msgspec.defstruct(name, fields, kw_only=True)
+    return msgspec.defstruct(name, fields, kw_only=True, forbid_unknown_fields=exact)

@@ -12,6 +12,8 @@ from typing import TypeVar
 
 import msgspec
 
+from roboglot.spelling import meant
+
 T = TypeVar("T")
 
 KINDS = {
@@ -46,13 +48,43 @@ FORMS = frozenset(form.replace("{place}", "{}") for form in _FORMS.values())
 
 
 def why_invalid(
-    error: Exception, whole: str = "the value", *, field: str = "", kinds: Mapping[str, str] = KINDS
+    error: Exception,
+    whole: str = "the value",
+    *,
+    field: str = "",
+    kinds: Mapping[str, str] = KINDS,
+    wanted: object = None,
 ) -> str:
     """Return in plain words why a value is invalid; the text of another error unchanged.
 
     ``field``: the field with the value, if it is not the whole; ``whole``: its name if no field is wrong.
-    ``kinds``: the words for types.
+    ``kinds``: the words for types. ``wanted``: the type that the value should have, for a guess at an unknown field.
     """
+    message = _plain(error, whole, field, kinds)
+    unknown = re.search(r"unknown field `([^`]+)`", str(error)) if wanted else None
+    return message + meant(unknown[1], _fields_of(wanted)) if unknown else message
+
+
+def _fields_of(kind: object) -> set[str]:
+    """Return the names of all fields that may occur anywhere in a value of a type."""
+    names: set[str] = set()
+    waiting = [msgspec.inspect.type_info(kind)]
+    while waiting:
+        match waiting.pop():
+            case msgspec.inspect.StructType(fields=fields):
+                new = {field.encode_name for field in fields} - names
+                names |= new
+                waiting += [field.type for field in fields if field.encode_name in new]
+            case msgspec.inspect.UnionType(types=types):
+                waiting += types
+            case msgspec.inspect.VarTupleType(item_type=item) | msgspec.inspect.ListType(item_type=item):
+                waiting.append(item)
+            case msgspec.inspect.DictType(value_type=value):
+                waiting.append(value)
+    return names
+
+
+def _plain(error: Exception, whole: str, field: str, kinds: Mapping[str, str]) -> str:
     if isinstance(error, RecursionError):
         return "JSON is nested too deeply"
     if not isinstance(error, msgspec.ValidationError):

@@ -176,6 +176,8 @@ async def test_a_fault_and_its_end(shown: Shown) -> None:
 async def test_refusals_say_why(shown: Shown) -> None:
     async with tools(shown) as client:
         assert "no robot 'b'" in await refusal(client, "where_am_i", robot="b")
+        for plan in ({"plan": [], "plans": []}, {"plan": [{"do": "drive", "z": 1.0}]}):
+            assert "Extra inputs are not permitted" in await refusal(client, "rehearse", **plan)
         async with tools_of("http://127.0.0.1:1") as lost:
             assert "start it with `roboglot up`" in await refusal(lost, "robots")
 

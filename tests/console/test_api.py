@@ -18,6 +18,7 @@ from websockets.asyncio.client import connect
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
 from roboglot.console.resend import resend
 from roboglot.console.thumbnails import ROBOT, UNKNOWN, thumbnail
+from roboglot.console.verbs.clock import CLOCK_VERBS
 from roboglot.console.verbs.robots import VERBS
 from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.model.clock import LockstepClock, RealClock
@@ -34,7 +35,7 @@ from roboglot.model.errors import Unconnected
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.tap import Direction, Exchange
-from roboglot.operations import BadParameters
+from roboglot.operations import BadParameters, OperationTable
 from roboglot.protocols.door import Endpoint
 from roboglot.runtime import Runtime
 from roboglot.simulation.world.world_files import load_world
@@ -143,6 +144,26 @@ async def test_the_description_lists_every_verb(shown: Shown) -> None:
             operation.names
         )
     assert {f"/api/world/{operation.key}" for operation in WORLD_VERBS} <= set(described["paths"])
+
+
+@pytest.mark.parametrize("table", [VERBS, WORLD_VERBS, CLOCK_VERBS], ids=lambda table: table.name)
+def test_no_verb_takes_unknown_parameters(table: OperationTable[str]) -> None:
+    """They were ignored: a person placed with ``yaw`` looked elsewhere."""
+    for operation in table:
+        with pytest.raises(BadParameters, match=r"^nonsense is unknown$"):
+            operation.parse({"nonsense": 1})
+
+
+async def test_unknown_parameters_are_refused_with_a_guess(shown: Shown) -> None:
+    person = {"person": "Ann", "x": 1, "y": 1}
+    for path, values, why in (
+        ("world/place_person", person | {"degree": 90}, "degree is unknown; did you mean 'degrees'?"),
+        ("robots/a/take_control", {"robot": "a"}, "robot is unknown"),
+        ("robots/a/stop", {"now": True}, "now is unknown"),
+        ("robots/a/program", {"source": "", "sourc": "print(1)"}, "sourc is unknown; did you mean 'source'?"),
+        ("robots/a/rehearse", {"steps": [{"do": "drive"}], "step": []}, "step is unknown; did you mean 'steps'?"),
+    ):
+        assert await shown.ask(f"/api/{path}", values) == (400, {"error": why})
 
 
 async def test_a_robot_docks_by_the_console(shown: Shown) -> None:

@@ -54,7 +54,13 @@ async def test_hands_do_the_same_in_another_world() -> None:
     assert second.hands.faults == hands.faults
 
 
-@pytest.mark.parametrize(("name", "values"), [("world_file", {}), ("__init__", {}), ("push", {"name": 3}), ("fly", {})])
+# Refused when it was done first, so it is noted with these values.
+OPTIONS = [("inject_fault", {"kind": "blocked_path", "robot": "a", "options": {"ahead": "far"}})]
+
+
+@pytest.mark.parametrize(
+    ("name", "values"), [("world_file", {}), ("__init__", {}), ("push", {"name": 3}), ("fly", {}), *OPTIONS]
+)
 async def test_what_is_no_deed_of_hands_is_refused(name: str, values: dict[str, object]) -> None:
     with pytest.raises(ValueError):  # noqa: PT011 - each has its own words
         do_again(world().hands, Input(0.0, 0, "", "hands", name, values))

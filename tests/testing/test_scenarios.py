@@ -17,6 +17,7 @@ WRONG = {
     "name: x": "when is missing",
     "name: x\nwhen: []\nthen: []\n": "then must have at least 1 entries",
     "name: x\nwhen: []\nthen: [{moved: {z: 1}}]\n": "z is unknown",
+    "name: x\nwhen: []\nthen: [{refusd: 0}]\n": "refusd is unknown; did you mean 'refused'",
     "name: x\nwhen: [{run: a, text: b}]\nthen: [{refused: 0}]\n": "when 1: one of run, rest",
     "name: x\nwhen: [{within: 3}]\nthen: [{refused: 0}]\n": "not none",
     "name: x\nwhen: [{until: {}}]\nthen: [{refused: 0}]\n": "when 1: until: one of pose",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from importlib.metadata import version
 from typing import Annotated, Literal, TypeVar
 
@@ -11,6 +11,7 @@ import msgspec
 from mcp.server import MCPServer
 from mcp.server.mcpserver import Image
 from mcp.server.mcpserver.exceptions import ToolError
+from mcp.server.mcpserver.tools import Tool
 from pydantic import BaseModel, Field
 
 from roboglot.agents.console import ConsoleClient, Refused
@@ -26,7 +27,7 @@ Speed = Annotated[float, Field(ge=-10, le=10)]
 Wait = Annotated[float, Field(ge=0, le=SECONDS_MAX, description="Seconds to wait for its end; 0 returns at once.")]
 
 
-class GoTo(BaseModel):
+class GoTo(BaseModel, extra="forbid"):
     """Drive to a point of the map, around obstacles."""
 
     do: Literal["go_to"]
@@ -34,7 +35,7 @@ class GoTo(BaseModel):
     y: Meters
 
 
-class Drive(BaseModel):
+class Drive(BaseModel, extra="forbid"):
     """Drive with a velocity (m/s ahead, m/s left, rad/s), around nothing, then brake."""
 
     do: Literal["drive"]
@@ -75,9 +76,8 @@ class _State(msgspec.Struct):
 
 def make_server(console: ConsoleClient) -> MCPServer:
     """Return the server with all tools over one console."""
-    server = MCPServer("roboglot", version=version("roboglot"), instructions=INSTRUCTIONS)
     tools = Tools(console)
-    for tool in (
+    listed = (
         tools.robots,
         tools.where_am_i,
         tools.look,
@@ -89,9 +89,19 @@ def make_server(console: ConsoleClient) -> MCPServer:
         tools.run_program,
         tools.inject_fault,
         tools.clear_faults,
-    ):
-        server.add_tool(tool)
-    return server
+    )
+    exact = [_exact(tool) for tool in listed]
+    return MCPServer("roboglot", version=version("roboglot"), instructions=INSTRUCTIONS, tools=exact)
+
+
+def _exact(function: Callable[..., object]) -> Tool:
+    """Return a tool that refuses unknown arguments, which the library ignores."""
+    tool = Tool.from_function(function)
+    arguments = tool.fn_metadata.arg_model
+    arguments.model_config["extra"] = "forbid"
+    arguments.model_rebuild(force=True)
+    tool.parameters = arguments.model_json_schema()
+    return tool
 
 
 async def _answer_of(answer: Awaitable[T]) -> T:

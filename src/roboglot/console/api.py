@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping as Values
-from typing import TypeVar
 
 import msgspec
 
@@ -12,14 +10,14 @@ from roboglot.console import drawings, program_runs
 from roboglot.console.as_code import FORMS, LABELS, copy
 from roboglot.console.camera import Calls, send_film, send_photo, send_sound
 from roboglot.console.desk import CLIENT, Desk
-from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json
+from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json, read_wish
 from roboglot.console.openapi import document
 from roboglot.console.people.classes import Classes, Wish
 from roboglot.console.recordings import RecordingWish
 from roboglot.console.resend import resend
 from roboglot.console.state import link_of
 from roboglot.console.studio import blocks, lessons
-from roboglot.console.studio.plans import rehearse
+from roboglot.console.studio.plans import Plan, rehearse
 from roboglot.console.thumbnails import thumbnail
 from roboglot.console.verbs.maps import map_archive
 from roboglot.console.wire_log import readable
@@ -41,9 +39,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
 from roboglot.programs.errors import ProgramError
 from roboglot.protocols.door import Endpoint
-from roboglot.validation import why_invalid
 
-T = TypeVar("T")
 STATUSES: list[tuple[type[Exception], int]] = [
     (BadParameters, 400),
     (InvalidGoal, 400),
@@ -58,6 +54,14 @@ STATUSES: list[tuple[type[Exception], int]] = [
     (ProgramError, 409),
     (ValueError, 400),
 ]
+
+
+class _Program(msgspec.Struct, forbid_unknown_fields=True):
+    source: str = ""
+
+
+class _Call(msgspec.Struct, forbid_unknown_fields=True):
+    offer: str
 
 
 class Api:
@@ -91,7 +95,7 @@ class Api:
             case "GET", ["class"]:
                 await answer_json(send, self._classes.look())
             case "POST", ["class"]:
-                await answer_json(send, await self._classes.do(_decoded(await read_json(receive), Wish)))
+                await answer_json(send, await self._classes.do(await read_wish(receive, Wish)))
             case "GET" | "POST", ["recording"]:
                 await answer_json(send, await self._serve_recording(method, receive))
             case _, ["robots", *_]:
@@ -116,8 +120,8 @@ class Api:
             case "POST", ["robots", name, "wire", number, "resend"]:
                 await answer_json(send, {"answers": await self._sent_again(name, number)})
             case "POST", ["robots", name, "camera", "call"]:
-                offer = (await read_json(receive)).get("offer")
-                answered = await self.calls.answer(self._desk.view(name).robot, str(offer))
+                offer = (await read_wish(receive, _Call)).offer
+                answered = await self.calls.answer(self._desk.view(name).robot, offer)
                 await answer_json(send, {"answer": answered})
             case ("GET", ["robots", name, "program" as what]) | (
                 "POST",
@@ -137,7 +141,7 @@ class Api:
             self._desk.view(name, "look at the recording")
         if method == "GET":
             return recordings.look()
-        wish = _decoded(await read_json(receive), RecordingWish)
+        wish = await read_wish(receive, RecordingWish)
         for robot in self._desk.robots.values():
             robot.admission.check(CLIENT, "record", Right.ADMIN)
         with self._desk.noting(f"record {wish.do}"):
@@ -149,11 +153,11 @@ class Api:
             return
         if method == "GET":
             raise _nothing_here()
-        values = await read_json(receive)
         if what == "rehearse":
-            await answer_json(send, await rehearse(self._desk, name, values))
+            await answer_json(send, await rehearse(self._desk, name, await read_wish(receive, Plan)))
         else:
-            await answer_json(send, await program_runs.start(self._desk, name, str(values.get("source", ""))))
+            source = (await read_wish(receive, _Program)).source
+            await answer_json(send, await program_runs.start(self._desk, name, source))
 
     async def _send_file(self, robot: Robot, file: str, receive: Receive, send: Send) -> None:
         match file:
@@ -222,13 +226,6 @@ class Api:
         if endpoint is None:
             raise NotFound(f"the {door} door of robot {name} is closed")
         return endpoint
-
-
-def _decoded(values: Values[str, object], kind: type[T]) -> T:
-    try:
-        return msgspec.convert(values, kind)
-    except msgspec.ValidationError as error:
-        raise BadParameters(why_invalid(error, "the body")) from None
 
 
 def _nothing_here() -> Problem:

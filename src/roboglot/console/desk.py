@@ -22,7 +22,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden, NotFound, Refused
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
-from roboglot.operations import Operation
+from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.door import Endpoint
 from roboglot.values import dataclass
 
@@ -153,6 +153,8 @@ class Desk:
         robot = self.view(name, verb).robot
         if verb == TAKE:
             self.check(robot, verb, Right.DRIVE)
+            if values:
+                raise BadParameters(f"{next(iter(values))} is unknown")
             with robot.admission.noting(CLIENT, verb), self._input(robot, verb, values, client):
                 return await robot[Lease].take(client)
         if (operation := VERBS.get(verb)) is None:

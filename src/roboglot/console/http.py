@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
 from roboglot.console.settings import BODY_MAX, BODY_SECONDS_MAX
 from roboglot.validation import why_invalid
 
+T = TypeVar("T")
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -54,6 +55,14 @@ async def read_json(receive: Receive) -> Mapping[str, object]:
         return msgspec.json.decode(body, type=dict) if body else {}
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise Problem(400, f"the body is not a JSON object: {why_invalid(error)}") from None
+
+
+async def read_wish(receive: Receive, kind: type[T]) -> T:
+    """Return the body as a value of a type, or raise Problem."""
+    try:
+        return msgspec.convert(await read_json(receive), kind)
+    except msgspec.ValidationError as error:
+        raise Problem(400, why_invalid(error, "the body", wanted=kind)) from None
 
 
 async def answer(send: Send, status: int, content_type: bytes, body: bytes, more: Rows | None = None) -> None:

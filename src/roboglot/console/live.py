@@ -34,13 +34,13 @@ Send = Callable[[str | bytes], Awaitable[None]]
 _numbers = itertools.count(1)
 
 
-class Hello(msgspec.Struct, tag="hello", tag_field="type"):
+class Hello(msgspec.Struct, tag="hello", tag_field="type", forbid_unknown_fields=True):
     """Name of the person at the page."""
 
     name: str = ""
 
 
-class Watch(msgspec.Struct, tag="watch", tag_field="type"):
+class Watch(msgspec.Struct, tag="watch", tag_field="type", forbid_unknown_fields=True):
     """Robot that the page shows; flags for its wire, the truth, and its camera's detections.
 
     ``moving``: the page draws the robot, so it gets scan, path and map, and poses at each beat instead of each second.
@@ -53,7 +53,7 @@ class Watch(msgspec.Struct, tag="watch", tag_field="type"):
     moving: bool = True
 
 
-class Wish(msgspec.Struct, tag="do", tag_field="type"):
+class Wish(msgspec.Struct, tag="do", tag_field="type", forbid_unknown_fields=True):
     """A command; ``robot`` empty: to the world. The answer carries ``id``."""
 
     id: int
@@ -62,7 +62,7 @@ class Wish(msgspec.Struct, tag="do", tag_field="type"):
     values: dict[str, object] = {}
 
 
-class Ping(msgspec.Struct, tag="ping", tag_field="type"):
+class Ping(msgspec.Struct, tag="ping", tag_field="type", forbid_unknown_fields=True):
     """Answered at once with the same ``at``."""
 
     at: float

@@ -17,7 +17,7 @@ PAD = "pad"  # the kind of recorded inputs for gamepads
 Share = Annotated[float, msgspec.Meta(ge=-1, le=1)]
 
 
-class Velocity(msgspec.Struct, tag="drive", tag_field="type"):
+class Velocity(msgspec.Struct, tag="drive", tag_field="type", forbid_unknown_fields=True):
     """Shares (-1 to 1) of the base's top speeds: forward, left, counter-clockwise.
 
     ``seq`` counts up. ``stamp``: the server's last time known to the page (ms), plus the time passed since.

@@ -19,6 +19,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.spelling import instead
+from roboglot.validation import why_invalid
 
 NAME = "lease.sock"  # in the data folder
 LEASE = "lease"  # the kind of recorded inputs from this socket
@@ -68,7 +69,9 @@ class LeaseServer(LocalServer):
             request = msgspec.json.decode(line, type=Request)
             if request.do != "look":
                 await self._grant(request)
-        except (msgspec.DecodeError, RobotError, LookupError) as refused:
+        except msgspec.DecodeError as refused:
+            error = why_invalid(refused, "the request", wanted=Request)
+        except (RobotError, LookupError) as refused:
             error = str(refused.args[0]) if refused.args else type(refused).__name__
         return msgspec.json.encode(Answer([_control(name, robot) for name, robot in self._robots.items()], error))
 

@@ -10,6 +10,7 @@ import msgspec
 
 from roboglot.hosting.local_socket import LocalServer
 from roboglot.model.errors import RobotError
+from roboglot.validation import why_invalid
 
 if TYPE_CHECKING:
     from roboglot.recording.recorder import Recorder
@@ -49,7 +50,7 @@ class RecordServer(LocalServer):
         try:
             answer = await self._grant(msgspec.json.decode(line, type=Request))
         except (msgspec.DecodeError, RobotError, OSError) as refused:
-            answer = Answer(error=str(refused) or type(refused).__name__)
+            answer = Answer(error=why_invalid(refused, "the request", wanted=Request) or type(refused).__name__)
         return msgspec.json.encode(answer)
 
     async def _grant(self, request: Request) -> Answer:

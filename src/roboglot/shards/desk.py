@@ -12,6 +12,7 @@ from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.moving import move_robot
 from roboglot.shards.requests import SOCKET, Answer, Request, RobotRow, Row
 from roboglot.shards.supervisor import Shard
+from roboglot.validation import why_invalid
 
 
 class FleetDesk(LocalServer):
@@ -29,7 +30,9 @@ class FleetDesk(LocalServer):
             if request.do != "look":
                 async with self._turn:
                     await self._grant(request)
-        except (msgspec.DecodeError, LookupError, ValueError, OSError) as refused:
+        except msgspec.DecodeError as refused:
+            error = why_invalid(refused, "the request", wanted=Request)
+        except (LookupError, ValueError, OSError) as refused:
             error = str(refused.args[0]) if refused.args else type(refused).__name__
         rows = [_row(shard) for shard in self._supervisor.shards.values()]
         return msgspec.json.encode(Answer(rows, self._supervisor.nursery, error))

@@ -9,14 +9,13 @@ from typing import Annotated
 import msgspec
 
 from roboglot.console.desk import Desk
-from roboglot.console.http import Problem, Receive, Scope, Send, answer_json, read_json
+from roboglot.console.http import Problem, Receive, Scope, Send, answer_json, read_wish
 from roboglot.console.people.classes import Classes, Elsewhere
 from roboglot.console.people.entry import address_of, admission_of, cookie_of
 from roboglot.console.people.sessions import Sessions, cookie_name, set_cookie
 from roboglot.console.settings import JOIN_TRIES
 from roboglot.model.admission import NO_PROOF, LockedOut, Proof, ProofKind, Unknown
 from roboglot.transport.limiter import Limiter
-from roboglot.validation import why_invalid
 
 SIGN_IN, SIGN_OUT = "/api/sign_in", "/api/sign_out"
 Secret = Annotated[str, msgspec.Meta(max_length=300)]
@@ -51,10 +50,7 @@ class Signing:
             await self._sessions.end(cookie_of(scope))
             await answer_json(send, {"name": ""}, 200, [set_cookie(name, "", secure=secure)])
             return True
-        try:
-            shown = msgspec.convert(await read_json(receive), Shown)
-        except msgspec.ValidationError as error:
-            raise Problem(400, why_invalid(error)) from None
+        shown = await read_wish(receive, Shown)
         token, answer = await self._sign_in(address_of(scope), shown)
         if not token:  # the pupil belongs to another world
             await answer_json(send, answer)

@@ -52,34 +52,34 @@ Send = Callable[[str], Awaitable[None]]
 Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 
 
-class Open(msgspec.Struct, tag="open", tag_field="type"):
+class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=True):
     """Robot that the page programs from now on, and the program shown; of others, only begin and end are reported."""
 
     robot: str
     program: Id = ""  # in all messages
 
 
-class FrameMessage(msgspec.Struct, tag="frame", tag_field="type"):
+class FrameMessage(msgspec.Struct, tag="frame", tag_field="type", forbid_unknown_fields=True):
     """One frame for the robot (2002)."""
 
     text: str
 
 
-class Debug(msgspec.Struct, tag="debug", tag_field="type"):
+class Debug(msgspec.Struct, tag="debug", tag_field="type", forbid_unknown_fields=True):
     """A request as on ``/debug`` of the door; the answer carries ``id``."""
 
     id: int
     text: str
 
 
-class Check(msgspec.Struct, tag="check", tag_field="type"):
+class Check(msgspec.Struct, tag="check", tag_field="type", forbid_unknown_fields=True):
     """A program's text to be checked."""
 
     id: int
     body: Annotated[str, msgspec.Meta(max_length=BODY_MAX)]
 
 
-class Fetch(msgspec.Struct, tag="fetch", tag_field="type"):
+class Fetch(msgspec.Struct, tag="fetch", tag_field="type", forbid_unknown_fields=True):
     """Request for a stored program or module and its whereabouts; ``log`` and ``text``: with these, too."""
 
     id: int

@@ -10,7 +10,7 @@ NAME_MAX, WORDS_MAX, STYLE_MAX = 40, 300, 400_000  # characters
 Words = Annotated[str, msgspec.Meta(max_length=WORDS_MAX)]
 
 
-class Doing(msgspec.Struct, frozen=True):
+class Doing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """State of a pupil's page."""
 
     phase: Words = "idle"
@@ -21,7 +21,7 @@ class Doing(msgspec.Struct, frozen=True):
     stars: Annotated[int, msgspec.Meta(ge=0, le=1000)] = 0
 
 
-class Member(msgspec.Struct, tag="class", tag_field="type"):
+class Member(msgspec.Struct, tag="class", tag_field="type", forbid_unknown_fields=True):
     """Request of a page to its class."""
 
     do: Literal["open", "join", "leave", "doing", "hand_in", "stop_all", "look", "close"]

@@ -149,7 +149,7 @@ def read(text: str) -> Lesson:
     try:
         return msgspec.toml.decode(text, type=Lesson)
     except msgspec.ValidationError as error:
-        raise ValueError(why_invalid(error, "the mission")) from None
+        raise ValueError(why_invalid(error, "the mission", wanted=Lesson)) from None
 
 
 def load(folders: Sequence[Path]) -> dict[str, Lesson]:

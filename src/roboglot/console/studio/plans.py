@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 import msgspec
@@ -35,20 +34,19 @@ class Drive(msgspec.Struct, tag="drive", tag_field="do", forbid_unknown_fields=T
     seconds: Moment = 1.0
 
 
-class Plan(msgspec.Struct):
+class Plan(msgspec.Struct, forbid_unknown_fields=True):
     """Plan to try."""
 
     steps: Annotated[list[GoTo | Drive], msgspec.Meta(min_length=1, max_length=STEPS_MAX)]
 
 
-async def rehearse(desk: Desk, name: str, values: Mapping[str, object]) -> dict[str, object]:
+async def rehearse(desk: Desk, name: str, plan: Plan) -> dict[str, object]:
     """Try a plan from where the robot is now; it does not move. Raises NotFound, Forbidden, Busy, ValueError."""
     robot = desk.view(name, "rehearse").robot
     robot.admission.check(CLIENT, "rehearse", Right.DRIVE)
     studio = desk.studio
     if studio.rehearse is None or studio.scene_of is None:
         raise NotFound("there is no simulation here to try it in")
-    plan = msgspec.convert(values, Plan)
     here = robot[Localization].pose
     scene = studio.scene_of(name)
     try:

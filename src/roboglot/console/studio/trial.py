@@ -30,7 +30,7 @@ NAME_MAX = 100
 Tell = Callable[[dict[str, object]], None]
 
 
-class TrialWish(msgspec.Struct, tag="try", tag_field="type"):
+class TrialWish(msgspec.Struct, tag="try", tag_field="type", forbid_unknown_fields=True):
     """Request to try ``body`` in the world of ``lesson``; empty: in a copy of the robot's own world."""
 
     id: int
@@ -38,7 +38,7 @@ class TrialWish(msgspec.Struct, tag="try", tag_field="type"):
     lesson: Annotated[str, msgspec.Meta(max_length=NAME_MAX)] = ""
 
 
-class TrialEnd(msgspec.Struct, tag="end_try", tag_field="type"):
+class TrialEnd(msgspec.Struct, tag="end_try", tag_field="type", forbid_unknown_fields=True):
     """Request to end the trial."""
 
 

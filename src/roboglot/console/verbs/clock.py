@@ -13,7 +13,7 @@ from roboglot.operations import OperationTable, Right
 Pace = Annotated[float, msgspec.Meta(ge=0.05, le=50)]
 Seconds = Annotated[float, msgspec.Meta(gt=0, le=60)]
 
-CLOCK_VERBS: OperationTable[str] = OperationTable("console clock", Right.ADMIN)
+CLOCK_VERBS: OperationTable[str] = OperationTable("console clock", Right.ADMIN, exact=True)
 
 
 def steerable(clock: Clock) -> RealClock:

@@ -40,7 +40,7 @@ Name = Annotated[str, msgspec.Meta(min_length=1, max_length=80)]
 Spot = tuple[Meters, Meters]
 Spots = Annotated[list[Spot], msgspec.Meta(min_length=1, max_length=WAYPOINTS_MAX)]
 
-VERBS: OperationTable[str] = OperationTable("console", Right.DRIVE)
+VERBS: OperationTable[str] = OperationTable("console", Right.DRIVE, exact=True)
 
 
 class Started(msgspec.Struct):

@@ -20,7 +20,7 @@ Extent = Annotated[float, msgspec.Meta(gt=0.01, le=20)]
 Seed = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
 Newtons = Annotated[float, msgspec.Meta(ge=-500, le=500)]  # N s
 
-WORLD_VERBS: OperationTable[str] = OperationTable("console world", Right.ADMIN)
+WORLD_VERBS: OperationTable[str] = OperationTable("console world", Right.ADMIN, exact=True)
 
 
 @WORLD_VERBS.on("reseed")

@@ -72,9 +72,9 @@ def do_again(stage: Stage, noted: Input) -> None:
     options = cast(dict[str, object], values.pop(OPTIONS, {}))
     try:
         arguments = {name: _value(value, hints[name]) for name, value in values.items()}
-    except (KeyError, msgspec.ValidationError) as error:
+        getattr(target, noted.name)(**arguments, **options)
+    except (KeyError, TypeError, msgspec.ValidationError) as error:
         raise ValueError(f"{noted.name}: {error}") from None
-    getattr(target, noted.name)(**arguments, **options)
 
 
 @lru_cache(64)

@@ -12,6 +12,7 @@ from roboglot.programs.engine.events import Stops
 from roboglot.programs.errors import NotAllowed, ProgramError
 from roboglot.programs.language.places import Step
 from roboglot.programs.tasks.service import ProgramService
+from roboglot.validation import why_invalid
 
 STOPS_MAX = 1000  # lines per task, and blocks per task
 STEPS = {"step": Step.INTO, "over": Step.OVER, "out": Step.OUT}
@@ -47,7 +48,9 @@ async def answer(service: ProgramService, text: str) -> str:
     try:
         wish = _decode(text.encode("utf-8", "replace"))
     except (msgspec.MsgspecError, RecursionError) as error:
-        return json.dumps({"target_id": "", "operate": "", "error": str(error)[:200]}, ensure_ascii=False)
+        return json.dumps(
+            {"target_id": "", "operate": "", "error": why_invalid(error, wanted=Wish)[:200]}, ensure_ascii=False
+        )
     why = ""
     try:
         await _do(service, wish)

@@ -88,7 +88,7 @@ def read_mask(path: Path) -> Mask:
     try:
         mask = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Mask)
     except (msgspec.ValidationError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{path}: {why_invalid(error)}") from None
+        raise ValueError(f"{path}: {why_invalid(error, wanted=Mask)}") from None
     if len(mask.rule) > RULES_MAX:
         raise ValueError(f"{path}: more than {RULES_MAX} rules")
     return mask

@@ -13,7 +13,6 @@ from typing import TypeVar, cast
 
 import msgspec
 
-from roboglot.spelling import meant
 from roboglot.validation import why_invalid
 
 T = TypeVar("T")
@@ -38,7 +37,8 @@ def read_toml(path: Path, structure: type[T]) -> T:
     try:
         return cast(T, _decoded(text, cast(Hashable, structure)))
     except msgspec.ValidationError as error:
-        raise BadFile(f"{path}{_line_of(text, str(error))}: {_explained(error, structure)}") from None
+        why = why_invalid(error, "the file", wanted=structure)
+        raise BadFile(f"{path}{_line_of(text, str(error))}: {why}") from None
     except msgspec.DecodeError as error:
         raise BadFile(f"{path}: not TOML: {error}") from None
 
@@ -47,35 +47,6 @@ def read_toml(path: Path, structure: type[T]) -> T:
 def _decoded(text: str, structure: object) -> object:
     """Return the (frozen) structure of a text, cached: a hundred robots of a kind decode their body once."""
     return msgspec.toml.decode(text, type=structure, strict=False)
-
-
-def _explained(error: msgspec.ValidationError, structure: type) -> str:
-    """Return the mistake in plain words, with the nearest known key for an unknown one."""
-    message = why_invalid(error, "the file")
-    unknown = re.search(r"unknown field `([^`]+)`", str(error))
-    if unknown is None:
-        return message
-    return message + meant(unknown[1], _keys_of(structure))
-
-
-def _keys_of(structure: type) -> set[str]:
-    """Return all keys that may occur anywhere in such a file."""
-    keys: set[str] = set()
-    waiting = [msgspec.inspect.type_info(structure)]
-    while waiting:
-        info = waiting.pop()
-        match info:
-            case msgspec.inspect.StructType(fields=fields):
-                new = {field.encode_name for field in fields} - keys
-                keys |= new
-                waiting += [field.type for field in fields if field.encode_name in new]
-            case msgspec.inspect.UnionType(types=types):
-                waiting += types
-            case msgspec.inspect.VarTupleType(item_type=item):
-                waiting.append(item)
-            case _:
-                pass
-    return keys
 
 
 def _line_of(text: str, message: str) -> str:

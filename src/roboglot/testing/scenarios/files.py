@@ -219,7 +219,8 @@ def read(path: Path) -> Found:
         _check(scenario)
         scenario.given.wanted(path.parent)
     except (OSError, UnicodeDecodeError, YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
-        why = error.strerror if isinstance(error, OSError) and error.strerror else why_invalid(error, "the file")
+        spoken = isinstance(error, OSError) and error.strerror
+        why = spoken or why_invalid(error, "the file", wanted=Scenario)
         raise BadScenario(f"{path}: {' '.join(why.split())}") from None
     return Found(path, scenario)
 
