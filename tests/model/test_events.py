@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
 from roboglot.model.events import BumperPressed, BumperReleased, Event, EventStream
 
 
@@ -48,3 +50,36 @@ def test_a_listener_hears_until_it_leaves() -> None:
         return heard
 
     assert asyncio.run(run()) == [1]
+
+
+def test_nested_events_come_after_the_outer_one() -> None:
+    """A listener's own event was seen before the one that it answers by all who listened after it."""
+    events, early, late = EventStream(), list[float](), list[float]()
+    events.listen(Event, lambda event: early.append(event.stamp))
+    answers = {1.0: [2.0, 3.0], 2.0: [4.0], 3.0: []}
+
+    def answer(event: Event) -> None:
+        for stamp in answers.get(event.stamp, []):
+            events.publish(BumperReleased(stamp=stamp, zone="front"))
+
+    events.listen(Event, answer)
+    events.listen(Event, lambda event: late.append(event.stamp))
+    with events.subscribe(Event) as queued:
+        events.publish(BumperPressed(stamp=1.0, zone="front"))
+        assert early == late == [event.stamp for event in queued.drain()] == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_broken_listener_keeps_later_events_coming() -> None:
+    events, heard = EventStream(), list[float]()
+
+    def break_at(event: Event) -> None:
+        if event.stamp == 1.0:
+            events.publish(BumperReleased(stamp=2.0, zone="front"))
+            raise ValueError
+
+    events.listen(Event, break_at)
+    events.listen(Event, lambda event: heard.append(event.stamp))
+    with pytest.raises(ValueError, match="^$"):
+        events.publish(BumperPressed(stamp=1.0, zone="front"))
+    events.publish(BumperPressed(stamp=3.0, zone="front"))
+    assert heard == [2.0, 3.0]

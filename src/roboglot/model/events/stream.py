@@ -84,14 +84,28 @@ class EventStream:
         self._subscriptions: list[_Receiver] = []
         self._listeners: list[tuple[type[Event], Callable[[Event], None]]] = []
         self._receivers: dict[type[Event], tuple[Callable[[Event], None], ...]] = {}  # by the type of a published event
+        self._delivering = False
+        self._nested = deque[Event]()
 
     def publish(self, event: Event) -> None:
-        """Deliver ``event`` at once: listeners are called, subscriptions get it queued."""
+        """Deliver ``event`` at once: listeners are called, subscriptions get it queued.
+
+        One that a listener publishes follows when the present one is delivered to all, so that all see one order.
+        """
+        if self._delivering:
+            self._nested.append(event)
+            return
         receivers = self._receivers.get(type(event))
         if receivers is None:
             receivers = self._receivers[type(event)] = self._receivers_of(type(event))
-        for receive in receivers:
-            receive(event)
+        self._delivering = True
+        try:
+            for receive in receivers:
+                receive(event)
+        finally:
+            self._delivering = False
+            if self._nested:
+                self.publish(self._nested.popleft())
 
     def _receivers_of(self, kind: type[Event]) -> tuple[Callable[[Event], None], ...]:
         listeners = (listener for wanted, listener in self._listeners if issubclass(kind, wanted))
