@@ -108,6 +108,7 @@ async def test_calls_of_another_robot_are_refused() -> None:
         CyberDogClient(ADDRESS, None, port=robot.port, app_port=0) as client,
         _dial(client) as own,
         _dial(client) as other,
+        _dial(client) as silent,
         asyncio.timeout(PATIENCE),
     ):
         robot.answers = (pb.RecResponse(nameCode=Code.DEVICE_INFO, data='{"sn": "mine"}').SerializeToString(),)
@@ -121,8 +122,9 @@ async def test_calls_of_another_robot_are_refused() -> None:
         assert not await _beat(other, "other")
         assert known(client.heartbeat).serial == "mine"
         with client.watch(values.Pose) as poses:
-            with pytest.raises(grpc.aio.AioRpcError, match="another robot"):
-                await _push(other, 1.0)
+            for stranger in (other, silent):  # one has named another robot, one none
+                with pytest.raises(grpc.aio.AioRpcError, match="another robot"):
+                    await _push(stranger, 1.0)
             await _push(own, 2.0)
             async for pose in poses:
                 assert pose.px == 2.0

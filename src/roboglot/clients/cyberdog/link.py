@@ -239,7 +239,7 @@ class _App:
 
     def __init__(self, link: DogLink) -> None:
         self._link, self._beats = link, Beats()
-        self._callers = dict[str, str]()  # serial number by connection, oldest first
+        self._callers = dict[str, str]()  # serial number by connection, that of the last heartbeat at the end
         ticks, pushed = reading(pb.Ticks.FromString), reading(pb.SendRequest.FromString)
         self.handlers = grpc.method_handlers_generic_handler(
             SERVICE,
@@ -252,6 +252,7 @@ class _App:
     async def _beat(self, request: pb.Ticks | None, rpc: grpc.aio.ServicerContext) -> pb.Result:
         if request is None:
             await _refuse(rpc)
+        self._callers.pop(rpc.peer(), None)
         self._callers[rpc.peer()] = request.sn
         if len(self._callers) > CALLERS_MAX:
             del self._callers[next(iter(self._callers))]
@@ -275,8 +276,8 @@ class _App:
         yield pb.RecResponse(nameCode=request.nameCode, data="{}")
 
     async def _admit(self, rpc: grpc.aio.ServicerContext) -> None:
-        """End a call of another robot. Raises what gRPC does."""
-        if self._link.is_stranger(self._callers.get(rpc.peer(), self._link.serial)):
+        """End a call of another robot, or of one that has not named itself by a heartbeat. Raises what gRPC does."""
+        if self._link.is_stranger(self._callers.get(rpc.peer())):
             await rpc.abort(grpc.StatusCode.PERMISSION_DENIED, "this app is connected to another robot")
 
 
