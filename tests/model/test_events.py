@@ -79,7 +79,7 @@ def test_broken_listener_keeps_later_events_coming() -> None:
 
     events.listen(Event, break_at)
     events.listen(Event, lambda event: heard.append(event.stamp))
-    with pytest.raises(ValueError, match="^$"):
+    with pytest.raises(ValueError, match=r"^$"):
         events.publish(BumperPressed(stamp=1.0, zone="front"))
     events.publish(BumperPressed(stamp=3.0, zone="front"))
     assert heard == [2.0, 3.0]

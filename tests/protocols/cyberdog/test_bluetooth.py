@@ -7,8 +7,10 @@ from typing import Any
 
 import pytest
 
+from roboglot.model.actions import ActionStatus
 from roboglot.model.components.interaction.remote_control import Gear, RemoteControl
 from roboglot.model.components.system.bluetooth import BLUETOOTH, Bluetooth
+from roboglot.model.components.system.system_log import SYSTEM_LOG
 from roboglot.model.geometry import Point, Pose
 from tests.protocols.cyberdog.phone import App, Client, Stream, answered, until
 
@@ -70,6 +72,19 @@ async def test_scan_ends_with_the_last_who_waits(client, door, robot, gadget, fo
     assert not waiting
     found = await answered(client, 8001, {"scan_seconds": 3}, forward)
     assert found["device_info_list"], "the radio is free for the next scan"
+
+
+@pytest.mark.parametrize(
+    ("code", "asked", "held"), [(8002, {"selected_device": WANTED}, BLUETOOTH), (10005, {}, SYSTEM_LOG)]
+)
+async def test_work_ends_with_its_only_waiting_app(client, robot, gadget, code, asked, held) -> None:
+    """A device was connected, and the log sent, seconds after the app had gone."""
+    stream = Stream(client, code, asked)
+    await until(lambda: robot.actions.running(held))
+    (work,) = robot.actions.running(held)
+    stream.call.cancel()
+    await until(lambda: work.status is ActionStatus.CANCELED)
+    assert work.reason == "no app waits for it any more"
 
 
 async def test_what_is_not_there_cannot_be_connected(client, robot, gadget, forward) -> None:

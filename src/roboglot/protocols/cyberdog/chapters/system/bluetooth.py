@@ -20,6 +20,7 @@ from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
+from roboglot.protocols.cyberdog.chapters.system.bracelet import LEFT
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.validation import why_invalid
 from roboglot.wire.cyberdog.codes import Code, InBandError
@@ -66,7 +67,10 @@ def _under_way(robot: Robot) -> Action | None:
 
 @TABLE.on(Code.CONNECT_BLUETOOTH, right=Right.EDIT, needs=(Bluetooth,))
 async def connect(call: Call, *, selected_device: object = None) -> dict[str, int]:
-    """Connect a device (0, or 1: no answer); without one, disconnect the current device (0, or 3: none)."""
+    """Connect a device (0, or 1: no answer); without one, disconnect the current device (0, or 3: none).
+
+    An attempt ends with its request.
+    """
     robot = call.context.robot
     radio = robot[Bluetooth]
     if selected_device is None:
@@ -84,6 +88,8 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
         status = await robot.clock.wait_for(connecting.done(), CONNECT_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
+    finally:
+        connecting.cancel(LEFT)
     if status is not ActionStatus.SUCCEEDED:
         return call.refused({"result": RADIO_FAILED}, connecting.reason)
     return {"result": DONE}

@@ -23,6 +23,7 @@ OFFERED = push(Code.BLUETOOTH_UPDATE_OFFERED)
 PROGRESS = push(Code.BLUETOOTH_UPDATE_PROGRESS)
 GEAR = push(Code.GEAR_CHANGED)
 SUCCEEDED, FAILED, SENDING = 1, 2, 7  # ``status`` of 8010
+LEFT = "no app waits for it any more"  # why work ends with its request
 STEP = 0.05  # of the progress between two pushes
 
 
@@ -63,7 +64,7 @@ class Bracelet:
             if not self._waiting[scan.id]:
                 del self._waiting[scan.id]
                 if scan.source == SOURCE and not scan.status.ended:
-                    scan.cancel("no app waits for it any more")
+                    scan.cancel(LEFT)
 
     def offer(self) -> None:
         """Report newer firmware for the connected device, if there is any."""

@@ -13,6 +13,7 @@ from roboglot.model.errors import InvalidGoal, NotFound, Refused, RobotError
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE
+from roboglot.protocols.cyberdog.chapters.system.bracelet import LEFT
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import ENVIRONMENT
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, InBandError, MachineState, TaskState, UnlockResult
@@ -62,10 +63,11 @@ async def upload_log(call: Call) -> dict[str, object]:
     try:
         await call.context.robot.clock.wait_for(action.succeeded(), UPLOAD_MAX)
     except TimeoutError:
-        action.cancel("it took too long")
         return {"error_code": int(InBandError.TIMEOUT)}
     except RobotError as error:
         return call.refused({"success": False}, str(error))
+    finally:
+        action.cancel(LEFT)
     return {"success": True}
 
 
