@@ -9,6 +9,7 @@ from typing import TypedDict
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
 from roboglot.autonomy.slam.evidence import EvidenceGrid
@@ -24,11 +25,13 @@ from roboglot.model.components.mapping.annotations import (
 from roboglot.model.components.mapping.floors import Floors, RideStage
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.errors import Blocked, InvalidGoal, Refused
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
+from roboglot.simulation.components.sensing.lidar import SimulatedLidar
 from tests.autonomy.conftest import Tour, delivering
 from tests.narrowing import known
 
@@ -144,6 +147,20 @@ async def test_ride_in_lift_that_leaves_fails(tour: Tour, monkeypatch: pytest.Mo
     action = await tour.end_of(tour.robot[Floors].ride(1), 400.0)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert tour.world.truth.floor_of("a") == 1
+
+
+async def test_covered_lidar_is_no_free_way(tour: Tour) -> None:
+    """A covered lidar measures nothing, which was taken for an empty door."""
+    action, lidar = await leave_the_lift(tour), tour.robot[Lidar]
+    assert isinstance(lidar, SimulatedLidar)
+    await tour.clock.advance(0.2)
+    lidar._section = structs.replace(lidar._section, dropouts=1.0)
+    await tour.clock.advance(1.0)
+    stood = tour.truth
+    await tour.end_of(action)
+    assert isinstance(action.error, Blocked), action.reason
+    assert action.reason == "the lidar is silent"
+    assert tour.truth.distance_to(stood) < 0.02
 
 
 class Where(TypedDict, total=False):

@@ -16,7 +16,7 @@ from roboglot.autonomy.building.lift_queue import Turn, turn
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
-from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.autonomy.slam.scan_points import ScanReader, sees
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.lift_client import LiftClient, LiftDoor
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
@@ -177,7 +177,7 @@ class LiftFloors(Floors):
             if left < closest - THERE:
                 closest, closest_at = left, now
             if now - closest_at > PATIENCE:
-                raise Blocked("a person stands in the lift's door")
+                raise Blocked("a person stands in the lift's door" if self._sees(way) else "the lidar is silent")
             if now > held_until - DOOR_HELD / 2:
                 self._hold_door(needed=not backwards or self._is_aboard)
                 held_until = now + DOOR_HELD
@@ -200,14 +200,17 @@ class LiftFloors(Floors):
                 raise
 
     def _room(self, way: float) -> float:
-        """Return the free distance ahead of the hull (``way`` 1) or behind (-1) by the lidar, m; 0 without a scan."""
+        """Return the free distance ahead of the hull (``way`` 1) or behind (-1) by the lidar, m; 0 if it is blind."""
         scan, radius = self.robot[Lidar].scan, self.robot.description.radius
-        if scan is None:
+        if scan is None or not self._sees(way):
             return 0.0
         points = ScanReader().read(scan).points
         along = points[:, 0] * way
         ahead = along[(np.abs(points[:, 1]) < radius) & (along > 0.0)]
         return float(ahead.min()) - radius if len(ahead) else math.inf
+
+    def _sees(self, way: float) -> bool:
+        return sees(self.robot[Lidar].scan, 0.0 if way > 0.0 else math.pi)
 
     async def _change_to(self, floor: int, redraw: bool) -> None:
         """Store the present floor's state and restore that of ``floor``, keeping the robot's place in the car."""

@@ -9,7 +9,7 @@ from dataclasses import field
 from roboglot.autonomy.following.thing_finder import moved_thing, thing_at
 from roboglot.autonomy.following.trail import Points, Trail, gap, room
 from roboglot.autonomy.navigation.base_actions import PERIOD, start_on_base
-from roboglot.autonomy.slam.scan_points import ScanReader
+from roboglot.autonomy.slam.scan_points import ScanReader, sees
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.following import Following, FollowSide
@@ -206,10 +206,10 @@ class SightFollowing(Following):
         if left < CLOSE or (side is FollowSide.BEHIND and here.point.distance_to(quarry.place) < distance):
             return Twist(yaw=_within(TURN_RATE, TURN_GAIN * bearing)), True
         scan = self._robot[Lidar].scan
-        seen = self._reader.read(scan).points if scan is not None else None
-        if seen is None:
-            return STILL, False
         heading = math.remainder(here.point.bearing_to(goal) - here.yaw, math.tau)
+        if scan is None or not sees(scan, heading):
+            return STILL, False
+        seen = self._reader.read(scan).points
         if hidden and left < TOO_NEAR and room(seen, self._robot.description.radius, heading) < left:
             return self._step_back(bearing, seen), True
         heading, left, straight = self._way(quarry, here, seen, heading, left)

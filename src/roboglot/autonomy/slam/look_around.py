@@ -14,7 +14,7 @@ import numpy as np
 
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.matcher import FREE, PLACE_AGREEMENT, PLACES_MAX, WIDE, Match, fit, search
-from roboglot.autonomy.slam.scan_points import ScanPoints, ScanReader
+from roboglot.autonomy.slam.scan_points import ScanPoints, ScanReader, sees
 from roboglot.autonomy.slam.slam import Slam
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import Clock
@@ -92,13 +92,15 @@ async def go_on(robot: Robot, reader: ScanReader, source: str) -> bool:
     if Driving not in robot or scan is None or (DockContact in robot and robot[DockContact].docked):
         return False
     way = open_way(reader.read(scan), radius)
-    if way is None:
+    if way is None or not sees(scan, way.yaw):
         return False
     turn = robot[Driving].move_by(Pose(yaw=way.yaw), source=source)
     if not await _watched(robot, turn, lambda _: True):
         return False
     move = robot[Driving].move_by(Pose(way.x), speed=SPEED, source=source)
-    return await _watched(robot, move, lambda seen: room(reader.read(seen), 0.0, radius) > STOP_BEFORE)
+    return await _watched(
+        robot, move, lambda seen: sees(seen, 0.0) and room(reader.read(seen), 0.0, radius) > STOP_BEFORE
+    )
 
 
 async def _watched(robot: Robot, move: Action, goes: Callable[[LaserScan], bool]) -> bool:

@@ -17,6 +17,7 @@ RAYS_MAX = 8192
 NEARBY = 12.0  # m
 DESKEW_FROM = 0.01  # m or rad of motion during one turn of the lidar from which rays are corrected
 CARRIED_NEAR = 0.09  # m around the load within which echoes are ignored
+FACING = 0.707  # cosine of 45 degrees
 ECHO_SHARE_MIN = 0.1  # share of echoes below which the scan is ignored
 
 
@@ -138,3 +139,10 @@ def _deskewed(ends: Floats, velocity: Twist, increment: float) -> Floats:
     moved_y = (half_s * velocity.x + half_c * velocity.y) * seconds
     x, y = ends[:, 0], ends[:, 1]
     return np.stack([c * x - s * y + moved_x, s * x + c * y + moved_y], axis=1)
+
+
+def sees(scan: LaserScan | None, yaw: float) -> bool:
+    """Return whether rays within 45 degrees of ``yaw`` (base_link, rad) measure anything: unknown is not free."""
+    if scan is None:
+        return False
+    return not is_covered(scan.ranges[np.cos(scan.angles + (scan.mount.yaw - yaw)) > FACING])
