@@ -52,6 +52,10 @@ def test_names_of_faults_have_words_in_both_languages() -> None:
     assert [sorted(wanted - set(WORDS[language])) for language in ("en", "zh")] == [[], []]
 
 
+def test_one_place_of_the_pages_knows_the_lost_link() -> None:
+    assert [path.name for path in OWN if f'"{LINK_LOST}"' in path.read_text("utf-8")] == ["link.js"]
+
+
 def test_faults_and_options_have_words_in_both_languages() -> None:
     options = {name for kind in KINDS.values() for name in list(inspect.signature(kind.begin).parameters)[1:]}
     wanted = {f"robot.{kind}" for kind in KINDS} | {f"option.{name}" for name in options}

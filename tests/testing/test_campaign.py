@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 
 from roboglot.testing.campaign.report import interval, report
 from roboglot.testing.campaign.table import OtherCampaign, Row, Table, write_parquet
-from roboglot.testing.campaign.trials import Outcome, Result, Trial, trials_of
+from roboglot.testing.campaign.trials import Outcome, Result, Trial, named, trials_of
 from roboglot.testing.scenarios.files import find
 from tests.programs.playing import children_of
 
@@ -121,9 +121,20 @@ def test_hidden_files_are_left_out(folder: Path) -> None:
     assert "1 of 1 trials are in" in again.communicate(timeout=200)[0]
 
 
+NAMES = (
+    *(b"plain.yaml", b"it's \xe9.yaml", b"a b.yaml", b"a`b.yaml", b"a\nb|c.yaml", b"a\\xe9.yaml", b"\\\xe9.yaml"),
+    *("é\\.yaml".encode(), b"\\n\xe9f.yaml", b"\\\\x41\xff'.yaml"),
+)
+
+
+def test_labels_of_names_differ() -> None:
+    labels = [Trial("/", os.fsdecode(name), "", 1, "").label for name in NAMES]
+    assert [os.fsencode(named(label)) for label in labels] == list(NAMES)
+
+
 def test_report_quotes_names_for_the_shell() -> None:
     broken = Row("s", "s", 1, Outcome.BROKEN, "why", 1.0, 1, "f")
-    for name in (b"plain.yaml", b"it's \xe9.yaml", b"a b.yaml"):
+    for name in NAMES:
         label = Trial("/", os.fsdecode(name), "", 1, "").label
         text = report([broken._replace(scenario=label)], Path("/x"), 1)
         line = text.partition("roboglot test ")[2].partition(" --seed")[0]

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from roboglot.testing.campaign.table import Row
-from roboglot.testing.campaign.trials import Outcome
+from roboglot.testing.campaign.trials import Outcome, named
 
 Z = 1.96  # of a normal distribution, for 95 %
 REASONS_MAX, SEEDS_MAX = 5, 10
@@ -32,9 +32,11 @@ def report(rows: Sequence[Row], folder: Path, wanted: int) -> str:
         times = sorted(row.seconds for row in own)
         late = times[min(len(times) - 1, math.ceil(0.95 * len(times)) - 1)]
         share = f"{100 * low:.1f} to {100 * high:.1f} %"
-        lines.append(f"| {scenario} | {fine} | {len(own)} | {share} | {statistics.median(times):.1f} | {late:.1f} |")
+        lines.append(
+            f"| {_plain(scenario)} | {fine} | {len(own)} | {share} | {statistics.median(times):.1f} | {late:.1f} |"
+        )
     for scenario, own in sorted(by_scenario.items()):
-        lines += _reasons(folder / scenario, [row for row in own if row.outcome is not Outcome.PASSED])
+        lines += _reasons(folder / named(scenario), [row for row in own if row.outcome is not Outcome.PASSED])
     return "\n".join([*lines, ""])
 
 
@@ -55,7 +57,7 @@ def _reasons(scenario: Path, failed: Sequence[Row]) -> Iterator[str]:
     kinds: dict[str, list[Row]] = defaultdict(list)
     for row in failed:
         kinds[f"{row.outcome}: {re.sub(r'[-+]?[0-9]+(?:[.][0-9]+)?', '#', row.why)}"].append(row)
-    yield from ("", f"## {scenario.name}", "")
+    yield from ("", f"## {_plain(Path(failed[0].scenario).name)}", "")
     for kind, _ in Counter({kind: len(own) for kind, own in kinds.items()}).most_common(REASONS_MAX):
         own = sorted(kinds[kind], key=lambda row: row.seed)
         seeds = ", ".join(str(row.seed) for row in own[:SEEDS_MAX]) + (" …" if len(own) > SEEDS_MAX else "")
@@ -64,11 +66,12 @@ def _reasons(scenario: Path, failed: Sequence[Row]) -> Iterator[str]:
 
 
 def _quoted(path: str) -> str:
-    """Return the path for a shell; bytes that are not UTF-8 are written out as bash reads them."""
-    text = os.fsencode(path).decode("utf-8", "backslashreplace")
-    if text == path and not re.search(r"\\x[89a-f][0-9a-f]", path):
+    """Return the path for a shell, in a code span of one line; bash reads what is written out in it."""
+    text = os.fsencode(path).replace(b"\\", b"\\\\").decode("utf-8", "backslashreplace")
+    odd = re.sub("[\0-\x1f\x7f`]", lambda found: f"\\x{ord(found[0]):02x}", text)
+    if odd == path.replace("\\", "\\\\"):
         return shlex.quote(path)
-    return "$'" + text.replace("'", "\\'") + "'"
+    return "$'" + odd.replace("'", "\\'") + "'"
 
 
 def _plain(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
@@ -43,8 +44,19 @@ class Trial:
 
     @property
     def label(self) -> str:
-        """``scenario`` for tables and reports: bytes of a file's name that are not UTF-8 are written out."""
-        return os.fsencode(self.scenario).decode("utf-8", "backslashreplace")
+        """``scenario`` for tables and reports: bytes of a file's name that are not UTF-8 are written out.
+
+        So backslashes are doubled; ``named`` returns the name.
+        """
+        return os.fsencode(self.scenario).replace(b"\\", b"\\\\").decode("utf-8", "backslashreplace")
+
+
+def named(label: str) -> str:
+    """Return the file's name that a label stands for."""
+    written = re.compile(rb"\\(?:\\|x([0-9a-f]{2}))")
+    return os.fsdecode(
+        written.sub(lambda found: bytes.fromhex(found[1].decode()) if found[1] else b"\\", label.encode())
+    )
 
 
 class Result(msgspec.Struct, frozen=True):

@@ -2,7 +2,7 @@
 import { signal } from "@preact/signals";
 import { Button, Icon, can, duration, fixed, html, person, robotWord, say, t } from "../base.js";
 import { MapView } from "../map.js";
-import { command, current, introduce, poses, simulated, state, wanted, you } from "../link.js";
+import { command, current, introduce, poses, simulated, stale, state, wanted, you } from "../link.js";
 import { Drive } from "./drive.js";
 import { later } from "./later.js";
 import { Recording } from "./recording.js";
@@ -71,13 +71,12 @@ function Control() {
 
 function State() {
   const { about, battery, place, safety, drawings, faults } = state.value, pose = poses.value[current.value];
-  const stale = faults.some((f) => f.name === "link lost");
   return html`<${Control} />
-    <div class="card"><h3>${t("condition")}</h3><${Faults} />${stale && html`<p class="warned">${t("link.stale")}</p>`}<dl>
+    <div class="card"><h3>${t("condition")}</h3><${Faults} />${stale.value && html`<p class="warned">${t("link.stale")}</p>`}<dl>
       ${battery && html`<${Row} name=${t("battery")} kind=${battery.low ? "bad" : ""}>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}
         <small>${[battery.volts && `${battery.volts} V`, battery.amperes && `${battery.amperes} A`, battery.remaining && t("battery.left", { time: duration(battery.remaining) })].filter(Boolean).join(" · ")}</small><//>`}
       ${pose && html`<${Row} name=${t("pose")}>x ${fixed(pose[0])} · y ${fixed(pose[1])} m · ${Math.round(pose[2] * 180 / Math.PI)}°<//>
-      ${!stale && pose[3] !== null && html`<${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}`}
+      ${!stale.value && pose[3] !== null && html`<${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}`}
       ${place.quality !== null && html`<${Row} name=${t("place.fit")} kind=${place.lost ? "bad" : ""}>${place.lost ? t("place.lost", { why: robotWord(place.lost) }) : `${Math.round(place.quality * 100)} %`}<//>`}
       ${place.floor !== null && html`<${Row} name=${t("floor")}>${place.floor}<//>`}
       ${safety.docked !== null && html`<${Row} name=${t("dock")}>${safety.docked ? t("docked") : t("undocked")}<//>`}

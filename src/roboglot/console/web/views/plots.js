@@ -3,22 +3,19 @@ import { useEffect, useRef } from "preact/hooks";
 import { effect, signal } from "@preact/signals";
 import { fixed, html, language, t, theme } from "../base.js";
 import { palette } from "../chart.js";
-import { age, clock, current, poses, state } from "../link.js";
+import { age, clock, current, poses, stale, state } from "../link.js";
 
 const PERIOD = 500; // ms
 const NOTED_MAX = 1200; // a robot
 const HEIGHT = 130; // px
 
-/** Whether the values are old, as there is no link. */
-const lost = () => state.value?.faults?.some((f) => f.name === "link lost") ?? false;
-
 /** What is noted of a robot; each chart shows one or two of them. @type {Record<string, () => number | null>} */
 const SOURCES = {
   speed: () => { const p = poses.value[current.value]; return p && p[3] !== null ? Math.hypot(p[3], p[4]) : null; },
   turning: () => { const p = poses.value[current.value]; return p && p[5] !== null ? p[5] * 180 / Math.PI : null; },
-  battery: () => { const b = state.value?.battery; return b && !lost() ? b.charge * 100 : null; },
-  fit: () => { const q = state.value?.place?.quality; return lost() || q === null || q === undefined ? null : q * 100; },
-  amperes: () => lost() ? null : state.value?.battery?.amperes ?? null,
+  battery: () => { const b = state.value?.battery; return b && !stale.value ? b.charge * 100 : null; },
+  fit: () => { const q = state.value?.place?.quality; return stale.value || q === null || q === undefined ? null : q * 100; },
+  amperes: () => stale.value ? null : state.value?.battery?.amperes ?? null,
   link: () => age.value,
 };
 const CHARTS = [["speed", "m/s", null], ["turning", "°/s", null], ["battery", "%", [0, 100]], ["fit", "%", [0, 100]], ["amperes", "A", null], ["link", "ms", null]];
