@@ -8,6 +8,8 @@ import pytest
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.gimbal import Gimbal
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.protocols.robomaster.table import TABLE, implemented
 from roboglot.wire.contracts import contract
 
@@ -120,6 +122,17 @@ async def test_a_refusal_names_the_nearest_valid_command(client, listen, caplog,
     advised = explained.rpartition("did you mean `")[2].partition("`")[0]
     at_once = " wait_for_complete false" if advised.startswith("gimbal") else ""
     assert await client.ask(f"{advised}{at_once};") not in ("fail;", "command format error: command parse error;")
+
+
+async def test_lost_link_is_logged_by_its_driver_alone(client, robot, caplog) -> None:
+    """Each command of a client that drove on gave a warning of its own."""
+    link = robot.add(Link, Link("robomaster://ep", robot.clock, robot.events, robot[Health]))
+    link.move_to(LinkState.LOST, "no answer")
+    for _ in range(3):
+        assert await client.ask("chassis speed ?;") == "fail;"
+    assert "asked" not in caplog.text
+    assert await client.ask("chassis spd ?;") == PARSE_ERROR
+    assert "asked 'chassis spd ?'" in caplog.text
 
 
 async def test_a_client_cannot_forge_log_lines(client, caplog) -> None:

@@ -12,6 +12,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import cast
 
+from roboglot.model.components.system.link import Link
 from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.model.inputs.outside import CAME, GONE
 from roboglot.model.lateness import late
@@ -247,9 +248,14 @@ class ControlConnection(asyncio.Protocol):
         if result.explain:
             explained = cache(lambda: self._refusal(text, result))
             self._explain(explained)
-            if self._explained < EXPLANATIONS_MAX:
+            if self._explained < EXPLANATIONS_MAX and not self._is_lost(result):
                 self._explained += 1
                 log.warning("robomaster: %s", explained())
+
+    def _is_lost(self, result: Answer) -> bool:
+        """Return whether the lost link to a real robot, which its driver has logged, is the reason."""
+        robot = self._context.robot
+        return Link in robot and result.why == str(robot[Link].refusal)
 
     def _refusal(self, text: str | None, result: Answer) -> str:
         shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
