@@ -160,7 +160,7 @@ async def test_unknown_parameters_are_refused_with_a_guess(shown: Shown) -> None
         ("world/place_person", person | {"degree": 90}, "degree is unknown; did you mean 'degrees'?"),
         ("robots/a/take_control", {"robot": "a"}, "robot is unknown"),
         ("robots/a/stop", {"now": True}, "now is unknown"),
-        ("robots/a/program", {"source": "", "sourc": "print(1)"}, "sourc is unknown; did you mean 'source'?"),
+        ("robots/a/program", {"source": "", "sources": "print(1)"}, "sources is unknown; did you mean 'source'?"),
         ("robots/a/rehearse", {"steps": [{"do": "drive"}], "step": []}, "step is unknown; did you mean 'steps'?"),
     ):
         assert await shown.ask(f"/api/{path}", values) == (400, {"error": why})

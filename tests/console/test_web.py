@@ -52,7 +52,7 @@ def test_names_of_faults_have_words_in_both_languages() -> None:
     assert [sorted(wanted - set(WORDS[language])) for language in ("en", "zh")] == [[], []]
 
 
-def test_one_place_of_the_pages_knows_the_lost_link() -> None:
+def test_one_page_file_knows_the_lost_link() -> None:
     assert [path.name for path in OWN if f'"{LINK_LOST}"' in path.read_text("utf-8")] == ["link.js"]
 
 

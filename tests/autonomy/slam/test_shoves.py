@@ -72,6 +72,21 @@ async def test_move_with_a_shove_does_not_succeed(tour: Tour) -> None:
     assert "displaced" in action.reason
 
 
+@pytest.mark.world("office", body="hermes")
+@pytest.mark.parametrize(("speed", "blow"), [(0.6, 120.0), pytest.param(0.2, 90.0, marks=pytest.mark.slow)])
+async def test_push_against_the_wheels_is_no_slip(tour: Tour, speed: float, blow: float) -> None:
+    """The robot fell short of its wheels' way, and was then lost beside its place."""
+    await tour.go((20.0, 10.0), deg=180)
+    shoves, action = tour.robot.events.subscribe(RobotDisplaced), tour.robot[Driving].move_by(Pose(2.0), speed=speed)
+    await tour.clock.advance(1.5)
+    tour.world.hands.push("a", Vector3(-blow, 0.0, 0.0))
+    await tour.end_of(action)
+    assert len(shoves.drain()) == 1
+    assert isinstance(action.error, Blocked)
+    assert "displaced" in action.reason
+    assert tour.error[0] < 0.05
+
+
 @pytest.mark.world("office")
 @pytest.mark.parametrize("carried", [Pose(0.0, 0.0, 0.6), Pose(0.0, -2.0, 1.5)], ids=["turned", "far"])
 async def test_move_of_a_carried_robot_does_not_succeed(tour: Tour, carried: Pose) -> None:

@@ -63,8 +63,8 @@ def test_the_judge_finds_what_is_wrong() -> None:
         "maxItems": 2,
         "items": {"anyOf": [{"$ref": "#/components/schemas/Point"}, {"type": "null"}]},
     }
-    assert judge.why_invalid([{"x": 1}, None], schema) == ""
+    assert judge.misfit([{"x": 1}, None], schema) == ""
     for wrong in ([{"x": -1}], [{}], [{"x": True}], [5], [{"x": "1"}], {}, [None] * 3, None):
-        assert judge.why_invalid(wrong, schema), wrong
-    assert judge.why_invalid("b", {"enum": ["a"]})
-    assert judge.why_invalid({"b": 1}, {"type": "object", "additionalProperties": {"type": "string"}})
+        assert judge.misfit(wrong, schema), wrong
+    assert judge.misfit("b", {"enum": ["a"]})
+    assert judge.misfit({"b": 1}, {"type": "object", "additionalProperties": {"type": "string"}})

@@ -68,9 +68,17 @@ class DisplacementWatch:
             return None
         way = math.hypot(ahead, aside)
         lag, off = (-(x * ahead + y * aside) / way, abs(x * aside - y * ahead) / way) if way > 0.0 else (0.0, shoved)
-        self.slips = 0.0 < lag <= way + slack and off <= slack  # it fell short of the way that its wheels measured
+        short = 0.0 < lag <= way + slack and off <= slack  # it fell short of the way that its wheels measured
+        self.slips = short and self._back(ahead / way, aside / way) <= SHOVED
         self.forget(stamp)
         return shoved
+
+    def _back(self, x: float, y: float) -> float:
+        """Return how far the scans saw the robot go against the driven direction ``x``, ``y`` up to now, m."""
+        back = 0.0
+        for _, along, up, east, north, _ in self._corrections:
+            back = max(0.0, back - (along + east) * x - (up + north) * y)
+        return back
 
 
 async def fresh_look(clock: Clock, belief: Belief) -> None:
