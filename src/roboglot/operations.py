@@ -135,7 +135,7 @@ class Operation(Generic[K]):
 class OperationTable(Generic[K]):
     """All operations of one protocol; a name declared twice fails at import.
 
-    ``exact``: unknown parameters are refused; protocols whose newer clients may send more ignore them.
+    ``exact``: unknown parameters are refused, not ignored.
     """
 
     def __init__(self, name: str, right: Right | None = None, *, exact: bool = False) -> None:

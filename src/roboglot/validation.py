@@ -67,21 +67,8 @@ def why_invalid(
 
 def _fields_of(kind: object) -> set[str]:
     """Return the names of all fields that may occur anywhere in a value of a type."""
-    names: set[str] = set()
-    waiting = [msgspec.inspect.type_info(kind)]
-    while waiting:
-        match waiting.pop():
-            case msgspec.inspect.StructType(fields=fields):
-                new = {field.encode_name for field in fields} - names
-                names |= new
-                waiting += [field.type for field in fields if field.encode_name in new]
-            case msgspec.inspect.UnionType(types=types):
-                waiting += types
-            case msgspec.inspect.VarTupleType(item_type=item) | msgspec.inspect.ListType(item_type=item):
-                waiting.append(item)
-            case msgspec.inspect.DictType(value_type=value):
-                waiting.append(value)
-    return names
+    _, structures = msgspec.json.schema_components([kind])
+    return {name for each in structures.values() for name in each.get("properties", ())}
 
 
 def _plain(error: Exception, whole: str, field: str, kinds: Mapping[str, str]) -> str:

@@ -10,7 +10,7 @@ from roboglot.console import drawings, program_runs
 from roboglot.console.as_code import FORMS, LABELS, copy
 from roboglot.console.camera import Calls, send_film, send_photo, send_sound
 from roboglot.console.desk import CLIENT, Desk
-from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_json, read_wish
+from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_as, read_json
 from roboglot.console.openapi import document
 from roboglot.console.people.classes import Classes, Wish
 from roboglot.console.recordings import RecordingWish
@@ -95,7 +95,7 @@ class Api:
             case "GET", ["class"]:
                 await answer_json(send, self._classes.look())
             case "POST", ["class"]:
-                await answer_json(send, await self._classes.do(await read_wish(receive, Wish)))
+                await answer_json(send, await self._classes.do(await read_as(receive, Wish)))
             case "GET" | "POST", ["recording"]:
                 await answer_json(send, await self._serve_recording(method, receive))
             case _, ["robots", *_]:
@@ -120,7 +120,7 @@ class Api:
             case "POST", ["robots", name, "wire", number, "resend"]:
                 await answer_json(send, {"answers": await self._sent_again(name, number)})
             case "POST", ["robots", name, "camera", "call"]:
-                offer = (await read_wish(receive, _Call)).offer
+                offer = (await read_as(receive, _Call)).offer
                 answered = await self.calls.answer(self._desk.view(name).robot, offer)
                 await answer_json(send, {"answer": answered})
             case ("GET", ["robots", name, "program" as what]) | (
@@ -141,7 +141,7 @@ class Api:
             self._desk.view(name, "look at the recording")
         if method == "GET":
             return recordings.look()
-        wish = await read_wish(receive, RecordingWish)
+        wish = await read_as(receive, RecordingWish)
         for robot in self._desk.robots.values():
             robot.admission.check(CLIENT, "record", Right.ADMIN)
         with self._desk.noting(f"record {wish.do}"):
@@ -154,9 +154,9 @@ class Api:
         if method == "GET":
             raise _nothing_here()
         if what == "rehearse":
-            await answer_json(send, await rehearse(self._desk, name, await read_wish(receive, Plan)))
+            await answer_json(send, await rehearse(self._desk, name, await read_as(receive, Plan)))
         else:
-            source = (await read_wish(receive, _Program)).source
+            source = (await read_as(receive, _Program)).source
             await answer_json(send, await program_runs.start(self._desk, name, source))
 
     async def _send_file(self, robot: Robot, file: str, receive: Receive, send: Send) -> None:

@@ -57,7 +57,7 @@ async def read_json(receive: Receive) -> Mapping[str, object]:
         raise Problem(400, f"the body is not a JSON object: {why_invalid(error)}") from None
 
 
-async def read_wish(receive: Receive, kind: type[T]) -> T:
+async def read_as(receive: Receive, kind: type[T]) -> T:
     """Return the body as a value of a type, or raise Problem."""
     try:
         return msgspec.convert(await read_json(receive), kind)

@@ -9,7 +9,7 @@ from typing import Annotated
 import msgspec
 
 from roboglot.console.desk import Desk
-from roboglot.console.http import Problem, Receive, Scope, Send, answer_json, read_wish
+from roboglot.console.http import Problem, Receive, Scope, Send, answer_json, read_as
 from roboglot.console.people.classes import Classes, Elsewhere
 from roboglot.console.people.entry import address_of, admission_of, cookie_of
 from roboglot.console.people.sessions import Sessions, cookie_name, set_cookie
@@ -50,7 +50,7 @@ class Signing:
             await self._sessions.end(cookie_of(scope))
             await answer_json(send, {"name": ""}, 200, [set_cookie(name, "", secure=secure)])
             return True
-        shown = await read_wish(receive, Shown)
+        shown = await read_as(receive, Shown)
         token, answer = await self._sign_in(address_of(scope), shown)
         if not token:  # the pupil belongs to another world
             await answer_json(send, answer)

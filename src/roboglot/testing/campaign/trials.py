@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import os
-import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
@@ -53,10 +53,7 @@ class Trial:
 
 def named(label: str) -> str:
     """Return the file's name that a label stands for."""
-    written = re.compile(rb"\\(?:\\|x([0-9a-f]{2}))")
-    return os.fsdecode(
-        written.sub(lambda found: bytes.fromhex(found[1].decode()) if found[1] else b"\\", label.encode())
-    )
+    return os.fsdecode(codecs.escape_decode(label.encode())[0])
 
 
 class Result(msgspec.Struct, frozen=True):
