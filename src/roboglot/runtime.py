@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from roboglot.clients.errors import ClientError
 from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded
-from roboglot.console.desk import Desk
+from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.desk import World as ConsoleWorld
 from roboglot.console.recordings import Recordings
 from roboglot.console.server import Console
@@ -155,7 +155,9 @@ class Runtime:
         self.guard = self._build_guard() if config.access.on else None
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
-        self.leases = LeaseServer(config.data, self.fleet.robots, self.fleet.world.hands)
+        self.leases = LeaseServer(
+            config.data, self.fleet.robots, self.fleet.world.hands, (*(door.name for door in doors), CLIENT)
+        )
         self._recorder: Recorder | None = None
         self._record_server = RecordServer(config.data, lambda: self.recorder)
         self._types = doors

@@ -49,7 +49,7 @@ async def _ask(path: Path, request: Request) -> Answer:
 @pytest.fixture
 async def desk(robot: Robot, world: World, tmp_path: Path) -> AsyncIterator[Path]:
     """The desk's folder."""
-    made = LeaseServer(tmp_path, world.robots, world.hands)
+    made = LeaseServer(tmp_path, world.robots, world.hands, ("robomaster", "console"))
     await made.open()
     yield tmp_path
     await made.close()
@@ -87,7 +87,15 @@ async def test_control_is_seen_taken_given_and_released(desk: Path, robot: Robot
     (seen,) = (await _ask(desk / NAME, Request("release", "a"))).robots
     assert in_words(seen).endswith("control is free")
     assert (await _ask(desk / NAME, Request("give", "a"))).error.startswith("a client's name")
+    (seen,) = (await _ask(desk / NAME, Request("give", "a", "the robot itself"))).robots  # it moved last
+    assert seen.taken_by == "the robot itself"
     assert (await _ask(desk / NAME, Request("take", "b"))).error == "there is no robot 'b'; there are a"
+
+
+async def test_control_is_not_given_to_doors_that_do_not_exist(desk: Path, robot: Robot) -> None:
+    answer = await _ask(desk / NAME, Request("give", "a", "robomastr 10.0.0.7"))
+    assert answer.error == "there is no door 'robomastr'; did you mean 'robomaster'?"
+    assert robot[Lease].taken_by == ""
 
 
 async def test_only_owners_get_in_invalid_wishes_are_reported(desk: Path) -> None:

@@ -1,12 +1,13 @@
 """Server of ``roboglot lease``, ``stop`` and ``reset``: shows and changes control of the robots of one program.
 
-A socket in the data folder that only its owner can open: one line of JSON per request and answer. Knows no door.
+A socket in the data folder that only its owner can open: one line of JSON per request and answer. Knows the doors'
+names only.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -57,10 +58,12 @@ class Answer(msgspec.Struct):
 
 
 class LeaseServer(LocalServer):
-    """Server for all robots of one program."""
+    """Server for all robots of one program. ``doors``: first words of clients' names; empty: any."""
 
-    def __init__(self, folder: Path, robots: Mapping[str, Robot], stage: Stage | None = None) -> None:
-        self._robots, self._stage = robots, stage
+    def __init__(
+        self, folder: Path, robots: Mapping[str, Robot], stage: Stage | None = None, doors: Collection[str] = ()
+    ) -> None:
+        self._robots, self._stage, self._doors = robots, stage, doors
         super().__init__(folder / NAME, "roboglot lease", self._answer)
 
     async def _answer(self, line: bytes) -> bytes:
@@ -97,6 +100,9 @@ class LeaseServer(LocalServer):
             case "release":
                 await robot[Lease].release()
             case "give":
+                door = request.who.strip().partition(" ")[0]
+                if door and self._doors and door not in self._doors and request.who != robot[Lease].last.who:
+                    raise LookupError(f"there is no door {door!r}{instead(door, self._doors)}")
                 await robot[Lease].take(request.who)
             case "stop":
                 await robot.actions.cancel(reason="stopped by the owner of this machine")

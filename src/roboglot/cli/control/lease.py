@@ -28,9 +28,9 @@ def command(
         bool, typer.Option("--take", help="Take control: no client moves the robot until it is released.")
     ] = False,
     give: Annotated[
-        str,
+        str | None,
         typer.Option(metavar="WHO", help="Give control to this door or client alone: robomaster, 'slamware 10.0.0.7'."),
-    ] = "",
+    ] = None,
     release: Annotated[
         bool, typer.Option("--release", help="Release control: any client may move the robot again.")
     ] = False,
@@ -38,14 +38,15 @@ def command(
     data: Data = None,
 ) -> None:
     """Show who moves each robot; take control of one, pass it on or release it."""
-    if take + bool(give) + release > 1:
+    given = give is not None
+    if take + given + release > 1:
         raise typer.BadParameter("give one of --take, --give and --release")
-    if (take or give or release) and not (robot or all_):
+    if (take or given or release) and not (robot or all_):
         raise typer.BadParameter("name a robot, or give --all")
     if robot and all_:
         raise typer.BadParameter("name a robot, or give --all")
-    verb: Verb = "take" if take else "give" if give else "release" if release else "look"
-    answer = wish("lease", Request(verb, robot, give, all_), data)
+    verb: Verb = "take" if take else "give" if given else "release" if release else "look"
+    answer = wish("lease", Request(verb, robot, give or "", all_), data)
     shown = [control for control in answer.robots if robot in ("", control.robot)]
     if not shown:
         sys.exit(f"roboglot lease: there is no robot {robot!r}{instead(robot, _names(answer))}")
