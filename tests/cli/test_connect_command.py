@@ -11,8 +11,10 @@ from ipaddress import IPv4Network, ip_address
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from roboglot.access.store import Grant, open_store
+from roboglot.cli import loaded
 from roboglot.cli.connect import addresses
 from roboglot.operations import Right
 from roboglot.testing.addresses import free_addresses, free_port
@@ -89,6 +91,24 @@ def test_addresses_follow_one_another() -> None:
         addresses(3, "", "10.99.0.0/30")
     with pytest.raises(ValueError, match="either"):
         addresses(1, "127.0.0.9", "10.99.0.0/24")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["127.0.0.1:9", "--once"], "robot a: 127.0.0.1:9: Connection refused"),
+        (["127.0.0.1:99999"], "'127.0.0.1:99999' is not HOST or HOST:PORT"),
+        (["https://127.0.0.1"], "is not HOST or HOST:PORT"),
+        (["127.0.0.1", "--robot", "a", "--robot", "a"], "a robot is named twice"),
+    ],
+)
+def test_what_cannot_be_connected_ends_with_reasons(
+    arguments: list[str], reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOGLOT_TOKEN", "token")
+    ended = CliRunner().invoke(loaded("connect"), arguments)
+    assert ended.exit_code == 1
+    assert reason in f"{ended.output}{ended.exception}"
 
 
 def test_how_to_have_address_of_others_is_explained(tmp_path: Path) -> None:

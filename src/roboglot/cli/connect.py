@@ -13,11 +13,12 @@ from functools import partial
 from ipaddress import IPv4Address, IPv4Network
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
+from urllib.parse import urlsplit
 
 import typer
 
 from roboglot.access.tunnel.connector import AnnouncedGateway, KnownGateways, NotTrusted, Refused
-from roboglot.access.tunnel.dialling import Dialling, OnePlace, Place, Places, Unusable
+from roboglot.access.tunnel.dialling import Dialling, Ended, OnePlace, Place, Places, Unusable
 from roboglot.config import ROBOTS_MAX, is_loopback
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import visible
@@ -47,7 +48,7 @@ def command(
     registry: Annotated[
         str, typer.Option(help="URL or file of a registry, instead of a gateway; follows robots that move.")
     ] = "",
-    once: Annotated[bool, typer.Option("--once", help="End when a tunnel is lost.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End with status 1 when a tunnel is lost.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every connection.")] = False,
 ) -> None:
     """Open the vendors' ports of robots on this machine, over one TLS connection each to the gateway."""
@@ -57,7 +58,10 @@ def command(
     try:
         token = token_file.read_text() if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
         names = robot or ["a"]
+        if len({*names}) < len(names):
+            raise ValueError("a robot is named twice")
         places = addresses(len(names), address, address_range)
+        where = registered(registry) if registry else _one(gateway)
     except (OSError, ValueError) as error:
         sys.exit(f"roboglot connect: {in_words(error)}")
     if not token.strip():
@@ -65,12 +69,11 @@ def command(
     for place in places:
         if not is_loopback(place):
             print(f"roboglot connect: anyone who can reach {place} acts with your token", file=sys.stderr)
-    where = registered(registry) if registry else _one(gateway)
     try:
         run(_keep_all(where, dict(zip(names, places, strict=True)), token.strip(), once=once))
     except KeyboardInterrupt:
         sys.exit(130)
-    except (NotTrusted, Refused, Unusable, OSError, ValueError, sqlite3.Error) as refused:
+    except (NotTrusted, Refused, Unusable, Ended, OSError, ValueError, sqlite3.Error) as refused:
         sys.exit(f"roboglot connect: {in_words(refused)}")
 
 
@@ -149,10 +152,15 @@ def registered(registry: str) -> Iterator[Places]:
 
 
 def _one(gateway: str) -> AbstractContextManager[Places]:
-    """Return the given gateway as the place of all robots."""
-    host, _, port = gateway.rpartition(":") if gateway.rpartition(":")[2].isdigit() else (gateway, "", str(PORT))
-    known = KnownGateways(_settings() / "gateways.json")
-    return nullcontext(OnePlace(Place(host.strip("[]"), int(port), known)))
+    """Return the given gateway as the place of all robots. Raises ValueError."""
+    try:
+        parts = urlsplit(f"//{gateway}")
+        host, port = parts.hostname, parts.port or PORT
+    except ValueError:
+        host = None
+    if not host or gateway.endswith(":") or parts.netloc != gateway:
+        raise ValueError(f"{gateway!r} is not HOST or HOST:PORT, such as [::1]:50090")
+    return nullcontext(OnePlace(Place(host, port, KnownGateways(_settings() / "gateways.json"))))
 
 
 def _settings() -> Path:

@@ -24,6 +24,7 @@ from roboglot.transport.tls import TlsCall
 
 log = logging.getLogger(__name__)
 
+CALL_SECONDS_MAX = 5.0
 GREETING_SECONDS_MAX = 10.0
 BESIDE_AGAIN = 1.0  # s between attempts to open the second connection
 BROADCAST = "127.255.255.255"
@@ -105,7 +106,7 @@ class Connector:
     async def run(self, ready: Callable[[list[int], str, bool], None]) -> None:
         """Carry the ports; call ``ready`` with the open ports, the fingerprint, and whether that is new.
 
-        Raises NotTrusted, Refused, TunnelLost, OSError.
+        Raises NotTrusted, Refused, TunnelLost, OSError, TimeoutError.
         """
         link = await self._call(partial(TunnelLink, stir=BusyPoll().stir))
         try:
@@ -120,12 +121,13 @@ class Connector:
         context.minimum_version = ssl.TLSVersion.TLSv1_3
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # the fingerprint is checked instead
         loop = asyncio.get_running_loop()
-        transport, call = await loop.create_connection(lambda: TlsCall(made, context), self._gateway, self._port)
-        try:
-            return cast(TunnelLink, await call.over)
-        except asyncio.CancelledError:
-            transport.abort()
-            raise
+        async with asyncio.timeout(CALL_SECONDS_MAX):
+            transport, call = await loop.create_connection(lambda: TlsCall(made, context), self._gateway, self._port)
+            try:
+                return cast(TunnelLink, await call.over)
+            except asyncio.CancelledError:
+                transport.abort()
+                raise
 
     def _check(self, link: TunnelLink) -> tuple[str, bool]:
         """Return the gateway's fingerprint, and whether it is new here. Raises NotTrusted."""
@@ -176,7 +178,10 @@ class Connector:
                     raise OSError(f"{port} is not a port of an app")
                 return await loop.create_connection(protocol, "127.0.0.1", port)
 
-            tunnel = Tunnel(link, first=1, opened=call_back, datagram=pass_on)
+            def quiet() -> None:
+                log.info("robot %s: the line is silent; what is driven by hand stops", self._robot)
+
+            tunnel = Tunnel(link, first=1, opened=call_back, datagram=pass_on, quiet=quiet)
             async with contextlib.AsyncExitStack() as stack:
                 for port in words["tcp"]:
                     server = await listen(tunnel.accept(int(port)), self._address, int(port))

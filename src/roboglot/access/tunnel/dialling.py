@@ -9,6 +9,7 @@ from ipaddress import IPv4Network
 from typing import Protocol
 
 from roboglot.access.tunnel.connector import Connector, NotTrusted, Refused, Trust
+from roboglot.hosting.reasons import in_words
 from roboglot.values import dataclass
 
 AGAIN_AFTER = 1.0  # s
@@ -17,6 +18,10 @@ SOON = 0.5  # s between two look-ups of a robot that no program runs at present
 
 class Unusable(Exception):
     """The address or one of its ports is unavailable; a retry would fail, too."""
+
+
+class Ended(Exception):
+    """The tunnel is lost, and was wanted once only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,32 +76,32 @@ class Dialling:
         self._said = ""
 
     async def keep(self, *, once: bool = False) -> None:
-        """Keep the ports open; ``once``: until the tunnel is lost. Raises NotTrusted, Refused, Unusable."""
+        """Keep the ports open; ``once``: until the tunnel is lost (Ended). Raises NotTrusted, Refused, Unusable."""
         while True:
             place = await self._find()
-            moved = await self._carry(place)
+            lost = await self._carry(place)
             if once:
-                return
-            if not moved:
+                raise Ended(f"robot {self._robot}: {lost or 'it moved'}")
+            if lost:
+                self._say_once(f"{lost}; trying again")
                 await asyncio.sleep(AGAIN_AFTER)
+            else:
+                self._say_once("it moved")
 
     async def _find(self) -> Place:
         while True:
             try:
                 if place := await self._places.of(self._robot):
-                    self._said = ""
                     return place
                 self._say_once("no gateway is known that leads to it now")
             except OSError as error:
                 self._say_once(str(error))
             await asyncio.sleep(SOON)
 
-    async def _carry(self, place: Place) -> bool:
-        """Carry the ports until the tunnel is lost or the robot has moved; return True if it has moved."""
+    async def _carry(self, place: Place) -> str:
+        """Carry the ports until the tunnel is lost or the robot has moved; return why it is lost, "" if it moved."""
         connector = Connector(place.host, place.port, self._robot, self._token, self._address, place.trust)
-        running = asyncio.ensure_future(
-            connector.run(lambda ports, shown, new: self._ready(self._robot, ports, shown, new))
-        )
+        running = asyncio.ensure_future(connector.run(self._open))
         moving = asyncio.ensure_future(self._places.moved(self._robot, place))
         try:
             await asyncio.wait([running, moving], return_when=asyncio.FIRST_COMPLETED)
@@ -105,24 +110,27 @@ class Dialling:
                 task.cancel()
             (outcome, _) = await asyncio.gather(running, moving, return_exceptions=True)
         if isinstance(outcome, asyncio.CancelledError):
-            self._say(f"robot {self._robot}: it moved")
-            return True
+            return ""
         return await self._lost(outcome, place)
 
-    async def _lost(self, outcome: object, place: Place) -> bool:
-        """Report the end of a tunnel; return True if the robot has moved meanwhile."""
+    def _open(self, ports: list[int], fingerprint: str, new: bool) -> None:
+        self._said = ""
+        self._ready(self._robot, ports, fingerprint, new)
+
+    async def _lost(self, outcome: object, place: Place) -> str:
+        """Return why a tunnel ended; "" if the robot has moved meanwhile."""
         match outcome:
             case NotTrusted() | Refused():
                 if await self._is_there(place):
                     raise outcome
-                return True
+                return ""
             case OSError() | TimeoutError() | asyncio.IncompleteReadError():
                 if unusable := _unusable(outcome, self._address):
                     raise Unusable(unusable) from None
-                self._say(f"robot {self._robot}: {outcome or type(outcome).__name__}")
+                return f"{place.host}:{place.port}: {in_words(outcome) or 'no answer'}"
             case BaseException():
                 raise outcome
-        return False
+        return ""
 
     async def _is_there(self, place: Place) -> bool:
         """Return whether the gateway at ``place`` is still the robot's."""
