@@ -138,6 +138,18 @@ async def test_does_not_press_long_against_an_unseen_obstacle(tour: Tour) -> Non
     assert tour.clock.time() - touched < 2.0
 
 
+@pytest.mark.world("empty", body="hermes")
+async def test_robot_leaves_what_only_its_bumper_feels(tour: Tour) -> None:
+    box, goal = tour.start.compose(Pose(1.5, -0.52)), tour.start.compose(Pose(4.0, 0.0))
+    tour.world.hands.add_obstacle(box, (0.1, 0.6, 0.1))  # below its lidar, and to the right of its camera's view
+    tour.robot[Driving].drive(Twist(x=0.2), lifetime=20.0)
+    await tour.until(lambda: bool(tour.bumps))
+    await tour.clock.advance(15.0)  # longer than obstacles out of sight are remembered
+    action = await tour.go((goal.x, goal.y))
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert tour.truth.distance_to(goal) < 0.1
+
+
 @pytest.mark.world("empty")
 async def test_cancel_stops_within_the_braking_distance(tour: Tour) -> None:
     action = tour.head_for((8.5, 5.0))

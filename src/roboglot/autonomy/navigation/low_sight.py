@@ -1,23 +1,29 @@
-"""Obstacles below or above the lidar's plane, by depth camera and time-of-flight sensors.
+"""Obstacles below or above the lidar's plane, by depth camera, time-of-flight sensors and bumper.
 
 Floors and ramps are no obstacles: only surfaces too steep for wheels and too high for feet are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Set
 from operator import is_
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.components.motion.gripper import Gripper, GripperStatus
+from roboglot.model.components.sensing.bumper import Bumper
 from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
 from roboglot.model.components.sensing.time_of_flight import TimeOfFlight, ZoneDistances
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
 
 GRASP, GRASP_SIDE = 0.6, 0.12  # m ahead and aside that an object in the gripper covers
+
+ZONES = {"front": 0.0, "left": math.pi / 2, "rear": math.pi, "right": -math.pi / 2}  # rad: middles of the bumper's
+TOUCHED = np.linspace(-0.6, 0.6, 9)  # rad around a zone's middle
+BESIDE = 0.03  # m beyond the hull that what touches it may be
 
 Points = NDArray[np.float64]
 Sorting = Callable[[Points, Points, Points, float, float], tuple[Points, Points]]
@@ -53,6 +59,8 @@ class LowSight:
             views.append(self._in_image(image))
         if TimeOfFlight in robot:
             views.append(self._in_zones(robot[TimeOfFlight].readings))
+        if Bumper in robot and (pressed := robot[Bumper].pressed):
+            views.append((self._touching(pressed), NONE))
         if not views:
             return LowView(NONE, NONE)
         obstacles = _joined([standing for standing, _ in views if len(standing)])
@@ -60,6 +68,12 @@ class LowSight:
             held = (obstacles[:, 0] > 0.0) & (obstacles[:, 0] < GRASP) & (np.abs(obstacles[:, 1]) < GRASP_SIDE)
             obstacles = obstacles[~held]
         return LowView(obstacles, _joined([floor for _, floor in views if len(floor)]))
+
+    def _touching(self, zones: Set[str]) -> Points:
+        """Return points beside the pressed zones: what no sensor sees is there, at an unknown height."""
+        angles = np.concatenate([ZONES[zone] + TOUCHED for zone in zones if zone in ZONES] or [NONE[:, 0]])
+        away = self._radius + BESIDE
+        return np.column_stack((away * np.cos(angles), away * np.sin(angles), np.full(len(angles), self._height)))
 
     def _in_image(self, image: DepthImage) -> tuple[Points, Points]:
         """Return obstacle and floor points of a depth image; a slow camera's image is sorted only once."""
