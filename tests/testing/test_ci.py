@@ -32,6 +32,8 @@ def test_job_starts_and_drives_a_robot_keeping_events(tmp_path: Path) -> None:
     address = robot(tmp_path, "up", ARGUMENTS=f"--address {ADDRESS} --no-console --world empty --speed 4").strip()
     try:
         assert address == ADDRESS
+        with pytest.raises(AssertionError, match="a robot is up already"):
+            robot(tmp_path, "up", ARGUMENTS="--world empty")  # it would take the place of the first, which then stays
         app = [sys.executable, str(ROOT / "examples/ci/courier.py"), f"http://{address}:1448", "0.4", "0.0", "800"]
         drove = subprocess.run(app, capture_output=True, text=True, check=False)
         assert drove.stdout.startswith("arrived"), drove.stderr

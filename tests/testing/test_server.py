@@ -140,6 +140,8 @@ def test_failed_tests_leave_recording_map_and_exchanges(tmp_path: Path) -> None:
     assert sorted(entry.attrib["value"] for entry in properties) == files
 
 
-def test_unknown_word_in_a_marker_is_an_error(tmp_path: Path) -> None:
-    done = run_pytest(tmp_path, "import pytest\n@pytest.mark.world(sede=1)\ndef test_it(robot_server): pass\n")
+def test_wrong_words_in_a_marker_are_errors(tmp_path: Path) -> None:
+    tests = "def test_it(robot_server): pass\n@pytest.mark.world(robots=())\ndef test_robots(robot_server): pass\n"
+    done = run_pytest(tmp_path, f"import pytest\n@pytest.mark.world(sede=1)\n{tests}")
     assert "world has no sede" in done.stdout + done.stderr
+    assert "robots names at least one robot" in done.stdout + done.stderr

@@ -78,4 +78,7 @@ def wanted_of(values: Mapping[str, Any], faults: tuple[WantedFault, ...] = ()) -
     if unknown := values.keys() - known:
         raise ValueError(f"world has no {', '.join(sorted(unknown))}; there are {', '.join(sorted(known))}")
     robots = values.get("robots", ("a",))
-    return Wanted(**(dict(values) | {"robots": (robots,) if isinstance(robots, str) else tuple(robots)}), faults=faults)
+    names = (robots,) if isinstance(robots, str) else tuple(robots)
+    if not names:
+        raise ValueError("robots names at least one robot")
+    return Wanted(**(dict(values) | {"robots": names}), faults=faults)
