@@ -30,7 +30,9 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
-from roboglot.testing.bad_line import BadLine
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+from tests.access.bad_line import BadLine
 
 ROBOT, HERE, PORT = "127.0.98.1", "127.0.98.2", 50090
 SPEED = 0.5  # m/s

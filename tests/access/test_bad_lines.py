@@ -26,7 +26,7 @@ from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
-from roboglot.testing.bad_line import BadLine
+from tests.access.bad_line import BadLine
 from tests.access.line import bad_line
 from tests.access.matrix import ADDRESS, frame_states
 from tests.protocols.robomaster.clients.test_robomasterpy import TOUR, check, listen

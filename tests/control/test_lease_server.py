@@ -92,7 +92,7 @@ async def test_control_is_seen_taken_given_and_released(desk: Path, robot: Robot
     assert (await _ask(desk / NAME, Request("take", "b"))).error == "there is no robot 'b'; there are a"
 
 
-async def test_control_is_not_given_to_doors_that_do_not_exist(desk: Path, robot: Robot) -> None:
+async def test_control_is_given_to_doors_that_exist_only(desk: Path, robot: Robot) -> None:
     answer = await _ask(desk / NAME, Request("give", "a", "robomastr 10.0.0.7"))
     assert answer.error == "there is no door 'robomastr'; did you mean 'robomaster'?"
     assert robot[Lease].taken_by == ""

@@ -9,7 +9,7 @@ from ipaddress import IPv4Network
 from typing import Protocol
 
 from roboglot.access.tunnel.connector import Connector, NotTrusted, Refused, Trust
-from roboglot.hosting.reasons import in_words
+from roboglot.hosting.error_text import in_words
 from roboglot.values import dataclass
 
 AGAIN_AFTER = 1.0  # s
