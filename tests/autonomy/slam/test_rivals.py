@@ -37,6 +37,24 @@ def test_what_map_does_not_know_speaks_for_rivals(unknown: int, count: int, monk
     assert len(matcher.places(EvidenceGrid(), scan, None)) == count
 
 
+@pytest.mark.parametrize(("fitting", "count"), [(POINTS, 0), (82, 1)])
+def test_region_loses_to_a_better_place_elsewhere(fitting: int, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The only place in a region was believed, although the scan showed another room of the same shape."""
+    from roboglot.autonomy.slam import matcher
+    from roboglot.autonomy.slam.evidence import EvidenceGrid
+    from roboglot.autonomy.slam.scan_points import ScanPoints
+    from roboglot.model.components.mapping.localization import Region
+
+    inside, outside = (
+        candidate(7.0, 82, 9, 9),
+        candidate(0.0, fitting, (POINTS - fitting) // 2, (POINTS - fitting) // 2),
+    )
+    monkeypatch.setattr(matcher, "_candidates", lambda _, __, region, ___: ([inside] if region else [outside], True))
+    scan = ScanPoints(np.zeros((1, 2)), np.ones(1, np.uint8), np.zeros((1, 2)), Point())
+    found = matcher.places(EvidenceGrid(), scan, Region(5.0, -1.0, 9.0, 1.0))
+    assert found == [inside.match][:count]
+
+
 @pytest.mark.parametrize("complete", [True, False])
 def test_best_rival_is_believed_if_all_were_examined(complete: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     from roboglot.autonomy.slam import matcher

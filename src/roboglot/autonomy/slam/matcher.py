@@ -161,13 +161,14 @@ def places(
     """Return the places in the map (or ``region``) that explain the scan about equally well, the best first.
 
     Several places: the scan alone is ambiguous. None: the place is not on the map, or too little of it is known. In a
-    ``region``, or at a pose that is ``known`` already, less certainty suffices.
+    ``region``, or at a pose that is ``known`` already, less certainty suffices, unless the scan fits better elsewhere.
     """
     candidates, complete = _candidates(grid, scan, region, most)
-    alike = _alike(candidates)
+    elsewhere = _candidates(grid, scan, None, most)[0] if region is not None and candidates else []
+    alike = _alike(candidates, elsewhere)
     if len(alike) == 1 < len(candidates) and not complete:
         candidates, complete = _candidates(grid, scan, region, PLACES_TRIED)
-        alike = _alike(candidates)
+        alike = _alike(candidates, elsewhere)
         if not complete:  # more than are examined: one of the others may be better
             alike = candidates
     if not alike:
@@ -177,15 +178,19 @@ def places(
     return [one.match for one in alike] if sure else []
 
 
-def _alike(candidates: list[Candidate]) -> list[Candidate]:
-    """Return the ``candidates`` (best first) that explain the scan about as well as the best one."""
+def _alike(candidates: list[Candidate], elsewhere: list[Candidate]) -> list[Candidate]:
+    """Return the ``candidates`` that explain the scan about as well as the best one, also of those ``elsewhere``.
+
+    Each list has the best first.
+    """
     if not candidates:
         return []
-    first = candidates[0].said  # differences from a rival may lie on unknown ground
+    best = max((*candidates, *elsewhere), key=lambda one: one.match.fit)
+    first = best.said  # differences from a rival may lie on unknown ground
     least = first.agreement - RIVAL_SUPPORTED - (1.0 - first.known)
-    alike = [one for one in candidates if one.match.fit >= RIVAL_FIT * candidates[0].match.fit]
+    alike = [one for one in candidates if one.match.fit >= RIVAL_FIT * best.match.fit]
     alike = [one for one in alike if one.said.agreement >= least]
-    best = max(alike, key=lambda one: one.look.exact)
+    best = max((*alike, *elsewhere), key=lambda one: one.look.exact)
     if best.match.sigma <= SURE_SIGMA:
         alike = [one for one in alike if not one.look.is_outdone_by(best.look)]
     return alike
