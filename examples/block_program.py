@@ -76,4 +76,13 @@ def run(program: str) -> None:
 
 
 if __name__ == "__main__":
-    run(Path(sys.argv[1]).read_text() if len(sys.argv) > 1 else PROGRAM)
+    try:
+        run(Path(sys.argv[1]).read_text() if len(sys.argv) > 1 else PROGRAM)
+    except FileNotFoundError as missing:
+        sys.exit(f"{missing.filename} is missing; certificates: .venv/bin/roboglot certs --export phone")
+    except RuntimeError as error:  # another app has the port
+        sys.exit(str(error))
+    except queue.Empty:
+        sys.exit(f"nothing came from the robot for {PATIENCE:.0f} s")
+    except grpc.RpcError as error:
+        sys.exit(f"the robot did not answer: {error.details()}")

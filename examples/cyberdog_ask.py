@@ -30,6 +30,11 @@ def ask(code: int, params: str = "{}") -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) not in (2, 3):
+    if len(sys.argv) not in (2, 3) or not sys.argv[1].isdecimal():
         sys.exit(__doc__)
-    ask(int(sys.argv[1]), *sys.argv[2:])
+    try:
+        ask(int(sys.argv[1]), *sys.argv[2:])
+    except FileNotFoundError as missing:
+        sys.exit(f"{missing.filename} is missing: .venv/bin/roboglot certs --export phone")
+    except grpc.RpcError as error:
+        sys.exit(f"the robot did not answer: {error.details()}")

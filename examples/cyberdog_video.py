@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import json
 import os
+import sys
 import threading
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
+from roboglot.clients.errors import ClientError
 
 PAGE = Path(__file__).with_suffix(".html")
 BODY_MAX = 100_000
@@ -85,5 +87,10 @@ async def main() -> None:
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(KeyboardInterrupt):
-        asyncio.run(main())
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            asyncio.run(main())
+    except FileNotFoundError as missing:
+        sys.exit(f"{missing.filename} is missing: .venv/bin/roboglot certs --export phone")
+    except (ClientError, OSError) as error:  # also the page's port in use
+        sys.exit(str(error))

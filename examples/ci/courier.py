@@ -107,6 +107,11 @@ class Arm:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) not in (4, 5):
+        sys.exit("courier.py URL X Y [PATIENCE]: drive the robot at URL to X, Y (m) within PATIENCE s")
     courier = Courier(sys.argv[1], *map(float, sys.argv[4:5]))
-    courier.go(float(sys.argv[2]), float(sys.argv[3]))
+    try:
+        courier.go(float(sys.argv[2]), float(sys.argv[3]))
+    except RobotError as error:
+        sys.exit(str(error))
     print("arrived at", *(f"{value:.1f}" for value in courier.place()))
