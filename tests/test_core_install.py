@@ -93,6 +93,11 @@ def test_the_core_is_small(core: Path) -> None:
     assert not [name for name in HEAVY if (site / name).exists()]
 
 
+def test_the_start_screen_names_a_file_that_is_installed(core: Path) -> None:
+    (proto,) = core.parent.parent.glob("lib/python*/site-packages/roboglot/wire/cyberdog/proto/cyberdog_app.proto")
+    assert "service GrpcApp" in proto.read_text()  # grpcurl reads it, as the CyberDog door suggests
+
+
 def test_importing_the_core_loads_nothing_heavy(core: Path) -> None:
     code = (
         "import sys, roboglot, roboglot.clients.slamware, roboglot.clients.robomaster.client, roboglot.clients.visual, "
