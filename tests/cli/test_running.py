@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from roboglot.cli.control import running
-from roboglot.cli.control.lease import wish
+from roboglot.cli.control.lease import send
 from roboglot.control import lease_server
 from roboglot.control.record_server import Answer, Request
 from roboglot.hosting.local_socket import LocalServer
@@ -51,14 +51,14 @@ async def test_commands_reach_the_worlds_of_a_fleet(tmp_path: Path) -> None:
         servers.append(LocalServer(tmp_path / "shards" / world / "data" / lease_server.NAME, "lease", answer))
         await servers[-1].open()
     try:
-        stopped = await asyncio.to_thread(wish, "stop", lease_server.Request("stop", all=True), tmp_path)
+        stopped = await asyncio.to_thread(send, "stop", lease_server.Request("stop", all=True), tmp_path)
         assert [control.robot for control in stopped.robots] == ["a1", "a2", "a10"]
         assert sorted(asked) == [("stop", "a1"), ("stop", "a10"), ("stop", "a2")]
         asked.clear()
-        await asyncio.to_thread(wish, "reset", lease_server.Request("reset", "a2"), tmp_path)
+        await asyncio.to_thread(send, "reset", lease_server.Request("reset", "a2"), tmp_path)
         assert [(verb, robot) for verb, robot in asked if verb != "look"] == [("reset", "a2")]
         with pytest.raises(SystemExit, match=r"roboglot stop: there is no robot 'b'; there are a1, a2, a10"):
-            await asyncio.to_thread(wish, "stop", lease_server.Request("stop", "b"), tmp_path)
+            await asyncio.to_thread(send, "stop", lease_server.Request("stop", "b"), tmp_path)
     finally:
         for server in servers:
             await server.close()
@@ -82,13 +82,13 @@ async def test_every_world_that_refuses_is_named(tmp_path: Path) -> None:
     gone.touch()  # as a killed world leaves it
     try:
         with pytest.raises(SystemExit) as ended:
-            await asyncio.to_thread(wish, "stop", lease_server.Request("stop", all=True), tmp_path)
+            await asyncio.to_thread(send, "stop", lease_server.Request("stop", all=True), tmp_path)
         assert str(ended.value).splitlines() == [
             "roboglot stop: robot a1: no link",
             "roboglot stop: robot a3: no link",
             f"roboglot stop: no `roboglot up` answers in {gone.parent}",
         ]
-        stopped = await asyncio.to_thread(wish, "stop", lease_server.Request("stop", "a2"), tmp_path)
+        stopped = await asyncio.to_thread(send, "stop", lease_server.Request("stop", "a2"), tmp_path)
         assert [control.robot for control in stopped.robots] == ["a2"]
     finally:
         for server in servers:

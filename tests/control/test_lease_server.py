@@ -132,7 +132,7 @@ def test_command_says_when_there_is_no_such_robot(tmp_path: Path, monkeypatch: p
     def answer(name: str, request: Request, data: Path | None) -> Answer:
         return Answer([Control("a", "", "", 0.0, "", "", "")])
 
-    monkeypatch.setattr("roboglot.cli.control.lease.wish", answer)
+    monkeypatch.setattr("roboglot.cli.control.lease.send", answer)
     command("a", data=tmp_path)
     with pytest.raises(SystemExit, match="there is no robot 'b'; there are a"):
         command("b", data=tmp_path)

@@ -352,11 +352,11 @@ def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
     )
 
 
-def _ask(verb: Verb, data: Path | None, **wish: str) -> Answer:
+def _ask(verb: Verb, data: Path | None, **fields: str) -> Answer:
     """Return the fleet's answer; without one, or after a refusal, end the program with a sentence."""
     from roboglot.shards.requests import SOCKET, Answer, Request
 
-    return running.request("fleet", _folder(data) / SOCKET, Request(verb, **wish), Answer, PATIENCE, "no fleet is up")
+    return running.request("fleet", _folder(data) / SOCKET, Request(verb, **fields), Answer, PATIENCE, "no fleet is up")
 
 
 def _print(answer: Answer, name: str) -> None:

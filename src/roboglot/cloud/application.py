@@ -125,10 +125,10 @@ class BackEnd:
         rows = await self._store.records(account, RECORDS_SHOWN)
         return [_record(robot, json.loads(document)) for robot, document in rows]
 
-    async def _favourite(self, account: str, _robot: str, wish: dict[str, object]) -> None:
+    async def _favourite(self, account: str, _robot: str, request: dict[str, object]) -> None:
         """Set a favourite: ``{"type", "id", "favourite": true or false}``."""
-        kind, id = _text(wish, "type"), _text(wish, "id")
-        favourite = wish.get("favourite", True)
+        kind, id = _text(request, "type"), _text(request, "id")
+        favourite = request.get("favourite", True)
         if kind not in KINDS or not id.isprintable():
             raise Answer(CloudCode.NOT_FOUND, f"there is no such {kind}")
         if not isinstance(favourite, bool):

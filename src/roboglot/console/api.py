@@ -12,8 +12,8 @@ from roboglot.console.camera import Calls, send_film, send_photo, send_sound
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_as, read_json
 from roboglot.console.openapi import document
-from roboglot.console.people.classes import Classes, Wish
-from roboglot.console.recordings import RecordingWish
+from roboglot.console.people.classes import Classes, ClassRequest
+from roboglot.console.recordings import RecordingRequest
 from roboglot.console.resend import resend
 from roboglot.console.state import link_of
 from roboglot.console.studio import blocks, lessons
@@ -95,7 +95,7 @@ class Api:
             case "GET", ["class"]:
                 await answer_json(send, self._classes.look())
             case "POST", ["class"]:
-                await answer_json(send, await self._classes.do(await read_as(receive, Wish)))
+                await answer_json(send, await self._classes.do(await read_as(receive, ClassRequest)))
             case "GET" | "POST", ["recording"]:
                 await answer_json(send, await self._serve_recording(method, receive))
             case _, ["robots", *_]:
@@ -141,11 +141,11 @@ class Api:
             self._desk.view(name, "look at the recording")
         if method == "GET":
             return recordings.look()
-        wish = await read_as(receive, RecordingWish)
+        request = await read_as(receive, RecordingRequest)
         for robot in self._desk.robots.values():
             robot.admission.check(CLIENT, "record", Right.ADMIN)
-        with self._desk.noting(f"record {wish.do}"):
-            return await recordings.do(wish)
+        with self._desk.noting(f"record {request.do}"):
+            return await recordings.do(request)
 
     async def _serve_program(self, method: str, name: str, what: str, receive: Receive, send: Send) -> None:
         if method == "GET" and what == "program":

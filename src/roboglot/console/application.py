@@ -219,7 +219,7 @@ class Application:
         """Serve a page, listed in ``pages`` while its socket is open; ``longest``: bytes of a message."""
         pages.add(page)
         sending = asyncio.get_running_loop().create_task(page.run(), name="console page")
-        listening = asyncio.get_running_loop().create_task(_listen(page, longest, receive), name="console wishes")
+        listening = asyncio.get_running_loop().create_task(_listen(page, longest, receive), name="console requests")
         self._listening[listening] = identity()
         try:
             await listening

@@ -19,9 +19,9 @@ from roboglot.console.settings import (
     MESSAGES_PER_SECOND_MAX,
     NAME_MAX,
     OTHERS_BEATS,
+    REQUESTS_MAX,
     STATE_BEATS,
     WIRE_MAX,
-    WISHES_MAX,
 )
 from roboglot.console.teleop import Pad, Velocity
 from roboglot.console.views import RobotView
@@ -53,7 +53,7 @@ class Watch(msgspec.Struct, tag="watch", tag_field="type", forbid_unknown_fields
     moving: bool = True
 
 
-class Wish(msgspec.Struct, tag="do", tag_field="type", forbid_unknown_fields=True):
+class Request(msgspec.Struct, tag="do", tag_field="type", forbid_unknown_fields=True):
     """A command; ``robot`` empty: to the world. The answer carries ``id``."""
 
     id: int
@@ -68,7 +68,7 @@ class Ping(msgspec.Struct, tag="ping", tag_field="type", forbid_unknown_fields=T
     at: float
 
 
-Message = Hello | Watch | Wish | Ping | Velocity
+Message = Hello | Watch | Request | Ping | Velocity
 
 
 def milliseconds() -> float:
@@ -87,13 +87,13 @@ class Page:
         self._watched: RobotView | None = None
         self._watch = Watch("")
         self._pads: dict[str, Pad] = {}
-        self._replies: asyncio.Queue[dict[str, object]] = asyncio.Queue(WISHES_MAX * 4)
+        self._replies: asyncio.Queue[dict[str, object]] = asyncio.Queue(REQUESTS_MAX * 4)
         self._sent: dict[str, dict[str, object]] = {}
         self._frames: dict[str, bytes] = {}
         self._truth: dict[str, object] = {}
         self._boxes: list[list[object]] = []
         self._wire_at = 0
-        self._wishes: set[asyncio.Task[None]] = set()
+        self._requests: set[asyncio.Task[None]] = set()
         self._allowance, self._counted_at = float(MESSAGES_PER_SECOND_MAX), time.monotonic()
         self._due = asyncio.Event()
         self._refused = ""
@@ -212,8 +212,8 @@ class Page:
                 self._introduce(name)
             case Watch() as watch:
                 self._look_at(watch)
-            case Wish() as wish:
-                self._begin(wish)
+            case Request() as request:
+                self._begin(request)
 
     def _introduce(self, name: str) -> None:
         name = name.strip()
@@ -260,21 +260,21 @@ class Page:
             self._refused = why
             self._reply({"type": "pad", "robot": velocity.robot, "refused": why})
 
-    def _begin(self, wish: Wish) -> None:
-        if len(self._wishes) >= WISHES_MAX:
-            self._reply({"type": "done", "id": wish.id, "error": "too many commands are under way"})
+    def _begin(self, request: Request) -> None:
+        if len(self._requests) >= REQUESTS_MAX:
+            self._reply({"type": "done", "id": request.id, "error": "too many commands are under way"})
             return
-        task = asyncio.get_running_loop().create_task(self._carry_out(wish), name=f"console {wish.verb}")
-        self._wishes.add(task)
-        task.add_done_callback(self._wishes.discard)
+        task = asyncio.get_running_loop().create_task(self._carry_out(request), name=f"console {request.verb}")
+        self._requests.add(task)
+        task.add_done_callback(self._requests.discard)
 
-    async def _carry_out(self, wish: Wish) -> None:
-        answer: dict[str, object] = {"type": "done", "id": wish.id}
+    async def _carry_out(self, request: Request) -> None:
+        answer: dict[str, object] = {"type": "done", "id": request.id}
         try:
-            if wish.robot:
-                answer["result"] = await self._desk.command(wish.robot, wish.verb, wish.values, self._client)
+            if request.robot:
+                answer["result"] = await self._desk.command(request.robot, request.verb, request.values, self._client)
             else:
-                answer["result"] = await self._desk.change_world(wish.verb, wish.values)
+                answer["result"] = await self._desk.change_world(request.verb, request.values)
         except (RobotError, BadParameters, ValueError) as error:
             answer["error"] = str(error) or type(error).__name__
         self._reply(answer)

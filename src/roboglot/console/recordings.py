@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 FOLDER = "recordings"  # in the data folder
 
 
-class RecordingWish(msgspec.Struct, forbid_unknown_fields=True):
+class RecordingRequest(msgspec.Struct, forbid_unknown_fields=True):
     """Request of a person; ``text``: text of a mark."""
 
     do: Literal["start", "stop", "mark"]
@@ -46,17 +46,17 @@ class Recordings:
             "failure": status.failure,
         }
 
-    async def do(self, wish: RecordingWish) -> dict[str, object]:
+    async def do(self, request: RecordingRequest) -> dict[str, object]:
         """Begin, mark or end the recording. Raises Refused."""
         recorder = self._recorder()
-        match wish.do:
+        match request.do:
             case "start":
                 self._folder.mkdir(parents=True, exist_ok=True)
                 recorder.start(f"{self._folder}/")
             case "mark":
-                if not wish.text.strip():
+                if not request.text.strip():
                     raise Refused("a mark needs text")
-                recorder.mark(wish.text.strip())
+                recorder.mark(request.text.strip())
             case "stop":
                 ended = await recorder.stop()
                 return self.look() | {"file": Path(ended.path).name, "bytes": ended.bytes}

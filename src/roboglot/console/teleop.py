@@ -39,19 +39,19 @@ class Pad:
         self._seq = -1
         self.late = 0
 
-    def drive(self, wish: Velocity, now: float) -> bool:
+    def drive(self, request: Velocity, now: float) -> bool:
         """Drive for ``DEAD_MAN`` s; ``now``: the server's time in ms. Return False for an old velocity, ignored.
 
         Raises the errors of driving (Busy, EmergencyStopped, …).
         """
-        if wish.seq <= self._seq or not 0.0 <= now - wish.stamp + 50.0 <= STALE * 1000.0 + 50.0:
+        if request.seq <= self._seq or not 0.0 <= now - request.stamp + 50.0 <= STALE * 1000.0 + 50.0:
             self.late += 1
             return False
-        self._seq = wish.seq
-        if not (wish.x or wish.y or wish.yaw):
+        self._seq = request.seq
+        if not (request.x or request.y or request.yaw):
             self.let_go("the pad was let go")
             return True
-        self.move(wish.x, wish.y, wish.yaw)
+        self.move(request.x, request.y, request.yaw)
         return True
 
     def move(self, x: float, y: float, yaw: float) -> None:

@@ -80,8 +80,8 @@ class LeaseServer(LocalServer):
 
     async def _grant(self, request: Request) -> None:
         if request.all:
-            wishes = (self.do(request, robot) for robot in self._robots.values())
-            ends = await asyncio.gather(*wishes, return_exceptions=True)  # a refusal does not delay the others
+            pending = (self.do(request, robot) for robot in self._robots.values())
+            ends = await asyncio.gather(*pending, return_exceptions=True)  # a refusal does not delay the others
             if refused := [f"robot {name}: {end}" for name, end in zip(self._robots, ends, strict=True) if end]:
                 raise LookupError("; ".join(refused))
             return

@@ -16,15 +16,15 @@ from roboglot.model.robot import Robot
 FAR = 1e6  # m, m/s: larger values are mistakes
 
 
-def drive(robot: Robot, wish: Twist, dead_man: float, source: str) -> None:
+def drive(robot: Robot, request: Twist, dead_man: float, source: str) -> None:
     """Drive at this velocity until the next command, for ``dead_man`` s of real time at most. Raises RobotError."""
-    if not all(abs(value) < FAR for value in (wish.x, wish.y, wish.yaw)):
+    if not all(abs(value) < FAR for value in (request.x, request.y, request.yaw)):
         raise InvalidGoal("a velocity is not finite")
     limits = robot[Base].limits
     if not limits.holonomic:
-        wish = Twist(wish.x, 0.0, wish.yaw)
+        request = Twist(request.x, 0.0, request.yaw)
     pace = robot.clock.speed if isinstance(robot.clock, RealClock) else 1.0
-    robot[Driving].drive(wish.clamped(limits.twist), lifetime=dead_man * pace, source=source)
+    robot[Driving].drive(request.clamped(limits.twist), lifetime=dead_man * pace, source=source)
 
 
 def go(robot: Robot, frame: str, pose: Pose, source: str) -> Action:

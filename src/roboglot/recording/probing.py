@@ -68,8 +68,8 @@ def _payload(door: str, operation: str, number: int) -> bytes:
         case "robomaster":
             return f"{operation};".encode()
         case "visual":
-            kind, wish = operation.split()
-            mode = "" if wish == "inquiry" else wish
+            kind, request = operation.split()
+            mode = "" if request == "inquiry" else request
             frame = f'{{"type": "{kind}", "id": "probe{number}", "target_id": [], "describe": "", "style": "", '
             return (frame + f'"operate": "inquiry", "mode": "{mode}", "condition": "", "body": ""}}').encode()
         case _:

@@ -27,11 +27,11 @@ from roboglot.console.studio.class_link import (
     Left,
     News,
     Opened,
+    PageRequest,
     Shows,
     Stop,
     Stopped,
     ToRoom,
-    Wished,
     line,
 )
 from roboglot.console.studio.classroom import Classroom, Seat, World
@@ -136,9 +136,9 @@ class _Link:
             case _:
                 self._hear_page(message)
 
-    def _hear_page(self, message: Wished | At | Drawn | Left) -> None:
+    def _hear_page(self, message: PageRequest | At | Drawn | Left) -> None:
         match message:
-            case Wished():
+            case PageRequest():
                 self._take(self._seat(message.seat), message)
             case At(seat=number, robot=robot):
                 self._seat(number).at(robot)
@@ -165,18 +165,18 @@ class _Link:
             self._seats[number] = self._room.seat(lambda news: self._send(number, news), self._world)
         return self._seats[number]
 
-    def _take(self, seat: Seat, wished: Wished) -> None:
+    def _take(self, seat: Seat, requested: PageRequest) -> None:
         if len(self._pending) >= PENDING_MAX:
-            seat.post({"type": "refused", "id": wished.wish.id, "why": "too much is being answered"})
+            seat.post({"type": "refused", "id": requested.request.id, "why": "too much is being answered"})
             return
 
         async def take() -> None:
             try:
-                await seat.take(wished.wish, may_teach=wished.may_teach)
+                await seat.take(requested.request, may_teach=requested.may_teach)
             except (RobotError, ValueError) as error:
-                seat.post({"type": "refused", "id": wished.wish.id, "why": str(error)})
+                seat.post({"type": "refused", "id": requested.request.id, "why": str(error)})
 
-        self._begin(take(), f"class {wished.wish.do}")
+        self._begin(take(), f"class {requested.request.do}")
 
     def _begin(self, what: Coroutine[None, None, None], name: str) -> None:
         task = asyncio.get_running_loop().create_task(what, name=name)

@@ -68,7 +68,7 @@ class Refusal(msgspec.Struct, tag=True, frozen=True):
     lasting: bool
 
 
-Wish = Fork | End
+NurseryRequest = Fork | End
 Birth = Warm | Born | Dead
 News = Ready | Beat | Refusal
 
@@ -81,7 +81,7 @@ def pair() -> tuple[socket.socket, socket.socket]:
     return ours, theirs
 
 
-def encode(message: Wish | Birth | News) -> bytes:
+def encode(message: NurseryRequest | Birth | News) -> bytes:
     """Return the packet of a message. Raises ValueError if it is too long."""
     packet = msgspec.json.encode(message)
     if len(packet) > MESSAGE_MAX:

@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, Warm, Wish, encode
+from roboglot.shards.messages import MESSAGE_MAX, Birth, Born, Dead, End, Fork, NurseryRequest, Warm, encode
 from roboglot.shards.warm_up import ENVIRONMENT, EXIT_BROKEN, ended, fork, wake_at_ends, warm
 
 LAST_SECONDS = 12.0  # s for shards to close when the nursery ends
@@ -63,7 +63,7 @@ class Nursery:
         packet, descriptors, _, _ = socket.recv_fds(self._control, MESSAGE_MAX, 2)
         if not packet:
             return False
-        match msgspec.json.decode(packet, type=Wish):
+        match msgspec.json.decode(packet, type=NurseryRequest):
             case Fork(number=number, folder=folder):
                 link, output = descriptors
                 self._fork(number, folder, link, output)

@@ -157,11 +157,11 @@ class Gateway:
         peer = link.transport.get_extra_info("peername") or ("", 0)
         async with asyncio.timeout(HELLO_SECONDS_MAX):
             frame = await link.first()
-        wish = _hello(frame.payload) if frame.kind is FrameKind.HELLO else Hello()
-        if wish.beats:
-            await self._beat(wish.beats, link)
+        request = _hello(frame.payload) if frame.kind is FrameKind.HELLO else Hello()
+        if request.beats:
+            await self._beat(request.beats, link)
             return
-        name, token = wish.robot, wish.token
+        name, token = request.robot, request.token
         who = await self._guard.admit(f"{peer[0]}:{peer[1]}", Proof(ProofKind.HTTP, f"Bearer {token}"))
         found = self._robots.get(name)
         if found is None or not self._guard.may(who, name, Right.SEE):

@@ -46,7 +46,7 @@ def command(
     if robot and all_:
         raise typer.BadParameter("name a robot, or give --all")
     verb: Verb = "take" if take else "give" if given else "release" if release else "look"
-    answer = wish("lease", Request(verb, robot, give or "", all_), data)
+    answer = send("lease", Request(verb, robot, give or "", all_), data)
     shown = [control for control in answer.robots if robot in ("", control.robot)]
     if not shown:
         sys.exit(f"roboglot lease: there is no robot {robot!r}{instead(robot, _names(answer))}")
@@ -54,7 +54,7 @@ def command(
         print(in_words(control))
 
 
-def wish(command: str, request: Request, data: Path | None) -> Answer:
+def send(command: str, request: Request, data: Path | None) -> Answer:
     """Return the answer of the running `roboglot up`, or of all worlds if the folder is a fleet's.
 
     Without an answer, end the program with a sentence.

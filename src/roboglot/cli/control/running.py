@@ -24,7 +24,7 @@ A = TypeVar("A", bound=HasError)
 def request(
     command: str,
     path: Path,
-    wish: msgspec.Struct,
+    request: msgspec.Struct,
     kind: type[A],
     patience: float,
     absent: str = "no `roboglot up` answers",
@@ -34,7 +34,7 @@ def request(
     Without one, or if it is a refusal, end the program with a sentence that names ``command``.
     """
     try:
-        answer = asyncio.run(exchange(path, wish, kind, patience))
+        answer = asyncio.run(exchange(path, request, kind, patience))
     except (FileNotFoundError, ConnectionRefusedError):
         sys.exit(f"roboglot {command}: {absent} in {path.parent}")
     except OSError as error:
@@ -46,6 +46,6 @@ def request(
     return answer
 
 
-async def exchange(path: Path, wish: msgspec.Struct, kind: type[A], patience: float) -> A:
+async def exchange(path: Path, request: msgspec.Struct, kind: type[A], patience: float) -> A:
     """Return the answer. Raises OSError (TimeoutError after ``patience`` s), DecodeError if it is of another kind."""
-    return msgspec.json.decode(await ask(path, msgspec.json.encode(wish), patience), type=kind)
+    return msgspec.json.decode(await ask(path, msgspec.json.encode(request), patience), type=kind)

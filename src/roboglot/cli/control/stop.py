@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from roboglot.cli.control.lease import Data, wish
+from roboglot.cli.control.lease import Data, send
 from roboglot.control.lease_server import Request
 
 
@@ -18,6 +18,6 @@ def command(
     """Stop a robot, or all. Their clients may move them again: `roboglot lease --all --take` keeps them standing."""
     if bool(robot) == all_:
         raise typer.BadParameter("name a robot, or give --all")
-    answer = wish("stop", Request("stop", robot, all=all_), data)
+    answer = send("stop", Request("stop", robot, all=all_), data)
     count = len(answer.robots)
     print(f"{count} robots stand" if all_ and count > 1 else f"{robot or answer.robots[0].robot} stands")

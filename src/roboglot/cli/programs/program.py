@@ -47,7 +47,7 @@ class What(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class Request:
     """Operation on a task (or module); ``saving``: its fields when saved."""
 
     what: What
@@ -107,7 +107,7 @@ def command(
     place = own_robot(body, world, speed) if own else contextlib.nullcontext(robot.removesuffix(FRAMES))
     try:
         asyncio.run(
-            _at(place, Wish(what, task, saving, modules or bool(interface), as_json), _stops(breaks, step=step))
+            _at(place, Request(what, task, saving, modules or bool(interface), as_json), _stops(breaks, step=step))
         )
     except (ClientError, Failure, ValueError, OSError) as error:
         sys.exit(f"roboglot program: {visible(in_words(error))}" if str(error) else 1)
@@ -148,32 +148,32 @@ async def _check(file: Path, source: str, *, as_json: bool) -> int:
     return 1 if problems else 0
 
 
-async def _at(place: contextlib.AbstractAsyncContextManager[str], wish: Wish, stops: Stops | None) -> None:
+async def _at(place: contextlib.AbstractAsyncContextManager[str], request: Request, stops: Stops | None) -> None:
     async with place as address, _link(address, FRAMES) as frames, _link(address, LOG) as log:
-        task, kind = wish.task, "module" if wish.module else "task"
-        match wish.what:
+        task, kind = request.task, "module" if request.module else "task"
+        match request.what:
             case What.LIST:
-                await _list(address, frames, kind, as_json=wish.as_json)
+                await _list(address, frames, kind, as_json=request.as_json)
             case What.LOG:
                 await log.send(task)
-                if not await _print_log(log, task, as_json=wish.as_json) and not await _known(frames, task):
+                if not await _print_log(log, task, as_json=request.as_json) and not await _known(frames, task):
                     raise Failure(f"there is no task {task}")
             case What.SUSPEND | What.RECOVER | What.SHUTDOWN | What.DELETE:
-                await _ask(frames, wish.what, task, type=kind)
-                print(f"{task}: {wish.what} accepted")
+                await _ask(frames, request.what, task, type=kind)
+                print(f"{task}: {request.what} accepted")
             case What.SAVE:
-                await _ask(frames, "save", task, type=kind, **wish.saving)
+                await _ask(frames, "save", task, type=kind, **request.saving)
                 print(f"{task} is saved")
             case What.RUN:
-                await _ask(frames, "save", task, **wish.saving)
+                await _ask(frames, "save", task, **request.saving)
                 if stops is None:
-                    await _run(frames, log, task, wish.saving["condition"])
+                    await _run(frames, log, task, request.saving["condition"])
                     return
                 async with _link(address, DEBUG) as debug:
-                    stepper = Stepper(debug, task, wish.saving["body"], *stops)
+                    stepper = Stepper(debug, task, request.saving["body"], *stops)
                     if wrong := await stepper.prepare():
                         raise Failure(wrong)
-                    await _run(frames, log, task, wish.saving["condition"], stepper)
+                    await _run(frames, log, task, request.saving["condition"], stepper)
 
 
 @contextlib.asynccontextmanager

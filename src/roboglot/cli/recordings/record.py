@@ -187,9 +187,9 @@ def repair(
     print(f"{count} messages are in {to}")
 
 
-def _ask(data: Path | None, wish: Request) -> Answer:
+def _ask(data: Path | None, request: Request) -> Answer:
     folder = data or default_data_folder(os.environ)
-    return running.request("record", folder / NAME, wish, Answer, PATIENCE)
+    return running.request("record", folder / NAME, request, Answer, PATIENCE)
 
 
 def _show(answer: Answer) -> None:

@@ -83,12 +83,12 @@ def _is_locked(path: str) -> bool:
 def _connected(path: str, kind: str, words: list[str]) -> socket.socket | None:
     """Start the command and return its connection; None without a parent of these sources. Raises OSError."""
     descriptors = _inherited()  # first: a socket would get the number of one that is closed
-    wish = ascii(_wish(kind, words, descriptors)).encode()  # a parent that is connected waits for it
+    request = ascii(_request(kind, words, descriptors)).encode()  # a parent that is connected waits for it
     parent = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         parent.connect(path)
-        socket.send_fds(parent, [len(wish).to_bytes(LENGTH)], descriptors)
-        parent.sendall(wish)
+        socket.send_fds(parent, [len(request).to_bytes(LENGTH)], descriptors)
+        parent.sendall(request)
         if parent.recv(1) == b"+":
             return parent
     except OSError:  # none listens, or it ends just now
@@ -111,7 +111,7 @@ def _inherited() -> list[int]:
     return found
 
 
-def _wish(kind: str, words: list[str], descriptors: list[int]) -> dict[str, object]:
+def _request(kind: str, words: list[str], descriptors: list[int]) -> dict[str, object]:
     """Return all that the command would have inherited from this process. Raises OSError."""
     what = {"stamp": installation.stamp(), "kind": kind, "words": words, "descriptors": descriptors}
     return what | surroundings()

@@ -137,7 +137,7 @@ class WarmParent:
         descriptors += given
         length, text = int.from_bytes(head), b""
         if len(head) != LENGTH or length > MESSAGE_MAX:
-            raise ValueError("this is no wish")
+            raise ValueError("this is not a request")
         while len(text) < length:
             if not (more := caller.recv(min(1 << 16, length - len(text)))):
                 raise ValueError("the caller has gone")

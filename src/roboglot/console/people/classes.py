@@ -33,7 +33,7 @@ NAME_MAX = 30  # characters of a pupil's name
 Name = Annotated[str, msgspec.Meta(max_length=class_requests.NAME_MAX)]
 
 
-class Wish(msgspec.Struct, forbid_unknown_fields=True):
+class ClassRequest(msgspec.Struct, forbid_unknown_fields=True):
     """Request of a teacher; ``pupil`` empty: for all."""
 
     do: Literal["open", "lock", "unlock", "reset", "give_back", "close"]
@@ -209,41 +209,41 @@ class Classes:
         minutes = max(0, round((lesson.until - self._now()) / 60.0))
         return {"code": lesson.code, "name": lesson.name, "minutes": minutes, "pupils": pupils}
 
-    async def do(self, wish: Wish) -> dict[str, object]:
+    async def do(self, request: ClassRequest) -> dict[str, object]:
         """Carry out a teacher's request, and return the class. Raises Forbidden, NotFound, Refused."""
-        with self._desk.noting(f"class {wish.do}"):
-            return await self._do(wish)
+        with self._desk.noting(f"class {request.do}"):
+            return await self._do(request)
 
-    async def _do(self, wish: Wish) -> dict[str, object]:
+    async def _do(self, request: ClassRequest) -> dict[str, object]:
         self._check_teacher()
-        if wish.do == "open":
-            await self._open(wish)
+        if request.do == "open":
+            await self._open(request)
             return self.look()
         lesson = self._lesson
         if lesson is None:
             raise NotFound("no class is open")
-        if wish.pupil and wish.pupil not in lesson.seats:
-            raise NotFound(f"there is no pupil {wish.pupil!r}")
-        seats = [lesson.seats[wish.pupil]] if wish.pupil else list(lesson.seats.values())
+        if request.pupil and request.pupil not in lesson.seats:
+            raise NotFound(f"there is no pupil {request.pupil!r}")
+        seats = [lesson.seats[request.pupil]] if request.pupil else list(lesson.seats.values())
         for robot in dict.fromkeys(seat.robot for seat in seats):
-            await self._do_with(wish.do, robot)
-        if wish.do in ("give_back", "close"):
+            await self._do_with(request.do, robot)
+        if request.do in ("give_back", "close"):
             for seat in seats:
                 await self._give_back(lesson, seat)
-        if wish.do == "close":
+        if request.do == "close":
             self._lesson = None
             await self._save(lesson)
             with contextlib.suppress(Refused):
                 await self._room.close(lesson.code)
         return self.look()
 
-    async def _open(self, wish: Wish) -> None:
+    async def _open(self, request: ClassRequest) -> None:
         if self._lesson is not None:
             raise Refused(f"class {self._lesson.code} is open")
         code = "".join(secrets.choice(classroom.CODE_LETTERS) for _ in range(classroom.CODE_LENGTH))
-        self._lesson = Lesson(code, wish.name.strip(), self._now() + wish.minutes * 60.0)
+        self._lesson = Lesson(code, request.name.strip(), self._now() + request.minutes * 60.0)
         await self._save(self._lesson)
-        await self._room.open(code, wish.name.strip())  # the studio's page uses the same code to join
+        await self._room.open(code, request.name.strip())  # the studio's page uses the same code to join
 
     async def _do_with(self, do: str, name: str) -> None:
         robot, locked = self._desk.robots[name], self._desk.locked

@@ -26,7 +26,7 @@ from roboglot.console.studio.class_requests import Member
 from roboglot.console.studio.classroom import Room
 from roboglot.console.studio.mistakes import explain
 from roboglot.console.studio.programs import Programs
-from roboglot.console.studio.trial import Trial, TrialEnd, TrialWish
+from roboglot.console.studio.trial import Trial, TrialEnd, TrialRequest
 from roboglot.model.client_context import connection, identity
 from roboglot.model.errors import NotFound, Refused, RobotError
 from roboglot.operations import Right
@@ -110,7 +110,7 @@ def _framed(text: str) -> str:
     return msgspec.json.encode({"type": "frame", "text": text}).decode()
 
 
-Message = Open | FrameMessage | Debug | Check | Fetch | TrialWish | TrialEnd | Member
+Message = Open | FrameMessage | Debug | Check | Fetch | TrialRequest | TrialEnd | Member
 _decode = msgspec.json.Decoder(Message).decode
 
 
@@ -214,10 +214,10 @@ class Session:
         self._pending.add(task)
         task.add_done_callback(self._pending.discard)
 
-    def _open(self, wish: Open) -> None:
-        name = wish.robot
+    def _open(self, request: Open) -> None:
+        name = request.robot
         self._leave()
-        self._shown = wish.program
+        self._shown = request.program
         try:
             self._desk.view(name, "program")
             programs = self._desk.studio.programs.get(name)
@@ -261,20 +261,20 @@ class Session:
                 self.post({"type": "checked", "id": id, "problems": [_plain(problem) for problem in problems]})
             case Fetch():
                 await self._fetch(programs, message)
-            case TrialWish():
+            case TrialRequest():
                 await self._trial.take(message, self._desk.studio, programs)
             case TrialEnd():
                 self._trial.close()
 
-    async def _take_class(self, wish: Member) -> None:
-        if wish.do == "join" and (who := identity()) in self._desk.pupils:  # a code signs in as one pupil
+    async def _take_class(self, request: Member) -> None:
+        if request.do == "join" and (who := identity()) in self._desk.pupils:  # a code signs in as one pupil
             name, _, code = who.rpartition("@")
-            wish = msgspec.structs.replace(wish, name=name, code=code)
-        elif wish.code and wish.do in ("join", "open"):
+            request = msgspec.structs.replace(request, name=name, code=code)
+        elif request.code and request.do in ("join", "open"):
             self._show_code()
-        await self._seat.take(wish, may_teach=self._desk.may_teach)
+        await self._seat.take(request, may_teach=self._desk.may_teach)
         now = time.monotonic()
-        if wish.do == "doing" and self._programs is not None and now - self._drawn >= DRAW_EVERY:
+        if request.do == "doing" and self._programs is not None and now - self._drawn >= DRAW_EVERY:
             self._drawn = now
             if picture := await draw_map(self._programs.robot):
                 self._seat.draw(picture)
@@ -286,21 +286,21 @@ class Session:
             raise Refused("too many wrong codes from your address: wait a minute")
         self._showed = host
 
-    async def _fetch(self, programs: Programs, wish: Fetch) -> None:
+    async def _fetch(self, programs: Programs, request: Fetch) -> None:
         service = programs.service
         found = None
-        if wish.text:
-            found = await (service.library.get(wish.program) if wish.module else service.get(wish.program))
-        entries = await service.log(wish.program) if wish.log and not wish.module else []
-        where = await service.whereabouts(wish.program)
+        if request.text:
+            found = await (service.library.get(request.program) if request.module else service.get(request.program))
+        entries = await service.log(request.program) if request.log and not request.module else []
+        where = await service.whereabouts(request.program)
         self.post(
             {
                 "type": "fetched",
-                "id": wish.id,
+                "id": request.id,
                 "program": found,
-                "log": [_entry(wish.program, entry) for entry in entries],
+                "log": [_entry(request.program, entry) for entry in entries],
                 "where": where,
-                "began": service.began.get(wish.program),  # its newest run; null: before the server did
+                "began": service.began.get(request.program),  # its newest run; null: before the server did
             }
         )
 

@@ -30,11 +30,11 @@ class Hello(msgspec.Struct, tag=True, frozen=True):
     page: str
 
 
-class Wished(msgspec.Struct, tag=True, frozen=True):
+class PageRequest(msgspec.Struct, tag=True, frozen=True):
     """Message to the classroom: a page's request."""
 
     seat: int
-    wish: Member
+    request: Member
     may_teach: bool
 
 
@@ -116,7 +116,7 @@ class Stop(msgspec.Struct, tag=True, frozen=True):
     robot: str
 
 
-ToRoom = Hello | Wished | At | Drawn | Left | Opened | Closed | Stopped | Shows
+ToRoom = Hello | PageRequest | At | Drawn | Left | Opened | Closed | Stopped | Shows
 FromRoom = News | Stop | Admitted | Ended
 _decode = msgspec.json.Decoder(FromRoom).decode
 
@@ -230,14 +230,14 @@ class LinkedRoom:
             case Ended(code=code):
                 self._ended(code)
 
-    async def _do_stop(self, wish: Stop) -> None:
+    async def _do_stop(self, request: Stop) -> None:
         why = ""
         try:
-            await self._stop(wish.robot)
+            await self._stop(request.robot)
         except (RobotError, OSError) as error:
-            why = f"{wish.robot}: {error}"
+            why = f"{request.robot}: {error}"
         if self._writer is not None:
-            self._writer.write(line(Stopped(wish.id, why)))
+            self._writer.write(line(Stopped(request.id, why)))
 
 
 class LinkedSeat:
@@ -247,10 +247,10 @@ class LinkedSeat:
         self._room, self.number, self.post = room, number, post
         self._robot = ""
 
-    async def take(self, wish: Member, *, may_teach: bool) -> None:
+    async def take(self, request: Member, *, may_teach: bool) -> None:
         """Pass a request on; ``post`` gets the result. Raises Refused if the classroom is out of reach."""
         self._room.send(At(self.number, self._robot), self)
-        self._room.send(Wished(self.number, wish, may_teach), self)
+        self._room.send(PageRequest(self.number, request, may_teach), self)
 
     def at(self, robot: str) -> None:
         """Set the page's robot, reported with its next request."""

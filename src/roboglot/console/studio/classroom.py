@@ -111,7 +111,7 @@ class Class:
 class Seated(Protocol):
     """One page's place in a classroom."""
 
-    async def take(self, wish: Member, *, may_teach: bool) -> None:
+    async def take(self, request: Member, *, may_teach: bool) -> None:
         """Execute a page's request. Raises NotFound and Refused, or posts them."""
 
     def at(self, robot: str) -> None:
@@ -268,33 +268,33 @@ class Seat:
             self._pupil.robot = robot
             self._class.notify_teachers()
 
-    async def take(self, wish: Member, *, may_teach: bool) -> None:
+    async def take(self, request: Member, *, may_teach: bool) -> None:
         """Execute a page's request. Raises NotFound, Refused."""
-        match wish.do:
+        match request.do:
             case "open":
-                await self._open(wish, may_teach)
+                await self._open(request, may_teach)
             case "join":
-                await self._join(wish)
+                await self._join(request)
             case "leave":
                 self.leave()
             case "doing" | "hand_in":
-                await self._note(wish)
+                await self._note(request)
             case "close":
                 await self._room.end(self._taught().code)
             case "stop_all":
                 await self._room.stop_all(self._taught())
             case "look":
-                shown = self._taught().pupils.get(wish.name)
+                shown = self._taught().pupils.get(request.name)
                 if shown is None:
-                    raise NotFound(f"there is no pupil {wish.name!r}")
+                    raise NotFound(f"there is no pupil {request.name!r}")
                 style = shown.bag.handed or shown.bag.style
-                self.post({"type": "looked", "id": wish.id, "name": shown.name, "style": style})
+                self.post({"type": "looked", "id": request.id, "name": shown.name, "style": style})
 
-    async def _open(self, wish: Member, may_teach: bool) -> None:
+    async def _open(self, request: Member, may_teach: bool) -> None:
         """Open a class, or with its code come back to it as its teacher."""
         if not may_teach:
             raise Refused("opening a class needs the right admin on the robots")
-        opened = self._room.find(wish.code) if wish.code else await self._room.begin(wish.name.strip())
+        opened = self._room.find(request.code) if request.code else await self._room.begin(request.name.strip())
         self.leave()
         self._class = opened
         opened.until = self._room.now() + OPEN_SECONDS
@@ -302,22 +302,22 @@ class Seat:
         opened.notify_teachers()
         await self._room.save(opened)
 
-    async def _join(self, wish: Member) -> None:
-        name, joined = wish.name.strip(), self._room.find(wish.code)
+    async def _join(self, request: Member) -> None:
+        name, joined = request.name.strip(), self._room.find(request.code)
         if not name or not name.isprintable():
             raise Refused("give a name")
         self.leave()
         pupil = joined.enrol(name)
         if pupil.seat is not None:
             raise Refused(f"{name} is in the class already")
-        pupil.bag.style = wish.style or pupil.bag.style
+        pupil.bag.style = request.style or pupil.bag.style
         before = pupil.bag.world
         elsewhere = self._room.place(joined, pupil, self._world)
         if elsewhere is not None:
             self.post({"type": "elsewhere", "code": joined.code, "name": name, "page": elsewhere.page})
             joined.notify_teachers()
         else:
-            self._sit(joined, pupil, pupil.bag.style if wish.carry else "")
+            self._sit(joined, pupil, pupil.bag.style if request.carry else "")
         if pupil.bag.world != before:
             await self._room.keep(joined.code, pupil)
 
@@ -329,14 +329,14 @@ class Seat:
         self.post({"type": "joined", "number": number, **words})
         self.at(self._robot)
 
-    async def _note(self, wish: Member) -> None:
+    async def _note(self, request: Member) -> None:
         joined, pupil = self._class, self._pupil
         if joined is None or pupil is None:
             return
-        pupil.doing, bag = wish.doing, pupil.bag
-        bag.style, bag.program, bag.all_stars = wish.style or bag.style, wish.doing.program, wish.doing.stars
-        if wish.do == "hand_in":
-            bag.handed, bag.stars = bag.style, wish.doing.stars
+        pupil.doing, bag = request.doing, pupil.bag
+        bag.style, bag.program, bag.all_stars = request.style or bag.style, request.doing.program, request.doing.stars
+        if request.do == "hand_in":
+            bag.handed, bag.stars = bag.style, request.doing.stars
             await self._room.keep(joined.code, pupil)
             self.post({"type": "handed"})
         joined.notify_teachers()

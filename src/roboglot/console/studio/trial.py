@@ -30,7 +30,7 @@ NAME_MAX = 100
 Tell = Callable[[dict[str, object]], None]
 
 
-class TrialWish(msgspec.Struct, tag="try", tag_field="type", forbid_unknown_fields=True):
+class TrialRequest(msgspec.Struct, tag="try", tag_field="type", forbid_unknown_fields=True):
     """Request to try ``body`` in the world of ``lesson``; empty: in a copy of the robot's own world."""
 
     id: int
@@ -51,35 +51,35 @@ class Trial:
         self._playing: asyncio.Task[Played] | None = None
         self._origin = Pose()  # of the world, in the frame that the page's map has
 
-    async def take(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
+    async def take(self, request: TrialRequest, studio: Studio, programs: Programs) -> None:
         """Try a program and report the result. Raises NotFound, Busy, ValueError, ProgramError."""
         if self._busy:
             raise Busy("a program is being tried already")
         self._busy, self._ended = True, False
         try:
-            await self._try(wish, studio, programs)
+            await self._try(request, studio, programs)
         finally:
             self._busy = False
 
-    async def _try(self, wish: TrialWish, studio: Studio, programs: Programs) -> None:
-        lesson = studio.lessons().get(wish.lesson) if wish.lesson else None
-        if wish.lesson and lesson is None:
-            raise NotFound(f"there is no mission {wish.lesson!r}")
-        if problems := await programs.service.check(wish.body):
-            self._answer(wish, lesson, problems=problems)
+    async def _try(self, request: TrialRequest, studio: Studio, programs: Programs) -> None:
+        lesson = studio.lessons().get(request.lesson) if request.lesson else None
+        if request.lesson and lesson is None:
+            raise NotFound(f"there is no mission {request.lesson!r}")
+        if problems := await programs.service.check(request.body):
+            self._answer(request, lesson, problems=problems)
             return
         scene = _scene(studio, programs, lesson)
         self._origin = map_origin(programs.robot, scene) if lesson is None else Pose()
-        played = await self._play(wish, scene, studio, programs)
-        self._answer(wish, lesson, played)
+        played = await self._play(request, scene, studio, programs)
+        self._answer(request, lesson, played)
 
-    async def _play(self, wish: TrialWish, scene: Scene, studio: Studio, programs: Programs) -> Played:
+    async def _play(self, request: TrialRequest, scene: Scene, studio: Studio, programs: Programs) -> Played:
         if studio.rehearse is None:
             raise NotFound("there is no simulation here to try it in")
-        modules = await _modules(programs, wish.body)
+        modules = await _modules(programs, request.body)
         if self._ended:
             raise Busy("it was cancelled")
-        play = studio.rehearse.play(wish.body, scene, modules=modules, speed=SPEED, notice=self._notice)
+        play = studio.rehearse.play(request.body, scene, modules=modules, speed=SPEED, notice=self._notice)
         self._playing = asyncio.ensure_future(play)
         try:
             return await self._playing
@@ -99,19 +99,19 @@ class Trial:
 
     def _answer(
         self,
-        wish: TrialWish,
+        request: TrialRequest,
         lesson: Lesson | None,
         played: Played | None = None,
         problems: list[Problem] | None = None,
     ) -> None:
-        answer: dict[str, object] = {"type": "tried", "id": wish.id, "lesson": wish.lesson}
+        answer: dict[str, object] = {"type": "tried", "id": request.id, "lesson": request.lesson}
         if played is not None:
             answer |= {"printed": played.printed, "error": played.error, "line": played.line, "seconds": played.seconds}
             answer |= {"why": explain(played.error)} if played.error else {}
             answer |= {"late": played.late, "touched": _touched(played)}
             answer |= {"refused": [dataclasses.asdict(one) for one in played.refused]}
         if lesson is not None:
-            found = no_program(problems or []) if played is None else grade(lesson, wish.body, played)
+            found = no_program(problems or []) if played is None else grade(lesson, request.body, played)
             answer |= {"grade": msgspec.to_builtins(found)}
         elif problems:
             first = problems[0]

@@ -23,7 +23,7 @@ Name = Annotated[str, msgspec.Meta(max_length=NAME_MAX)]
 Line = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 
 
-class Wish(msgspec.Struct, forbid_unknown_fields=True):
+class Request(msgspec.Struct, forbid_unknown_fields=True):
     """Breakpoints at ``lines`` of the task's own text and of ``modules`` (by name) and at the beginning of ``blocks``.
 
     ``first``: halt before the next statement. ``first_block``: halt at the next begin of a block. ``watched``: allow
@@ -40,39 +40,45 @@ class Wish(msgspec.Struct, forbid_unknown_fields=True):
     watched: bool = False
 
 
-_decode = msgspec.json.Decoder(Wish).decode
+_decode = msgspec.json.Decoder(Request).decode
 
 
 async def answer(service: ProgramService, text: str) -> str:
     """Execute a command; return the task's position afterwards, with the reason of a failure in ``error``."""
     try:
-        wish = _decode(text.encode("utf-8", "replace"))
+        request = _decode(text.encode("utf-8", "replace"))
     except (msgspec.MsgspecError, RecursionError) as error:
         return json.dumps(
-            {"target_id": "", "operate": "", "error": why_invalid(error, wanted=Wish)[:200]}, ensure_ascii=False
+            {"target_id": "", "operate": "", "error": why_invalid(error, wanted=Request)[:200]}, ensure_ascii=False
         )
     why = ""
     try:
-        await _do(service, wish)
+        await _do(service, request)
     except ProgramError as error:
         why = str(error)
-    where = dataclasses.asdict(await service.whereabouts(wish.target_id))
+    where = dataclasses.asdict(await service.whereabouts(request.target_id))
     del where["began"], where["variables"]  # only for the studio
-    return json.dumps({"target_id": wish.target_id, "operate": wish.operate, "error": why} | where, ensure_ascii=False)
+    return json.dumps(
+        {"target_id": request.target_id, "operate": request.operate, "error": why} | where, ensure_ascii=False
+    )
 
 
-async def _do(service: ProgramService, wish: Wish) -> None:
-    match wish.operate:
+async def _do(service: ProgramService, request: Request) -> None:
+    match request.operate:
         case "break":
-            units = {"": wish.lines} | wish.modules
+            units = {"": request.lines} | request.modules
             lines = {(unit, line) for unit, inside in units.items() for line in inside}
             if len(lines) > STOPS_MAX:
                 raise NotAllowed(f"more than {STOPS_MAX} lines")
             stops = Stops(
-                frozenset(lines), frozenset(wish.blocks), wish.first, first_block=wish.first_block, watched=wish.watched
+                frozenset(lines),
+                frozenset(request.blocks),
+                request.first,
+                first_block=request.first_block,
+                watched=request.watched,
             )
-            await service.stop_at(wish.target_id, stops)
+            await service.stop_at(request.target_id, stops)
         case "go":
-            await service.recover(wish.target_id)
+            await service.recover(request.target_id)
         case verb if (step := STEPS.get(verb.removesuffix("_block"))) is not None:
-            await service.step(wish.target_id, step, to_block=verb.endswith("_block"))
+            await service.step(request.target_id, step, to_block=verb.endswith("_block"))

@@ -36,7 +36,7 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class PlaybackCommand:
     """Request of a client for playback: ``play`` or pause, speed, position to ``seek`` (ns), and its id."""
 
     play: bool
@@ -86,5 +86,5 @@ class Source(Protocol):
     def look_at_camera(self) -> None:
         """Film only while a client has subscribed to the camera."""
 
-    def control(self, listener: Listener, wish: Wish) -> None:
+    def control(self, listener: Listener, command: PlaybackCommand) -> None:
         """Play, pause or seek for a client. Raises NotFound if live, InvalidGoal."""

@@ -18,7 +18,7 @@ from roboglot.model.client_context import set_client
 from roboglot.model.errors import NotReady
 from roboglot.model.robot import Robot
 from roboglot.model.stand_in import Recorded
-from roboglot.protocols.foxglove.channels import Channel, Listener, Wish
+from roboglot.protocols.foxglove.channels import Channel, Listener, PlaybackCommand
 from roboglot.recording.reader import BadRecording
 from roboglot.recording.readings import BY_SCHEMA
 from roboglot.recording.reel import Reel, Shot
@@ -99,21 +99,23 @@ class Player:
 
     # -- their requests --
 
-    def control(self, listener: Listener, wish: Wish) -> None:
+    def control(self, listener: Listener, command: PlaybackCommand) -> None:
         """Play, pause or seek. Raises NotReady if the file has become unreadable."""
         if self._broken:
             raise NotReady(f"the recording cannot be read: {self._broken}")
         self._at = self._now()
-        sought = wish.seek is not None or (wish.play and self._status is PlayStatus.ENDED)
+        sought = command.seek is not None or (command.play and self._status is PlayStatus.ENDED)
         if sought:
-            seek = self._recorded.first if wish.seek is None else wish.seek
+            seek = self._recorded.first if command.seek is None else command.seek
             self._at = self._next = min(max(seek, self._recorded.first), self._recorded.last)
-        self._speed, self._since = wish.speed, self._clock.time()
+        self._speed, self._since = command.speed, self._clock.time()
         ended = self._status is PlayStatus.ENDED and not sought
-        self._go(PlayStatus.PLAYING if wish.play else PlayStatus.ENDED if ended else PlayStatus.PAUSED, sought=sought)
+        self._go(
+            PlayStatus.PLAYING if command.play else PlayStatus.ENDED if ended else PlayStatus.PAUSED, sought=sought
+        )
         state = replace(self._state(), sought=sought)
         for other in tuple(self._listeners):
-            other.played(replace(state, request=wish.request) if other is listener else state)
+            other.played(replace(state, request=command.request) if other is listener else state)
 
     # -- playing --
 

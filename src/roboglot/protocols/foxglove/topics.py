@@ -10,7 +10,7 @@ import asyncio
 from roboglot.media.video import VideoStream
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
-from roboglot.protocols.foxglove.channels import Channel, Listener, Wish
+from roboglot.protocols.foxglove.channels import Channel, Listener, PlaybackCommand
 from roboglot.recording.entries import KINDS, Entry, encoded
 from roboglot.recording.readings import READINGS
 from roboglot.recording.redaction import Redaction
@@ -95,7 +95,7 @@ class Topics:
             camera = next((channel.id for channel in self.channels if channel.kind == "video"), -1)
             self._sampler.film(any(listener.wants(camera) is not None for listener in self._listeners))
 
-    def control(self, _listener: Listener, _wish: Wish) -> None:
+    def control(self, _listener: Listener, _command: PlaybackCommand) -> None:
         """Raise NotFound: a live robot has no playback."""
         raise NotFound("this robot is live; one of a recording (--robot a=recording:FILE) can be played back")
 

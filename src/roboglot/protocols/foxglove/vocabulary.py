@@ -96,10 +96,10 @@ def stops(message: str | bytes) -> bool:
     if isinstance(message, str) or not message or message[0] != ClientOpcode.MESSAGE_DATA:
         return False
     try:
-        wish = msgspec.json.decode(message[PUBLISHED_SIZE:], type=RosTwist)
+        request = msgspec.json.decode(message[PUBLISHED_SIZE:], type=RosTwist)
     except (msgspec.DecodeError, RecursionError):
         return False
-    return twist(wish) == Twist()
+    return twist(request) == Twist()
 
 
 def pose(message: RosPose) -> Pose:

@@ -231,8 +231,8 @@ class HttpConnection(HttpToolsProtocol):
 
         Java's client offers HTTP/2 in every request, and the parser would take the body for that protocol.
         """
-        wish = sys.exception()
-        assert isinstance(wish, httptools.HttpParserUpgrade)
+        upgrade = sys.exception()
+        assert isinstance(upgrade, httptools.HttpParserUpgrade)
         method, version = self.parser.get_method(), self.parser.get_http_version()
         if method == b"CONNECT":
             self.send_400_response("Invalid HTTP request received.")
@@ -244,7 +244,7 @@ class HttpConnection(HttpToolsProtocol):
             if name != b"upgrade":
                 head.append(name + b": " + value)
         self.parser = httptools.HttpRequestParser(self)
-        self._unread = [b"\r\n".join(head) + b"\r\n\r\n", memoryview(self._reading)[wish.args[0] :]]
+        self._unread = [b"\r\n".join(head) + b"\r\n\r\n", memoryview(self._reading)[upgrade.args[0] :]]
 
     def on_message_begin(self) -> None:
         self._begun += 1

@@ -16,7 +16,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.motion.gait import Gaits
-from roboglot.protocols.cyberdog.chapters.motion.motion_start import Wish
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import MotionRequest
 from roboglot.simulation.world.world import World
 from roboglot.testing import assert_pose
 from roboglot.wire.cyberdog.chapters.motion.motion import MotionCode
@@ -204,12 +204,12 @@ async def test_frames_that_come_during_a_motion_are_refused(client, app, robot, 
 async def test_another_clients_servo_is_not_cut_short(client, robot, world, forward) -> None:
     gaits = Gaits(robot)
     with acting_for("cyberdog 10.0.0.7"):
-        gaits.servo(303, Wish(Twist(0.3)))
+        gaits.servo(303, MotionRequest(Twist(0.3)))
     await forward(seconds=0.1)
     with acting_for("cyberdog 10.0.0.8"):
-        assert gaits.check(111, Wish()) is MotionCode.BUSY
+        assert gaits.check(111, MotionRequest()) is MotionCode.BUSY
     with acting_for("cyberdog 10.0.0.7"):
-        assert gaits.check(111, Wish()) is None
+        assert gaits.check(111, MotionRequest()) is None
 
 
 async def test_only_standing_leads_out_of_emergency_stop(client, robot, world, forward) -> None:

@@ -6,7 +6,7 @@ import math
 
 from roboglot.model.errors import InvalidGoal, NotReady
 from roboglot.operations import Right
-from roboglot.protocols.foxglove.channels import Wish
+from roboglot.protocols.foxglove.channels import PlaybackCommand
 from roboglot.protocols.foxglove.context import Context
 from roboglot.protocols.foxglove.table import TABLE
 
@@ -24,4 +24,4 @@ async def control(context: Context, *, command: int, speed: float, seek: int | N
         raise InvalidGoal(f"a playback command must be 0 (play) or 1 (pause), not {command}")
     if not math.isfinite(speed) or not SPEED_MIN <= speed <= SPEED_MAX:
         raise InvalidGoal(f"a recording is played {SPEED_MIN:g} to {SPEED_MAX:g} times as fast, not {speed:g}")
-    context.topics.control(context, Wish(command == PLAY, speed, seek, request))
+    context.topics.control(context, PlaybackCommand(command == PLAY, speed, seek, request))

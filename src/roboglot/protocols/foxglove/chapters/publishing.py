@@ -60,8 +60,8 @@ def _name(context: Context, topic: str) -> str:
 
 def _drive(context: Context, data: bytes) -> None:
     """Drive (geometry_msgs/Twist) until the next velocity, or for the dead-man time."""
-    wish = twist(msgspec.json.decode(data, type=RosTwist))
-    ros_commands.drive(context.robot, wish, context.config.dead_man, context.source)
+    request = twist(msgspec.json.decode(data, type=RosTwist))
+    ros_commands.drive(context.robot, request, context.config.dead_man, context.source)
 
 
 def _go(context: Context, data: bytes) -> None:

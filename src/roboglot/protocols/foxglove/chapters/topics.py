@@ -25,17 +25,17 @@ async def subscribe(context: Context, *, subscriptions: list[Subscription]) -> N
     """Subscribe to topics; those that hold a state send their last message at once."""
     topics = context.topics
     known = {channel.id for channel in topics.channels} if topics is not None else set()
-    for wish in subscriptions:
-        if wish.channel_id not in known or topics is None:
-            raise NotFound(f"there is no channel {wish.channel_id}")
-        if not 0 <= wish.id <= NUMBER_MAX or wish.id in context.subscriptions.values():
-            raise InvalidGoal(f"a subscription cannot have the number {wish.id}, or has it already")
-        if wish.channel_id in context.subscriptions:
-            raise InvalidGoal(f"channel {wish.channel_id} is subscribed to already")
+    for request in subscriptions:
+        if request.channel_id not in known or topics is None:
+            raise NotFound(f"there is no channel {request.channel_id}")
+        if not 0 <= request.id <= NUMBER_MAX or request.id in context.subscriptions.values():
+            raise InvalidGoal(f"a subscription cannot have the number {request.id}, or has it already")
+        if request.channel_id in context.subscriptions:
+            raise InvalidGoal(f"channel {request.channel_id} is subscribed to already")
         if len(context.subscriptions) >= SUBSCRIPTIONS_MAX:
             raise InvalidGoal(f"more than {SUBSCRIPTIONS_MAX} subscriptions")
-        context.subscriptions[wish.channel_id] = wish.id
-        topics.show_last(context, wish.channel_id, wish.id)
+        context.subscriptions[request.channel_id] = request.id
+        topics.show_last(context, request.channel_id, request.id)
     if topics is not None:
         topics.look_at_camera()
 

@@ -12,7 +12,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.motion.climbing import sees
-from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE, WATCHDOG, MotionStart, Wish
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import SOURCE, WATCHDOG, MotionRequest, MotionStart
 from roboglot.protocols.cyberdog.chapters.motion.motion_states import begins_in, entered, of_another, under_way
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
     DANCED,
@@ -38,7 +38,7 @@ from roboglot.wire.cyberdog.chapters.motion.motion import Motion, MotionCode, Sw
 from roboglot.wire.cyberdog.codes import MachineState
 
 DURATION_MAX = 60.0  # s: the longest walk by a result command, which only an emergency stop ends
-NOTHING_SPECIAL = Wish()
+NOTHING_SPECIAL = MotionRequest()
 MOVING = 0.01  # m/s or rad/s from which the body counts as walking
 
 
@@ -99,7 +99,7 @@ class Gaits:
             return self._last if ours and self._last in WALKS else Motion.TROT_SLOW
         return Motion.WALK_STAND if self._last in WALKS else Motion.STAND_UP
 
-    def servo(self, motion: int, wish: Wish) -> Executed:
+    def servo(self, motion: int, request: MotionRequest) -> Executed:
         """Execute one servo frame: keep its velocity until the next, or for WATCHDOG seconds.
 
         A robot that does not stand gets up first; frames in the meantime are accepted without effect.
@@ -109,7 +109,7 @@ class Gaits:
             return Executed(refusal, SwitchStatus.LOW_BATTERY if refusal is MotionCode.LOW_BATTERY else status)
         if not self._frames_may_ask_for(motion):
             return Executed(MotionCode.UNSUPPORTED)
-        if _asks_too_much(motion, wish):
+        if _asks_too_much(motion, request):
             return Executed(MotionCode.PARAMETERS)
         if self.busy:
             return Executed(MotionCode.BUSY)
@@ -122,10 +122,10 @@ class Gaits:
                 return Executed(MotionCode.DONE, SwitchStatus.CHANGING, 0.0)
             if motion in SERVO_POSES:
                 relative, _ = POSES[motion]
-                self._start.hold(wish.body, relative=relative)
+                self._start.hold(request.body, relative=relative)
             else:
-                self._start.hold(wish.body)
-                self._servo = self._start.walk(motion, wish, WATCHDOG, f"{SOURCE} servo")
+                self._start.hold(request.body)
+                self._servo = self._start.walk(motion, request, WATCHDOG, f"{SOURCE} servo")
         except RobotError as error:
             return Executed(codes_of(error).motion)
         self._last = motion
@@ -171,13 +171,13 @@ class Gaits:
             self._start.stop()
         return code
 
-    async def carry_out(self, motion: int, wish: Wish) -> MotionCode:
+    async def carry_out(self, motion: int, request: MotionRequest) -> MotionCode:
         """Perform a motion to its end, with the motions that must precede it; continues without a waiting client."""
-        if refusal := self.check(motion, wish):
+        if refusal := self.check(motion, request):
             return refusal
         if motion == Motion.EMERGENCY_STOP:
-            return await self._go_through(motion, wish)
-        return await asyncio.shield(self._follow_up(self._go_through(motion, wish), f"motion {motion}"))
+            return await self._go_through(motion, request)
+        return await asyncio.shield(self._follow_up(self._go_through(motion, request), f"motion {motion}"))
 
     def _follow_up(self, doing: Coroutine[object, object, MotionCode], name: str) -> asyncio.Task[MotionCode]:
         task = asyncio.get_running_loop().create_task(doing, name=name)
@@ -191,12 +191,12 @@ class Gaits:
         for sequence in self._sequences:
             sequence.cancel()
 
-    async def _go_through(self, motion: int, wish: Wish) -> MotionCode:
+    async def _go_through(self, motion: int, request: MotionRequest) -> MotionCode:
         if motion != Motion.EMERGENCY_STOP:
             await self._leave_servo()
         before = [(number, NOTHING_SPECIAL) for number in self._leading_to(motion)]
         code = MotionCode.DONE
-        for number, wanted in [*before, (motion, wish)]:
+        for number, wanted in [*before, (motion, request)]:
             try:
                 action = self._begin(number, wanted)
             except RobotError as error:
@@ -228,7 +228,7 @@ class Gaits:
             return MotionCode.EMERGENCY_STOPPED
         return codes_of(action.error).motion if action.error else MotionCode.EXECUTION
 
-    def check(self, motion: int, wish: Wish) -> MotionCode | None:
+    def check(self, motion: int, request: MotionRequest) -> MotionCode | None:
         """Return the code with which ``carry_out`` would refuse; None if it would not."""
         if refusal := refusal_of(self._robot, motion):
             return refusal
@@ -238,10 +238,10 @@ class Gaits:
             return MotionCode.UNSUPPORTED
         if motion in STATES:
             return MotionCode.BANNED
-        given, free = wish.seconds > 0, motion == Motion.USER_GAIT or (motion in POSES and not POSES[motion][1])
-        if not 0 <= wish.seconds <= DURATION_MAX or (not free and given == (motion in FIXED_TIME)):
+        given, free = request.seconds > 0, motion == Motion.USER_GAIT or (motion in POSES and not POSES[motion][1])
+        if not 0 <= request.seconds <= DURATION_MAX or (not free and given == (motion in FIXED_TIME)):
             return MotionCode.PARAMETERS
-        if _asks_too_much(motion, wish):
+        if _asks_too_much(motion, request):
             return MotionCode.PARAMETERS
         if motion in PRESETS or (motion in USERS and not self._robot[Legs].choreography.steps):
             return MotionCode.NO_SEQUENCE
@@ -255,15 +255,15 @@ class Gaits:
         """True while a motion with a result is under way."""
         return under_way(self._performing) or any(not task.done() for task in self._sequences)
 
-    def _begin(self, motion: int, wish: Wish) -> Action | None:
+    def _begin(self, motion: int, request: MotionRequest) -> Action | None:
         """Begin a motion and record it; None: it was done at once."""
-        action = self._start.begin(motion, wish)
+        action = self._start.begin(motion, request)
         if action is not None:
             self._last, self._performing = motion, action
         return action
 
 
-def _asks_too_much(motion: int, wish: Wish) -> bool:
+def _asks_too_much(motion: int, request: MotionRequest) -> bool:
     """Return whether a relative pose is out of range; the legs check absolute ones."""
     relative, _ = POSES.get(motion, (False, False))
-    return relative and not may_be_added(wish.body)
+    return relative and not may_be_added(request.body)

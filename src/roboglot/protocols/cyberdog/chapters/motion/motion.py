@@ -7,7 +7,7 @@ from roboglot.model.geometry import STILL
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.motion.gait import Executed
-from roboglot.protocols.cyberdog.chapters.motion.motion_start import Wish
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import MotionRequest
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import POSES, SERVO_POSES, WALKS
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import TABLE, push
@@ -44,10 +44,12 @@ async def servo(
     elif value == CALIBRATION:
         executed = gaits.calibrate()
     elif motion_id in WALKS:
-        wish = Wish(twist_of(motion_id, vel_des), body_of(pos_des, rpy_des), lift=lift_of(step_height, value))
-        executed = gaits.servo(motion_id, wish)
+        request = MotionRequest(
+            twist_of(motion_id, vel_des), body_of(pos_des, rpy_des), lift=lift_of(step_height, value)
+        )
+        executed = gaits.servo(motion_id, request)
     elif motion_id in SERVO_POSES:
-        executed = gaits.servo(motion_id, Wish(body=body_of(pos_des, rpy_des)))
+        executed = gaits.servo(motion_id, MotionRequest(body=body_of(pos_des, rpy_des)))
     else:
         executed = Executed(MotionCode.UNSUPPORTED)
     response: dict[str, object] = {
@@ -75,7 +77,7 @@ async def motion(
 ) -> dict[str, object]:
     """Perform a motion that ends by itself; ``duration`` in ms (walks, poses). Answered at its end, within 20 s."""
     walks, poses = motion_id in WALKS or motion_id == Motion.USER_GAIT, motion_id in POSES
-    wish = Wish(
+    request = MotionRequest(
         twist_of(motion_id, vel_des) if walks else STILL,
         body_of(pos_des if poses else [], rpy_des if poses else []),
         duration / 1000.0,
@@ -83,7 +85,7 @@ async def motion(
         feet_of(contact),
     )
     try:
-        code = await call.context.robot.clock.wait_for(call.context.gaits.carry_out(motion_id, wish), ANSWER_MAX)
+        code = await call.context.robot.clock.wait_for(call.context.gaits.carry_out(motion_id, request), ANSWER_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
     motion = (

@@ -26,7 +26,7 @@ UPRIGHT = BodyPose()
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class MotionRequest:
     """Parameters of a motion: velocity (base_link), body pose, seconds, foot lift."""
 
     velocity: Twist = STILL
@@ -45,21 +45,21 @@ class MotionStart:
         self._ahead = WayAhead(robot)
         self.standing = 0.0  # m: the belly's height when the robot last stood
 
-    def walk(self, motion: int, wish: Wish, seconds: float, source: str) -> Action:
+    def walk(self, motion: int, request: MotionRequest, seconds: float, source: str) -> Action:
         """Walk at the requested velocity for ``seconds``."""
         if Legs in self._robot:
-            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
+            self._robot[Legs].walk(WALKS[motion], self._lift(motion, request))
             if self._body == UPRIGHT:
                 self.standing = self._robot[Legs].body_height
-        return self._robot[Driving].drive(wish.velocity, lifetime=seconds, source=source)
+        return self._robot[Driving].drive(request.velocity, lifetime=seconds, source=source)
 
-    def _lift(self, motion: int, wish: Wish) -> FootLift | None:
-        return self._ahead.lift(wish.lift) if motion in SEEING else wish.lift
+    def _lift(self, motion: int, request: MotionRequest) -> FootLift | None:
+        return self._ahead.lift(request.lift) if motion in SEEING else request.lift
 
-    async def _look_ahead(self, motion: int, wish: Wish) -> None:
+    async def _look_ahead(self, motion: int, request: MotionRequest) -> None:
         """Lift the feet over obstacles ahead, until cancelled."""
         async for _ in self._robot.clock.every(LOOK):
-            self._robot[Legs].walk(WALKS[motion], self._lift(motion, wish))
+            self._robot[Legs].walk(WALKS[motion], self._lift(motion, request))
 
     def hold(self, body: BodyPose, *, relative: bool = False) -> None:
         """Walk or stand with the body in this pose; a repeated frame changes nothing."""
@@ -67,13 +67,13 @@ class MotionStart:
             self._robot[Legs].hold(body, duration=WATCHDOG, relative=relative, source=SOURCE)
             self._body = body
 
-    def looking(self, motion: int, wish: Wish) -> asyncio.Task[None] | None:
+    def looking(self, motion: int, request: MotionRequest) -> asyncio.Task[None] | None:
         """Return the terrain sensing of a motion that needs it; None for all others."""
         if motion not in SEEING or Legs not in self._robot:
             return None
-        return asyncio.get_running_loop().create_task(self._look_ahead(motion, wish), name="look ahead")
+        return asyncio.get_running_loop().create_task(self._look_ahead(motion, request), name="look ahead")
 
-    def begin(self, motion: int, wish: Wish) -> Action | None:
+    def begin(self, motion: int, request: MotionRequest) -> Action | None:
         """Begin a motion; None: it was done at once."""
         robot = self._robot
         match motion:
@@ -88,16 +88,16 @@ class MotionStart:
                 last = robot[Legs].choreography
                 action = robot[Legs].dance(last.steps, last.footfalls, source=SOURCE)
             case Motion.USER_GAIT:
-                step = Step(wish.seconds or PASSIVE_TROT, wish.velocity, lift=wish.lift or FootLift())
+                step = Step(request.seconds or PASSIVE_TROT, request.velocity, lift=request.lift or FootLift())
                 action = self._dance(step, robot[Legs].choreography.footfalls)
-            case Motion.POSE_ONE_FOOT if len(wish.down) < len(Foot):
-                action = self._raise_foot(wish)
+            case Motion.POSE_ONE_FOOT if len(request.down) < len(Foot):
+                action = self._raise_foot(request)
             case _ if motion in POSES:
                 relative, _ = POSES[motion]
-                seconds = wish.seconds or POSE_TIME
-                action = robot[Legs].hold(wish.body, duration=seconds, relative=relative, source=SOURCE)
+                seconds = request.seconds or POSE_TIME
+                action = robot[Legs].hold(request.body, duration=seconds, relative=relative, source=SOURCE)
             case _:
-                action = self.walk(motion, wish, wish.seconds or PASSIVE_TROT, SOURCE)
+                action = self.walk(motion, request, request.seconds or PASSIVE_TROT, SOURCE)
         return action
 
     def _posture(self, motion: int) -> Action | None:
@@ -114,15 +114,17 @@ class MotionStart:
             return robot[Legs].perform(FIGURES[motion], source=SOURCE)
         return None
 
-    def _raise_foot(self, wish: Wish) -> Action:
+    def _raise_foot(self, request: MotionRequest) -> Action:
         """Shift the body with the feet that are not ``down`` in the air, then stand straight."""
         legs, now = self._robot[Legs], self._robot[Legs].attitude
-        by = wish.body
+        by = request.body
         turned = Orientation(now.roll + by.attitude.roll, now.pitch + by.attitude.pitch, now.yaw + by.attitude.yaw)
         height = None if by.height is None else legs.body_height + by.height
-        lift = wish.lift.front if wish.lift else PAW_LIFT
-        step = Step(wish.seconds, body=BodyPose(height, turned, by.shift), footholds=(Foothold(lift=lift),) * len(Foot))
-        return self._dance(step, [Footfall(wish.seconds, wish.down)])
+        lift = request.lift.front if request.lift else PAW_LIFT
+        step = Step(
+            request.seconds, body=BodyPose(height, turned, by.shift), footholds=(Foothold(lift=lift),) * len(Foot)
+        )
+        return self._dance(step, [Footfall(request.seconds, request.down)])
 
     def _dance(self, step: Step, footfalls: Sequence[Footfall]) -> Action:
         """Dance one step; the choreography that 400 repeats stays unchanged."""
