@@ -93,7 +93,7 @@ def test_the_core_is_small(core: Path) -> None:
     assert not [name for name in HEAVY if (site / name).exists()]
 
 
-def test_the_start_screen_names_a_file_that_is_installed(core: Path) -> None:
+def test_the_start_screen_names_an_installed_file(core: Path) -> None:
     (proto,) = core.parent.parent.glob("lib/python*/site-packages/roboglot/wire/cyberdog/proto/cyberdog_app.proto")
     assert "service GrpcApp" in proto.read_text()  # grpcurl reads it, as the CyberDog door suggests
 
