@@ -71,7 +71,7 @@ class LowSight:
 
     def _touching(self, zones: Set[str]) -> Points:
         """Return points beside the pressed zones: what no sensor sees is there, at an unknown height."""
-        angles = np.concatenate([ZONES[zone] + TOUCHED for zone in zones if zone in ZONES] or [NONE[:, 0]])
+        angles = np.concatenate([angle + TOUCHED for zone, angle in ZONES.items() if zone in zones] or [NONE[:, 0]])
         away = self._radius + BESIDE
         return np.column_stack((away * np.cos(angles), away * np.sin(angles), np.full(len(angles), self._height)))
 
