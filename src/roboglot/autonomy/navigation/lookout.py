@@ -21,6 +21,7 @@ from roboglot.model.geometry import Point, Pose
 if TYPE_CHECKING:
     from roboglot.autonomy.navigation.planner import Planner
 
+FOLLOWS = 0.3  # m/s above which a robot among others is not held up, but drives behind one
 ANNOUNCED_MAX = 12.0  # m of the planned way that are announced to others
 
 
@@ -104,8 +105,10 @@ class Lookout:
         self._mind_others(follower, pose, path, aim)
         if blocked:
             self.blocked_place = Point(*path[min(int(free / SPACING), len(path) - 1)].tolist())
-        if blocked and not self.blocked:
+        follows = follower.speed > FOLLOWS and self._traffic.is_among_others(pose)
+        if blocked and (follows or not self.blocked):
             self.blocked_at = self._clock.time()
+        if blocked and not self.blocked:
             self._robot.events.publish(PathBlocked(stamp=self.blocked_at, action=self._action, at=self.blocked_place))
         self.blocked = blocked
 
