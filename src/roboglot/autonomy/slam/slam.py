@@ -19,6 +19,7 @@ from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, is_well_painted, supported
 from roboglot.autonomy.slam.contradictions import STOOD, WheelWitness, is_long
 from roboglot.autonomy.slam.displacement import DisplacementWatch
+from roboglot.autonomy.slam.elsewhere import NEAR, Elsewhere
 from roboglot.autonomy.slam.excursion import Excursions
 from roboglot.autonomy.slam.loops import LoopCloser
 from roboglot.autonomy.slam.matcher import (
@@ -55,7 +56,6 @@ REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad searched at most af
 TRUSTED = 0.75  # agreement from which a match is used to judge odometry
 KNOWN_SURE = 0.6  # share of known points from which agreement alone suffices
 PROBATION = 3.0  # m to drive without contradiction after a distant relocalization, before scans are added there
-NEAR, BETTER = 1.5, 0.08  # m; the gain in agreement that a distant place needs over the believed one
 NEW_GROUND = 0.3  # share of known points below which the scan counts as new ground
 GAP_MAX = 0.35  # s between two scans up to which odometry's constant errors are learnt
 BLIND = np.diag((0.5**2, 0.5**2, 0.3**2))  # variances after a gap in the scans
@@ -88,6 +88,7 @@ class Slam:
         self._looked_at, self._looking, self._given_at = -math.inf, False, -math.inf
         self._pause = LOST_PERIOD  # s from a search of the whole map to the next
         self._missed, self._fell_at = 0.0, 0.0  # agreement before it fell, and m driven then; 0: it did not fall
+        self._elsewhere = Elsewhere()
         self._compared = belief.map  # the map with which the newest scan was compared
         self._unseen = False  # whether a pose was given, and not yet compared with the whole map
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
@@ -309,6 +310,7 @@ class Slam:
             self._missed = max(self._missed, usual)
             if best.agreement >= DOUBT_SHARE * self._missed or best.known < KNOWN_SURE * best.points:
                 self._pause, self._missed = LOST_PERIOD, 0.0
+                self._elsewhere.forget()
                 return False
         return not self._looking and stamp - self._looked_at >= (LOST_PERIOD if belief.lost else self._pause)
 
@@ -329,9 +331,8 @@ class Slam:
                 found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
             near = found[0].pose.distance_to(pose) < NEAR
             if belief.lost is None:
-                # A robot on its way amid others that move along fits best where it was: nearby places do not count.
-                counts = near if given else not near or self._way - self._fell_at <= STOOD
-                if not counts or found[0].agreement < agreement + BETTER:
+                stood = self._way - self._fell_at <= STOOD
+                if not self._elsewhere.replaces(found[0], odometry, pose, agreement, given=given, stood=stood):
                     return
                 if not given or len(found) > 1:
                     self.whereabouts.lose(LostReason.NO_FIT, stamp)

@@ -1,0 +1,73 @@
+"""A distant place that fits better replaces the believed one only when a second search finds it, too."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from roboglot.autonomy.slam.elsewhere import Elsewhere
+from roboglot.autonomy.slam.matcher import Match
+from roboglot.model.geometry import Pose
+
+BELIEVED, MIRRORED, NEARBY = Pose(2.9, 2.6), Pose(4.5, 3.4, math.pi), Pose(3.5, 2.6)
+START = Pose()  # by odometry
+
+
+def fitting(pose: Pose, agreement: float = 0.85) -> Match:
+    """A match in which this share of a thousand known points fits."""
+    return Match(pose, np.eye(3), 0.0, round(1000 * agreement), 1000, 1000)
+
+
+def replaces(
+    elsewhere: Elsewhere, found: Match, odometry: Pose = START, *, given: bool = False, stood: bool = True
+) -> bool:
+    """Whether it replaces the believed place of a robot that believed to be at BELIEVED when odometry began."""
+    believed = BELIEVED.compose(odometry)
+    return elsewhere.replaces(found, odometry, believed, 0.7, given=given, stood=stood)
+
+
+def test_a_distant_place_has_to_be_found_twice() -> None:
+    elsewhere = Elsewhere()
+    assert not replaces(elsewhere, fitting(MIRRORED))
+    assert replaces(elsewhere, fitting(MIRRORED))
+
+
+def test_the_place_moves_with_the_robot() -> None:
+    elsewhere, step = Elsewhere(), Pose(0.5, 0.0, 0.3)
+    # The wheels' step happens in the frame of the odometry, which begins at the first of both places.
+    assert not replaces(elsewhere, fitting(MIRRORED))
+    assert replaces(elsewhere, fitting(MIRRORED.compose(step)), step)
+
+
+@pytest.mark.parametrize("other", [Pose(4.5, 3.4, 0.0), Pose(5.5, 3.4, math.pi)], ids=["turned", "moved"])
+def test_another_place_begins_anew(other: Pose) -> None:
+    elsewhere = Elsewhere()
+    assert not replaces(elsewhere, fitting(MIRRORED))
+    assert not replaces(elsewhere, fitting(other))
+    assert not replaces(elsewhere, fitting(MIRRORED))
+
+
+def test_a_fit_in_between_begins_anew() -> None:
+    elsewhere = Elsewhere()
+    assert not replaces(elsewhere, fitting(MIRRORED))
+    elsewhere.forget()
+    assert not replaces(elsewhere, fitting(MIRRORED))
+
+
+def test_a_place_that_fits_little_better_never_counts() -> None:
+    elsewhere = Elsewhere()
+    assert not any(replaces(elsewhere, fitting(MIRRORED, 0.77)) for _ in range(3))
+
+
+@pytest.mark.parametrize(
+    ("given", "stood", "counts"), [(True, False, True), (False, True, True), (False, False, False)]
+)
+def test_a_place_nearby_counts_at_once(*, given: bool, stood: bool, counts: bool) -> None:
+    assert replaces(Elsewhere(), fitting(NEARBY), given=given, stood=stood) is counts
+
+
+def test_a_given_pose_is_not_replaced_by_a_distant_one() -> None:
+    elsewhere = Elsewhere()
+    assert not any(replaces(elsewhere, fitting(MIRRORED), given=True) for _ in range(3))
