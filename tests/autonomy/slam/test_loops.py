@@ -48,7 +48,7 @@ def short_sighted(folder: Path) -> str:
 async def test_a_loop_is_closed_and_the_map_straightened(tmp_path: Path, closing: bool) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig(body=short_sighted(tmp_path))]
-    fleet = build_fleet(RING, robots, clock=clock, seed=2, database=database)
+    fleet = build_fleet(RING, robots, clock=clock, seed=18, database=database)
     await fleet.start(wait=True)
     robot, start, closed, errors = fleet.robots["a"], fleet.world.truth.pose_of("a"), [], []
     robot.events.listen(LoopClosed, closed.append)

@@ -112,12 +112,14 @@ class Follower:
             error = wrap_angle(bearing - pose.yaw)
             self._turning = abs(error) >= self._turn_on_spot(near)
             allowed *= 0.0 if self._turning else math.cos(error)
-        self.speed = _towards(self.speed, allowed, self.limits.linear_acceleration * PERIOD)
+        step = self.limits.linear_acceleration * PERIOD
+        speed = _towards(self.speed, allowed, step)
+        self.speed = max(speed, self.speed - step)  # a base under way does not stop at once
         self.turn(error)
         if not self.limits.holonomic:
-            return Twist(self.speed, 0.0, self.yaw_rate)
+            return Twist(speed, 0.0, self.yaw_rate)
         aim = bearing - (pose.yaw + self.yaw_rate * PERIOD / 2.0)
-        return Twist(self.speed * math.cos(aim), self.speed * math.sin(aim), self.yaw_rate)
+        return Twist(speed * math.cos(aim), speed * math.sin(aim), self.yaw_rate)
 
     def _turn_on_spot(self, near: float) -> float:
         """Return the heading error (rad) beyond which the robot turns before it drives.
