@@ -69,6 +69,19 @@ def test_nested_events_come_after_the_outer_one() -> None:
         assert early == late == [event.stamp for event in queued.drain()] == [1.0, 2.0, 3.0, 4.0]
 
 
+def test_any_number_of_events_is_nested() -> None:
+    events, heard = EventStream(), list[float]()
+
+    def answer(event: Event) -> None:
+        for stamp in range(2000) if isinstance(event, BumperPressed) else ():
+            events.publish(BumperReleased(stamp=stamp, zone="front"))
+
+    events.listen(Event, answer)
+    events.listen(BumperReleased, lambda event: heard.append(event.stamp))
+    events.publish(BumperPressed(stamp=1.0, zone="front"))
+    assert heard == list(range(2000))
+
+
 def test_broken_listener_keeps_later_events_coming() -> None:
     events, heard = EventStream(), list[float]()
 

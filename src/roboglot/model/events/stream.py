@@ -95,16 +95,20 @@ class EventStream:
         if self._delivering:
             self._nested.append(event)
             return
-        receivers = self._receivers.get(type(event))
-        if receivers is None:
-            receivers = self._receivers[type(event)] = self._receivers_of(type(event))
         self._delivering = True
         try:
-            for receive in receivers:
-                receive(event)
+            while True:
+                receivers = self._receivers.get(type(event))
+                if receivers is None:
+                    receivers = self._receivers[type(event)] = self._receivers_of(type(event))
+                for receive in receivers:
+                    receive(event)
+                if not self._nested:
+                    break
+                event = self._nested.popleft()
         finally:
             self._delivering = False
-            if self._nested:
+            if self._nested:  # a listener broke
                 self.publish(self._nested.popleft())
 
     def _receivers_of(self, kind: type[Event]) -> tuple[Callable[[Event], None], ...]:
