@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from roboglot.autonomy.slam.elsewhere import Elsewhere
 from roboglot.autonomy.slam.matcher import Match
+from roboglot.autonomy.slam.whereabouts import Elsewhere
 from roboglot.model.geometry import Pose
 
 BELIEVED, MIRRORED, NEARBY = Pose(2.9, 2.6), Pose(4.5, 3.4, math.pi), Pose(3.5, 2.6)
@@ -23,7 +23,7 @@ def fitting(pose: Pose, agreement: float = 0.85) -> Match:
 def replaces(
     elsewhere: Elsewhere, found: Match, odometry: Pose = START, *, given: bool = False, stood: bool = True
 ) -> bool:
-    """Whether it replaces the believed place of a robot that believed to be at BELIEVED when odometry began."""
+    """Return whether it replaces the believed place of a robot that believed to be at BELIEVED when odometry began."""
     believed = BELIEVED.compose(odometry)
     return elsewhere.replaces(found, odometry, believed, 0.7, given=given, stood=stood)
 
@@ -68,6 +68,6 @@ def test_a_place_nearby_counts_at_once(*, given: bool, stood: bool, counts: bool
     assert replaces(Elsewhere(), fitting(NEARBY), given=given, stood=stood) is counts
 
 
-def test_a_given_pose_is_not_replaced_by_a_distant_one() -> None:
+def test_a_given_pose_yields_to_no_distant_one() -> None:
     elsewhere = Elsewhere()
     assert not any(replaces(elsewhere, fitting(MIRRORED), given=True) for _ in range(3))

@@ -19,7 +19,6 @@ from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, is_well_painted, supported
 from roboglot.autonomy.slam.contradictions import STOOD, WheelWitness, is_long
 from roboglot.autonomy.slam.displacement import DisplacementWatch
-from roboglot.autonomy.slam.elsewhere import NEAR, Elsewhere
 from roboglot.autonomy.slam.excursion import Excursions
 from roboglot.autonomy.slam.loops import LoopCloser
 from roboglot.autonomy.slam.matcher import (
@@ -38,7 +37,7 @@ from roboglot.autonomy.slam.scan_points import ScanPoints, is_covered
 from roboglot.autonomy.slam.slip import SlipWatch
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
 from roboglot.autonomy.slam.turns import Turns
-from roboglot.autonomy.slam.whereabouts import Whereabouts
+from roboglot.autonomy.slam.whereabouts import NEAR, Elsewhere, Whereabouts
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, RobotDisplaced, ScanTaken
 from roboglot.model.geometry import Pose, wrap_angle

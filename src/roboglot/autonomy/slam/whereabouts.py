@@ -6,6 +6,7 @@ import math
 
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import Support
+from roboglot.autonomy.slam.matcher import Match
 from roboglot.model.events import (
     EventStream,
     LocalizationLost,
@@ -14,6 +15,7 @@ from roboglot.model.events import (
     PoseConfirmed,
     RecoveryMeans,
 )
+from roboglot.model.geometry import Pose, wrap_angle
 
 DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # contradiction by the map: agreement below, share of points above
 DENIED_HIDDEN = 0.2  # … or share of rays through walls, which no crowd explains
@@ -22,6 +24,8 @@ DOUBTS_MAX, DOUBT_SECONDS = 3, 1.5  # contradictions in a row, and their duratio
 CONFIRMED = 5  # confirmations in a row before the pose is known again
 BLIND_SECONDS, BLIND_INTERVALS = 2.0, 5.0  # s without a scan, and in usual intervals, from which the pose is uncertain
 INTERVAL_GAIN = 0.1
+NEAR, BETTER = 1.5, 0.08  # m; the gain in agreement that another place needs over the believed one
+SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad between two searches' places up to which they are one
 
 
 class Whereabouts:
@@ -114,3 +118,30 @@ class Whereabouts:
     def begin(self) -> None:
         """Begin a new map, whose first scan defines the pose."""
         self._doubts, self._doubted_at, self.sure, self._belief.confirmed = 0, math.inf, True, True
+
+
+class Elsewhere:
+    """Decides whether another place, found by a search, replaces the believed one of a robot that is not lost."""
+
+    def __init__(self) -> None:
+        self._map_to_odom: Pose | None = None  # by the distant place that the last search found
+
+    def forget(self) -> None:
+        """Forget that place."""
+        self._map_to_odom = None
+
+    def replaces(
+        self, found: Match, odometry: Pose, believed: Pose, agreement: float, *, given: bool, stood: bool
+    ) -> bool:
+        """Return whether to believe ``found`` instead of ``believed``, whose ``agreement`` is given.
+
+        A distant place has to be found twice: while others leave a bare corridor, its mirror image may fit better for
+        a moment. A robot on its way amid others that move along fits best where it was: nearby places do not count.
+        """
+        near = found.pose.distance_to(believed) < NEAR
+        if not (near if given else not near or stood) or found.agreement < agreement + BETTER:
+            return False
+        before, self._map_to_odom = self._map_to_odom, found.pose.compose(odometry.inverse())
+        again = before.compose(odometry) if before else believed
+        turned = abs(wrap_angle(again.yaw - found.pose.yaw))
+        return near or (again.distance_to(found.pose) < SAME and turned < SAME_YAW)
