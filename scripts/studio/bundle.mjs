@@ -15,8 +15,7 @@ const TARGET = join(root, "src/roboglot/console/web/studio/vendor");
 const CONSOLE = join(root, "src/roboglot/console/web/vendor"); // its other files are as npm has them; its sums are kept by hand
 const APACHE_NOTICE = "Licensed under the Apache License, Version 2.0: the text is in roboglot's own LICENSE\n";
 const AXE = join(root, "tests/browser/vendor");
-const MEDIA = ["delete-icon.svg", "dropdown-arrow.svg", "foldout-icon.svg",
-  "handclosed.cur", "handdelete.cur", "handopen.cur", "resize-handle.svg", "sprites.svg", "1x1.gif", "quote0.png", "quote1.png", "pilcrow.png"];
+const MEDIA = ["delete-icon.svg", "foldout-icon.svg", "handclosed.cur", "handdelete.cur", "resize-handle.svg", "sprites.svg"]; // what the bundle names
 const BANNER = `const styleSheetElement=()=>{const e=document.createElement("link"),s=new CSSStyleSheet();document.adoptedStyleSheets.push(s);`
   + `Object.defineProperty(e,"textContent",{get:()=>"",set:t=>s.replaceSync(t)});return e};`;
 
