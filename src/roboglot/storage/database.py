@@ -10,6 +10,7 @@ import contextlib
 import copy
 import re
 import sqlite3
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -23,6 +24,7 @@ from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseErro
 T = TypeVar("T")
 Work = Callable[[Connection], object]
 ROBOTS = "roboglot.storage.schema"  # tables of the robots' memory
+WAIT = 5.0  # s for other programs that use the file
 
 
 class Database:
@@ -167,7 +169,7 @@ class _Reader:
     def read(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` in one transaction; call it in the thread."""
         if self._connection is None:
-            self._connection = sqlite3.connect(self._path, isolation_level=None, timeout=5.0)
+            self._connection = sqlite3.connect(self._path, isolation_level=None, timeout=WAIT)
             self._connection.execute("PRAGMA query_only=ON")
         with database_errors():
             self._connection.execute("BEGIN")
@@ -203,9 +205,9 @@ def database_errors() -> Iterator[None]:
 
 def connect(path: Path | str, schema: str = ROBOTS) -> sqlite3.Connection:
     """Open the file with the newest schema, outside of any transaction. Raises ValueError for a newer one."""
-    connection = sqlite3.connect(path, isolation_level=None, timeout=5.0)
+    connection = sqlite3.connect(path, isolation_level=None, timeout=WAIT)
     try:
-        connection.execute("PRAGMA journal_mode=WAL")
+        _log_ahead(connection)
         connection.execute("PRAGMA synchronous=FULL")
         connection.execute("PRAGMA foreign_keys=ON")
         if str(path) == ":memory:" and hasattr(connection, "deserialize"):
@@ -216,6 +218,20 @@ def connect(path: Path | str, schema: str = ROBOTS) -> sqlite3.Connection:
         connection.close()
         raise
     return connection
+
+
+def _log_ahead(connection: sqlite3.Connection) -> None:
+    """Set the journal's mode; SQLite itself does not wait while another program does so in a new file."""
+    until = time.monotonic() + WAIT  # noqa: TID251 - files know no robot's time
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode=WAL")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > until:  # noqa: TID251
+                raise
+            time.sleep(0.01)  # noqa: TID251
+        else:
+            return
 
 
 @cache
