@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 
 import pytest
@@ -69,11 +70,17 @@ Connect = Callable[..., Awaitable[TextClient]]
 
 @pytest.fixture
 async def connect(door: RoboMasterDoor) -> AsyncIterator[Connect]:
-    """Opens control connections, from 127.0.0.1 unless given."""
+    """Opens control connections, from 127.0.0.1 unless given, with a receive buffer of some bytes unless 0."""
     clients: list[TextClient] = []
 
-    async def open_one(host: str = "127.0.0.1") -> TextClient:
-        streams = await asyncio.open_connection(ADDRESS, port_of(door, "text SDK"), local_addr=(host, 0))
+    async def open_one(host: str = "127.0.0.1", buffer: int = 0) -> TextClient:
+        made = socket.socket()
+        if buffer:  # before it connects: once open, a kernel may drop what no longer fits, acknowledgements included
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
+        made.setblocking(False)
+        made.bind((host, 0))
+        await asyncio.get_running_loop().sock_connect(made, (ADDRESS, port_of(door, "text SDK")))
+        streams = await asyncio.open_connection(sock=made)
         clients.append(TextClient(*streams))
         return clients[-1]
 

@@ -303,9 +303,10 @@ async def test_client_that_is_not_read_from_can_leave(client, door, robot, forwa
     assert robot[Base].velocity.speed < 0.02
 
 
-async def test_unread_replies_are_not_piled_up(client, connect, door) -> None:
+async def test_unread_replies_are_not_piled_up(connect, door) -> None:
+    client = await connect(buffer=4096)
     client.writer.transport.pause_reading()
-    client.writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    await until(lambda: bool(door._connections))
     for connection in door._connections:
         connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     (unread,) = door._connections
