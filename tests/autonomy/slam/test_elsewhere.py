@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from roboglot.model.geometry import Pose
 
 BELIEVED, MIRRORED, NEARBY = Pose(2.9, 2.6), Pose(4.5, 3.4, math.pi), Pose(3.5, 2.6)
 START = Pose()  # by odometry
+MAP = object()
 
 
 def fitting(pose: Pose, agreement: float = 0.85) -> Match:
@@ -24,50 +27,57 @@ def replaces(
     elsewhere: Elsewhere, found: Match, odometry: Pose = START, *, given: bool = False, stood: bool = True
 ) -> bool:
     """Return whether it replaces the believed place of a robot that believed to be at BELIEVED when odometry began."""
-    believed = BELIEVED.compose(odometry)
-    return elsewhere.replaces(found, odometry, believed, 0.7, given=given, stood=stood)
+    belief: Any = SimpleNamespace(map_to_odom=BELIEVED, map=MAP)
+    return elsewhere.replaces(found, odometry, belief, 0.7, given=given, stood=stood)
 
 
-def test_a_distant_place_has_to_be_found_twice() -> None:
-    elsewhere = Elsewhere()
+@pytest.fixture
+def elsewhere() -> Elsewhere:
+    """Return the memory of a robot whose scans fitted."""
+    made = Elsewhere()
+    made.note_fit(MAP)
+    return made
+
+
+def test_one_search_counts_on_an_unknown_map() -> None:
+    assert replaces(Elsewhere(), fitting(MIRRORED))
+
+
+def test_a_distant_place_has_to_be_found_twice(elsewhere: Elsewhere) -> None:
     assert not replaces(elsewhere, fitting(MIRRORED))
     assert replaces(elsewhere, fitting(MIRRORED))
 
 
-def test_the_place_moves_with_the_robot() -> None:
-    elsewhere, step = Elsewhere(), Pose(0.5, 0.0, 0.3)
+def test_the_place_moves_with_the_robot(elsewhere: Elsewhere) -> None:
+    step = Pose(0.5, 0.0, 0.3)
     # The wheels' step happens in the frame of the odometry, which begins at the first of both places.
     assert not replaces(elsewhere, fitting(MIRRORED))
     assert replaces(elsewhere, fitting(MIRRORED.compose(step)), step)
 
 
 @pytest.mark.parametrize("other", [Pose(4.5, 3.4, 0.0), Pose(5.5, 3.4, math.pi)], ids=["turned", "moved"])
-def test_another_place_begins_anew(other: Pose) -> None:
-    elsewhere = Elsewhere()
+def test_another_place_begins_anew(elsewhere: Elsewhere, other: Pose) -> None:
     assert not replaces(elsewhere, fitting(MIRRORED))
     assert not replaces(elsewhere, fitting(other))
     assert not replaces(elsewhere, fitting(MIRRORED))
 
 
-def test_a_fit_in_between_begins_anew() -> None:
-    elsewhere = Elsewhere()
+def test_a_fit_in_between_begins_anew(elsewhere: Elsewhere) -> None:
     assert not replaces(elsewhere, fitting(MIRRORED))
-    elsewhere.forget()
+    elsewhere.note_fit(MAP)
     assert not replaces(elsewhere, fitting(MIRRORED))
 
 
-def test_a_place_that_fits_little_better_never_counts() -> None:
-    elsewhere = Elsewhere()
+def test_a_place_that_fits_little_better_never_counts(elsewhere: Elsewhere) -> None:
     assert not any(replaces(elsewhere, fitting(MIRRORED, 0.77)) for _ in range(3))
 
 
 @pytest.mark.parametrize(
     ("given", "stood", "counts"), [(True, False, True), (False, True, True), (False, False, False)]
 )
-def test_a_place_nearby_counts_at_once(*, given: bool, stood: bool, counts: bool) -> None:
-    assert replaces(Elsewhere(), fitting(NEARBY), given=given, stood=stood) is counts
+def test_a_place_nearby_counts_at_once(elsewhere: Elsewhere, *, given: bool, stood: bool, counts: bool) -> None:
+    assert replaces(elsewhere, fitting(NEARBY), given=given, stood=stood) is counts
 
 
-def test_a_given_pose_yields_to_no_distant_one() -> None:
-    elsewhere = Elsewhere()
+def test_a_given_pose_yields_to_no_distant_one(elsewhere: Elsewhere) -> None:
     assert not any(replaces(elsewhere, fitting(MIRRORED), given=True) for _ in range(3))

@@ -309,7 +309,7 @@ class Slam:
             self._missed = max(self._missed, usual)
             if best.agreement >= DOUBT_SHARE * self._missed or best.known < KNOWN_SURE * best.points:
                 self._pause, self._missed = LOST_PERIOD, 0.0
-                self._elsewhere.forget()
+                self._elsewhere.note_fit(belief.map)
                 return False
         return not self._looking and stamp - self._looked_at >= (LOST_PERIOD if belief.lost else self._pause)
 
@@ -331,7 +331,7 @@ class Slam:
             near = found[0].pose.distance_to(pose) < NEAR
             if belief.lost is None:
                 stood = self._way - self._fell_at <= STOOD
-                if not self._elsewhere.replaces(found[0], odometry, pose, agreement, given=given, stood=stood):
+                if not self._elsewhere.replaces(found[0], odometry, belief, agreement, given=given, stood=stood):
                     return
                 if not given or len(found) > 1:
                     self.whereabouts.lose(LostReason.NO_FIT, stamp)

@@ -125,23 +125,26 @@ class Elsewhere:
 
     def __init__(self) -> None:
         self._map_to_odom: Pose | None = None  # by the distant place that the last search found
+        self._fitted: object = None  # the map that fitted where the robot believes to be
 
-    def forget(self) -> None:
-        """Forget that place."""
-        self._map_to_odom = None
+    def note_fit(self, grid: object) -> None:
+        """Note that a scan fits this map at the believed place."""
+        self._map_to_odom, self._fitted = None, grid
 
     def replaces(
-        self, found: Match, odometry: Pose, believed: Pose, agreement: float, *, given: bool, stood: bool
+        self, found: Match, odometry: Pose, belief: Belief, agreement: float, *, given: bool, stood: bool
     ) -> bool:
-        """Return whether to believe ``found`` instead of ``believed``, whose ``agreement`` is given.
+        """Return whether to believe ``found`` instead of the believed place, whose ``agreement`` is given.
 
-        A distant place has to be found twice: while others leave a bare corridor, its mirror image may fit better for
-        a moment. A robot on its way amid others that move along fits best where it was: nearby places do not count.
+        On a map that fitted, a distant place has to be found twice: while others leave a bare corridor, its mirror
+        image may fit better for a moment. A robot on its way amid others that move along fits best where it was: nearby
+        places do not count.
         """
+        believed = belief.map_to_odom.compose(odometry)
         near = found.pose.distance_to(believed) < NEAR
         if not (near if given else not near or stood) or found.agreement < agreement + BETTER:
             return False
         before, self._map_to_odom = self._map_to_odom, found.pose.compose(odometry.inverse())
         again = before.compose(odometry) if before else believed
         turned = abs(wrap_angle(again.yaw - found.pose.yaw))
-        return near or (again.distance_to(found.pose) < SAME and turned < SAME_YAW)
+        return near or belief.map is not self._fitted or (again.distance_to(found.pose) < SAME and turned < SAME_YAW)
