@@ -23,7 +23,7 @@ CENTRED = 30  # points ahead that are centred in gaps
 GOAL_KEPT = 0.2  # m around a goal that are not centred
 SEARCH_AHEAD = 40  # points among which the nearest is searched
 
-Points = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 
 class Route:
@@ -32,7 +32,7 @@ class Route:
     ``goals``: places where the route passes them; ``reaches``: m from there that count as passed.
     """
 
-    def __init__(self, legs: Sequence[Points], wanted: Sequence[Point] | None = None, tolerance: float = 0.1) -> None:
+    def __init__(self, legs: Sequence[Floats], wanted: Sequence[Point] | None = None, tolerance: float = 0.1) -> None:
         """``legs``: for each goal, the vertices up to it (m, 2), at least one.
 
         ``wanted``: the goals themselves, as a leg may end a little beside an occupied one. Half of ``tolerance`` (m) is
@@ -40,8 +40,8 @@ class Route:
         """
         from roboglot.kernels.obstacles import nearest_point, way_ahead  # they need Numba
 
-        self._nearest_point: Callable[[Points, int, int, float, float], tuple[int, float]] = nearest_point
-        self._way_ahead: Callable[[Points, int, int, float, float, float, float, int], Points] = way_ahead
+        self._nearest_point: Callable[[Floats, int, int, float, float], tuple[int, float]] = nearest_point
+        self._way_ahead: Callable[[Floats, int, int, float, float, float, float, int], Floats] = way_ahead
         self.vertices = np.concatenate(legs)
         self.points, self.along, places = _densified(self.vertices)
         ends = np.cumsum([len(leg) for leg in legs]) - 1
@@ -52,10 +52,10 @@ class Route:
         reach = min(PASSED, max(PASSED_BESIDE, tolerance / 2))
         self.reaches = [reach if end.distance_to(goal) < 1e-6 else PASSED_BESIDE for end, goal in pairs]
         self._goals_at: list[int] = places[ends].tolist()  # indices into the points
-        self.speeds: Points = np.zeros(len(self.points))
+        self.speeds: Floats = np.zeros(len(self.points))
         self.unknown = 0.0  # m over floor that was never seen
         self.ends_known = False  # whether the map knows the floor at all goals
-        self._ceilings: Points = np.zeros(len(self.points))
+        self._ceilings: Floats = np.zeros(len(self.points))
         self.end = self.goals[-1]
         self.length = float(self.along[-1])  # m
         self._at = 0
@@ -82,7 +82,7 @@ class Route:
         found: list[float] = self.vertices_along.tolist()
         return found
 
-    def set_speeds(self, ceilings: Points, acceleration: float) -> None:
+    def set_speeds(self, ceilings: Floats, acceleration: float) -> None:
         """Set the speed limits: ``ceilings`` (n; m/s), less in bends, and braking in time for those and the end."""
         bends = np.zeros(len(self.points))
         if len(self.points) > 2 * CORNER_REACH:
@@ -101,7 +101,7 @@ class Route:
         lowest = np.minimum.accumulate(energy[::-1])[::-1]
         self.speeds = np.sqrt(np.maximum(0.0, lowest - 2.0 * BRAKING_SHARE * acceleration * self.along))
 
-    def centre(self, echoes: Points, clearance: float) -> tuple[float, bool]:
+    def centre(self, echoes: Floats, clearance: float) -> tuple[float, bool]:
         """Move the next stretch to the middle of gaps with less than ``clearance`` (m) on both sides.
 
         ``echoes`` (n, 2; map, m): present obstacles. Goals keep their places. Returns the narrowest gap's width (m; inf
@@ -151,7 +151,7 @@ class Route:
         x, y = self._spots[min(bisect_left(self._marks, along), len(self._marks) - 1)]
         return Point(x, y)
 
-    def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> Points:
+    def ahead(self, pose: Pose, carrot: Point, beyond: float, horizon: float) -> Floats:
         """Return the way ahead (dense; map): straight to ``carrot``, then ``horizon`` m of route from ``beyond`` m."""
         first = bisect_left(self._marks, beyond)
         last = min(bisect_left(self._marks, beyond + horizon) + 1, len(self._marks))
@@ -164,9 +164,7 @@ class Route:
         return Path((pose.point, *self._corners[first:]))
 
 
-def _densified(
-    vertices: Points,
-) -> tuple[Points, Points, NDArray[np.int64]]:
+def _densified(vertices: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return points at most SPACING m apart along the polyline, their distances (m), and the vertices' indices."""
     ahead = np.diff(vertices, axis=0)
     counts, spans, gone, begins, places = [], [], 0.0, [], [0]

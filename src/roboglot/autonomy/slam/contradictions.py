@@ -1,8 +1,8 @@
 """Decides between contradicting odometry and scan: in a crowd moving along, most points suggest that the robot stands.
 
 In a static world, all points that distinguish both poses agree. If they disagree, some are on moving things, and the
-wheels are believed: their pose, matched to walls alone. So they are if what speaks for the scan was painted just now,
-and is no wall. Robots driving ahead drag matches back by millimetres per step,
+wheels are believed: their pose, matched to walls alone. The wheels are also believed if only surfaces that were painted
+a moment ago, and are no walls, support the scan's pose. Robots driving ahead drag matches back by millimetres per step,
 too little for a single step: so the last seconds are judged too. Needs the kernels.
 """
 
