@@ -64,8 +64,7 @@ def load_world(name_or_path: str | Path) -> WorldDescription:
         case ".yaml" | ".yml":
             return completed(import_ros_map(path), str(path))
         case _:
-            files = "or give the path of a .toml or .yaml file"
-            raise BadFile(f"no world is named {name!r}{instead(name, known)}; {files}")
+            raise BadFile(f"no world is named {name!r}, and it is no .toml or .yaml file{instead(name, known)}")
 
 
 def world_sources(name_or_path: str) -> list[Path]:
