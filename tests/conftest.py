@@ -1,5 +1,7 @@
 """Settings for all tests: examples are the same in every run, and a slow machine is no failure."""
 
+from __future__ import annotations
+
 import contextlib
 import fcntl
 import functools
@@ -16,7 +18,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -25,6 +27,9 @@ from hypothesis.internal.constants_ast import Constants
 
 from roboglot.cli.warm import installation
 from tests import warm_start
+
+if TYPE_CHECKING:
+    from tests.storage.postgresql_server import PostgreSQLServer
 
 settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("explore", deadline=None, max_examples=1000)  # scripts/test --hypothesis-profile explore
@@ -159,6 +164,24 @@ def pytest_collection_finish() -> None:
     gc.freeze()
     gc.enable()
     gc.set_threshold(20_000, 20, 20)  # a test's world is thousands of objects that end together
+
+
+@pytest.fixture(scope="session")
+def running_db_server() -> Iterator[PostgreSQLServer]:
+    """One PostgreSQL server for all tests of a worker."""
+    from tests.storage.postgresql_server import binary_folder, postgresql_server
+
+    binaries = binary_folder()
+    assert binaries
+    with postgresql_server(binaries) as running:
+        yield running
+
+
+@pytest.fixture
+def db_server(running_db_server: PostgreSQLServer) -> PostgreSQLServer:
+    """Return a PostgreSQL server with an empty database."""
+    running_db_server.empty()
+    return running_db_server
 
 
 VENDOR_PORTS = (40924, 40926)  # UDP

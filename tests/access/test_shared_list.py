@@ -9,7 +9,7 @@ import sqlite3
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import resources
@@ -33,7 +33,7 @@ from roboglot.runtime import Runtime
 from roboglot.storage.opening import open_registry
 from roboglot.storage.transactions import Connection, DatabaseError, Transactions
 from roboglot.testing.addresses import free_addresses
-from tests.storage.postgresql_server import PostgreSQLServer, binary_folder, needs_postgresql, postgresql_server
+from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
 T = TypeVar("T")
 ADDRESS = free_addresses(1)
@@ -42,24 +42,10 @@ SEE, DRIVE = frozenset({Right.SEE}), frozenset({Right.DRIVE})
 ODD = "naïve 狗\0 \ue000 \ud800'; DROP TABLE audit; --"
 
 
-@pytest.fixture(scope="module")
-def running() -> Iterator[PostgreSQLServer]:
-    binaries = binary_folder()
-    assert binaries
-    with postgresql_server(binaries) as server:
-        yield server
-
-
-@pytest.fixture
-def server(running: PostgreSQLServer) -> PostgreSQLServer:
-    running.empty()
-    return running
-
-
 @pytest.fixture(params=["file", pytest.param("server", marks=needs_postgresql)])
 def url(request: pytest.FixtureRequest) -> str:
     """Return the database of list and audit; empty: in the data folder."""
-    return str(request.getfixturevalue("server").url) if request.param == "server" else ""
+    return str(request.getfixturevalue("db_server").url) if request.param == "server" else ""
 
 
 def note(number: int, robot: str = "a") -> Entry:
@@ -170,10 +156,10 @@ def test_a_changed_or_missing_row_is_found(tmp_path: Path) -> None:
 
 
 @needs_postgresql
-def test_server_refuses_changed_audit_and_change_is_found(server: PostgreSQLServer, tmp_path: Path) -> None:
-    with open_trail(tmp_path, server.url) as trail:
+def test_server_refuses_changed_audit_and_change_is_found(db_server: PostgreSQLServer, tmp_path: Path) -> None:
+    with open_trail(tmp_path, db_server.url) as trail:
         trail.add([note(n) for n in range(9)])
-        with psycopg.connect(server.url, autocommit=True) as connection:
+        with psycopg.connect(db_server.url, autocommit=True) as connection:
             for change in ("DELETE FROM audit", "UPDATE audit SET who='bert'", "TRUNCATE audit"):
                 with pytest.raises(psycopg.Error, match="the audit stays"):
                     connection.execute(change)
@@ -185,7 +171,7 @@ def test_server_refuses_changed_audit_and_change_is_found(server: PostgreSQLServ
 
 
 @needs_postgresql
-async def test_programs_of_fleet_share_list_and_audit(server: PostgreSQLServer, tmp_path: Path) -> None:
+async def test_programs_of_fleet_share_list_and_audit(db_server: PostgreSQLServer, tmp_path: Path) -> None:
     base = load_config(None, {"data": str(tmp_path / "data"), "world": "empty", "lockstep": True})
     runtime = Runtime(
         replace(
@@ -193,12 +179,12 @@ async def test_programs_of_fleet_share_list_and_audit(server: PostgreSQLServer, 
             robots=(RobotConfig("a", "universal", ADDRESS),),
             access=AccessConfig(on=True, local=False),
             console=ConsoleConfig(enabled=False),
-            database=server.url,
+            database=db_server.url,
         )
     )
     await runtime.start()
     try:
-        added = await asyncio.to_thread(access, "add", "cell", "--rights", "see", "--database", server.url)
+        added = await asyncio.to_thread(access, "add", "cell", "--rights", "see", "--database", db_server.url)
         bearer = {"authorization": f"Bearer {added.stdout.strip()}"}
         async with httpx.AsyncClient(headers=bearer) as client:
 
@@ -209,12 +195,12 @@ async def test_programs_of_fleet_share_list_and_audit(server: PostgreSQLServer, 
 
             await answers(200)
             assert (await client.delete(f"http://{ADDRESS}:1448/api/core/slam/v1/maps")).status_code == 403
-            revoked = await asyncio.to_thread(access, "revoke", "cell", "--database", server.url)
+            revoked = await asyncio.to_thread(access, "revoke", "cell", "--database", db_server.url)
             assert revoked.returncode == 0
             await answers(401)
     finally:
         await runtime.close()
-    with open_trail(tmp_path, server.url) as trail:
+    with open_trail(tmp_path, db_server.url) as trail:
         outcomes = {(entry.who, entry.robot, entry.outcome) for _, entry in trail.rows()}
     assert {("cell", "a", "refused"), ("cell", "a", "lost"), ("", "a", "turned away")} <= outcomes
     assert not list((tmp_path / "data").glob("a[cu]*.db*")), "nothing of it is kept beside the server"
@@ -226,33 +212,33 @@ def access(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @needs_postgresql
-def test_folders_list_is_copied_and_replaces_no_one(server: PostgreSQLServer, tmp_path: Path) -> None:
+def test_folders_list_is_copied_and_replaces_no_one(db_server: PostgreSQLServer, tmp_path: Path) -> None:
     with (
         contextlib.closing(open_store(tmp_path)) as local,
-        contextlib.closing(open_store(tmp_path, server.url)) as there,
+        contextlib.closing(open_store(tmp_path, db_server.url)) as there,
     ):
         local.add_machine("cell", [Grant("a", DRIVE, 5.5)])
         local.add_person("anna", "correct horse", [Grant("*", SEE)])
         there.add_person("anna", "better horse", [])
         kept = there.identities()
-        assert access("copy", "--data", str(tmp_path), "--database", server.url).stdout == "1 copied, 1 were there\n"
+        assert access("copy", "--data", str(tmp_path), "--database", db_server.url).stdout == "1 copied, 1 were there\n"
         assert there.identities() == [*kept, local.identities()[1]]
 
 
 @needs_postgresql
 async def test_server_away_rights_stay_and_rows_are_kept(
-    server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(audit, "AGAIN_SECONDS", 0.05)
     moment = 100.0
-    database = open_registry(server.url)
+    database = open_registry(db_server.url)
     guard = Guard(tmp_path, AccessConfig(on=True), {}, shared=database, now=lambda: moment)
-    with contextlib.closing(open_store(tmp_path, server.url)) as other:
+    with contextlib.closing(open_store(tmp_path, db_server.url)) as other:
         token = other.add_machine("cell", [Grant("a", DRIVE, 200.0)])
         bearer = Proof(ProofKind.HTTP, f"Bearer {token}")
         guard.start()
         await until(lambda: guard.may("cell", "a", Right.DRIVE))
-        server.stop()
+        db_server.stop()
         guard.audit.note(note(1))
         await until(lambda: {"cannot write the audit yet", "cannot read the list"} <= said(caplog))
         assert await guard.admit("10.0.0.7:1", bearer) == "cell"
@@ -261,7 +247,7 @@ async def test_server_away_rights_stay_and_rows_are_kept(
             await guard.invite("pupil", Grant("a", SEE, 300.0))
         moment = 201.0
         assert not guard.may("cell", "a", Right.DRIVE), "its time is over, whoever can be asked"
-        server.start()
+        db_server.start()
         other.revoke("cell")
 
         async def turned_away() -> bool:
@@ -276,7 +262,7 @@ async def test_server_away_rights_stay_and_rows_are_kept(
                 await asyncio.sleep(0.02)
         guard.close()
         database.close()
-    with open_trail(tmp_path, server.url) as trail:
+    with open_trail(tmp_path, db_server.url) as trail:
         assert [entry for _, entry in trail.rows()] == [note(1)]
 
 
@@ -336,24 +322,26 @@ def columns(url: str) -> set[object]:
 
 @needs_postgresql
 @pytest.mark.parametrize("before", VERSIONS[:-1])
-def test_older_programs_database_is_brought_up_to_date(server: PostgreSQLServer, tmp_path: Path, before: int) -> None:
+def test_older_programs_database_is_brought_up_to_date(
+    db_server: PostgreSQLServer, tmp_path: Path, before: int
+) -> None:
     """From each earlier version, by two programs that start at the same time."""
-    open_store(tmp_path, server.url).close()
-    newest = columns(server.url)
-    server.empty()
-    with psycopg.connect(server.url, autocommit=True) as connection:
+    open_store(tmp_path, db_server.url).close()
+    newest = columns(db_server.url)
+    db_server.empty()
+    with psycopg.connect(db_server.url, autocommit=True) as connection:
         connection.execute("CREATE TABLE roboglot_schema (version INTEGER PRIMARY KEY)")
         for version in VERSIONS[:before]:
             connection.execute((SCHEMA / f"v{version}.sql").read_text(encoding="utf-8").encode())
             connection.execute("INSERT INTO roboglot_schema VALUES (%s)", (version,))
         connection.execute("INSERT INTO cloud_account VALUES ('anna', 'x')")
     with ThreadPoolExecutor(2) as programs:
-        one, two = programs.map(lambda _: open_store(tmp_path, server.url), range(2))
+        one, two = programs.map(lambda _: open_store(tmp_path, db_server.url), range(2))
     with contextlib.closing(one), contextlib.closing(two):
         one.allow("10.0.0.7", [])
         assert len(two.identities()) == 1
-    with psycopg.connect(server.url) as connection:
+    with psycopg.connect(db_server.url) as connection:
         applied = connection.execute("SELECT version FROM roboglot_schema ORDER BY version").fetchall()
         assert applied == [(version,) for version in VERSIONS]
         assert connection.execute("SELECT name FROM cloud_account").fetchall() == [("anna",)]
-    assert columns(server.url) == newest
+    assert columns(db_server.url) == newest

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry, read_registry
 from roboglot.testing.addresses import free_addresses
 from tests.narrowing import known
-from tests.storage.postgresql_server import PostgreSQLServer, binary_folder, needs_postgresql, postgresql_server
+from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
 HERE, HOMES = free_addresses(1), (free_addresses(1), free_addresses(1))
 NAME = "/api/core/system/v1/robot/info"
@@ -155,23 +155,15 @@ async def test_only_certificate_that_the_registry_has_is_believed(tmp_path: Path
         database.close()
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[PostgreSQLServer]:
-    binaries = binary_folder()
-    assert binaries
-    with postgresql_server(binaries) as running:
-        yield running
-
-
 @needs_postgresql
-async def test_client_needs_only_the_right_to_read_homes(server: PostgreSQLServer) -> None:
-    database = open_registry(server.url)
+async def test_client_needs_only_the_right_to_read_homes(db_server: PostgreSQLServer) -> None:
+    database = open_registry(db_server.url)
     assert await Homes(database).take({"a": "10.0.0.1"}, "one", {}) == {"a": 1}
-    with psycopg.connect(server.url, autocommit=True) as connection:
+    with psycopg.connect(db_server.url, autocommit=True) as connection:
         connection.execute("REVOKE CREATE ON SCHEMA public FROM PUBLIC")
         connection.execute("CREATE ROLE pupil LOGIN")
         connection.execute("GRANT SELECT ON robot_home TO pupil")
-    url = server.url.replace("user=robots", "user=pupil")
+    url = db_server.url.replace("user=robots", "user=pupil")
     with contextlib.closing(read_registry(url)) as readable:
         found = await Homes(readable).of("a")
         assert found is not None

@@ -80,10 +80,13 @@ class PostgreSQLServer:
             self._server = None
 
     def empty(self) -> None:
-        """Empty the database."""
+        """Empty the database; start the server if a failed test has left it stopped."""
+        if self._server is None:
+            self.start()
         with psycopg.connect(self.url, autocommit=True, connect_timeout=5) as connection:
             connection.execute("DROP SCHEMA public CASCADE")
             connection.execute("CREATE SCHEMA public")
+            connection.execute("GRANT USAGE ON SCHEMA public TO PUBLIC")  # as in a new database
 
     def _command(self, name: str, *arguments: str) -> list[str]:
         return [str(self._binaries / name), *arguments]

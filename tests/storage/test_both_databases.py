@@ -199,19 +199,18 @@ def test_an_error_of_the_server_is_one_line() -> None:
 
 @needs_postgresql
 async def test_clients_see_no_host_of_the_database(
-    server: PostgreSQLServer, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    db_server: PostgreSQLServer, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(postgresql.limited_log, "_said", {})
-    server.empty()
-    database = open_database(tmp_path / "unused", server.url, ["a"])
+    database = open_database(tmp_path / "unused", db_server.url, ["a"])
     settings = StoredSettings(database, "a")
-    server.stop()
+    db_server.stop()
     try:
         with pytest.raises(DatabaseError) as failed:
             await settings.put("x", 1)
     finally:
-        server.start()
-    host = server.url.partition("host=")[2].partition("&")[0]
+        db_server.start()
+    host = db_server.url.partition("host=")[2].partition("&")[0]
     assert str(failed.value) == "the database cannot be reached"
     assert host in caplog.text
     with pytest.raises(DatabaseError) as failed:
@@ -222,39 +221,37 @@ async def test_clients_see_no_host_of_the_database(
 
 @needs_postgresql
 async def test_a_robot_is_served_once(
-    server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(postgresql, "CLAIM_MAX", 1)
-    server.empty()
-    one = open_database(tmp_path / "unused", server.url, ["a", "b"])
+    one = open_database(tmp_path / "unused", db_server.url, ["a", "b"])
     with pytest.raises(OSError, match="robot b is served by another program"):
-        open_database(tmp_path / "unused", server.url, ["b", "c"])
-    other = open_database(tmp_path / "unused", server.url, ["c"])
+        open_database(tmp_path / "unused", db_server.url, ["b", "c"])
+    other = open_database(tmp_path / "unused", db_server.url, ["c"])
     other.close()
     one.close()
-    open_database(tmp_path / "unused", server.url, ["b", "c"]).close()
+    open_database(tmp_path / "unused", db_server.url, ["b", "c"]).close()
 
 
 @needs_postgresql
 async def test_start_waits_for_a_dying_programs_robots(
-    server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A shard that Ray starts before the server has noticed the old machine's end need not start twice."""
     monkeypatch.setattr(postgresql, "CLAIM_MAX", 9000)
-    server.empty()
-    old = open_database(tmp_path / "unused", server.url, ["a", "b"])
-    starting = asyncio.create_task(asyncio.to_thread(open_database, tmp_path / "unused", server.url, ["b"]))
+    old = open_database(tmp_path / "unused", db_server.url, ["a", "b"])
+    starting = asyncio.create_task(asyncio.to_thread(open_database, tmp_path / "unused", db_server.url, ["b"]))
     waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
-    with psycopg.connect(server.url, autocommit=True) as connection:
+    with psycopg.connect(db_server.url, autocommit=True) as connection:
         while not starting.done() and connection.execute(waiting).fetchone() != (1,):  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     assert not starting.done()
     old.close()
     new = await starting
     await StoredSettings(new, "b").put("who", "new")
-    server.stop()  # its robots are another's when it comes back
-    server.start()
-    third = open_database(tmp_path / "unused", server.url, ["b"])
+    db_server.stop()  # its robots are another's when it comes back
+    db_server.start()
+    third = open_database(tmp_path / "unused", db_server.url, ["b"])
     monkeypatch.setattr(postgresql, "CLAIM_MAX", 1)
     with pytest.raises(DatabaseError, match="served by another program"):
         await StoredSettings(new, "b").put("who", "new again")
@@ -263,14 +260,13 @@ async def test_start_waits_for_a_dying_programs_robots(
 
 
 @needs_postgresql
-async def test_who_lost_a_robot_writes_nothing_for_it(server: PostgreSQLServer, tmp_path: Path) -> None:
-    server.empty()
-    first = open_database(tmp_path / "unused", server.url, ["a"])
+async def test_who_lost_a_robot_writes_nothing_for_it(db_server: PostgreSQLServer, tmp_path: Path) -> None:
+    first = open_database(tmp_path / "unused", db_server.url, ["a"])
     settings = StoredSettings(first, "a")
     await settings.put("who", "first")
-    server.stop()  # all connections break
-    server.start()
-    second = open_database(tmp_path / "unused", server.url, ["a"])
+    db_server.stop()  # all connections break
+    db_server.start()
+    second = open_database(tmp_path / "unused", db_server.url, ["a"])
     await StoredSettings(second, "a").put("who", "second")
     with pytest.raises(DatabaseError, match="served by another program"):
         await settings.put("who", "first again")
@@ -281,8 +277,7 @@ async def test_who_lost_a_robot_writes_nothing_for_it(server: PostgreSQLServer, 
 
 
 @needs_postgresql
-async def test_robot_moves_to_another_folder_with_its_places(server: PostgreSQLServer, tmp_path: Path) -> None:
-    server.empty()
+async def test_robot_moves_to_another_folder_with_its_places(db_server: PostgreSQLServer, tmp_path: Path) -> None:
     poi = {"id": "door", "pose": {"x": 1.0, "y": 2.0, "yaw": 0.0}, "metadata": {"display_name": "狗"}}
     for life in ("one machine", "another"):
         robot = RobotConfig("a", address=(address := free_addresses(1)))
@@ -292,7 +287,7 @@ async def test_robot_moves_to_another_folder_with_its_places(server: PostgreSQLS
                 (robot,),
                 lockstep=True,
                 data=tmp_path / life,
-                database=server.url,
+                database=db_server.url,
                 console=ConsoleConfig(enabled=False),
             )
         )

@@ -76,15 +76,14 @@ async def test_many_at_once_lose_nothing(store: CloudStore) -> None:
 
 
 @needs_postgresql
-async def test_a_restart_of_the_server_is_survived(server: PostgreSQLServer) -> None:
-    server.empty()
-    database = PostgreSQL(server.url)
+async def test_a_restart_of_the_server_is_survived(db_server: PostgreSQLServer) -> None:
+    database = PostgreSQL(db_server.url)
     store = CloudStore(database)
     token = await store.add_account("one")
-    server.stop()
+    db_server.stop()
     with pytest.raises(DatabaseError):
         await store.record("one", "dog", "lost, and said so")
-    server.start()
+    db_server.start()
     for number in range(8):
         await store.record("one", "dog", f"{number}")
     assert [document for _, document in await store.records("one", 100)] == [f"{number}" for number in range(8)]
@@ -93,14 +92,13 @@ async def test_a_restart_of_the_server_is_survived(server: PostgreSQLServer) -> 
 
 
 @needs_postgresql
-def test_newer_formats_are_left_untouched(server: PostgreSQLServer) -> None:
-    server.empty()
-    PostgreSQL(server.url).close()
-    PostgreSQL(server.url).close()  # nothing is created twice
-    with psycopg.connect(server.url) as connection:
+def test_newer_formats_are_left_untouched(db_server: PostgreSQLServer) -> None:
+    PostgreSQL(db_server.url).close()
+    PostgreSQL(db_server.url).close()  # nothing is created twice
+    with psycopg.connect(db_server.url) as connection:
         connection.execute("INSERT INTO roboglot_schema VALUES (99)")
     with pytest.raises(ValueError, match="of version 99"):
-        PostgreSQL(server.url)
+        PostgreSQL(db_server.url)
 
 
 def test_no_one_there_is_reported_in_one_line(tmp_path: Path) -> None:

@@ -157,12 +157,11 @@ async def test_robots_are_taken_at_once_all_or_none(database: Transactions, watc
 
 
 @needs_postgresql
-async def test_robots_stand_while_the_server_is_away(server: PostgreSQLServer, watch: Watch) -> None:
-    server.empty()
-    database, lost = open_database(Path(), server.url), list[str]()
+async def test_robots_stand_while_the_server_is_away(db_server: PostgreSQLServer, watch: Watch) -> None:
+    database, lost = open_database(Path(), db_server.url), list[str]()
     old = home(database, "old", watch, lost.append)
     await old.take()
-    server.stop()
+    db_server.stop()
     try:
         with pytest.raises(DatabaseError):
             await old.renew()
@@ -172,7 +171,7 @@ async def test_robots_stand_while_the_server_is_away(server: PostgreSQLServer, w
         old.look()
         assert lost == ["a", "b"]
     finally:
-        server.start()
+        db_server.start()
     await old.renew()
     assert not old.why_not("a")
     assert {h.epoch for h in (await Homes(database).all()).values()} == {1}
@@ -336,9 +335,8 @@ def wait_for_a_lock(url: str) -> None:
 
 @needs_postgresql
 @pytest.mark.parametrize("first", ["take", "renew"])
-async def test_renewal_during_a_takeover_confirms_nothing(server: PostgreSQLServer, first: str) -> None:
-    server.empty()
-    one, two = open_database(Path(), server.url), open_database(Path(), server.url)
+async def test_renewal_during_a_takeover_confirms_nothing(db_server: PostgreSQLServer, first: str) -> None:
+    one, two = open_database(Path(), db_server.url), open_database(Path(), db_server.url)
     held = Held(one)
     slow, fast = Homes(cast(Transactions, held)), Homes(two)
     await fast.take({"a": "", "b": ""}, "old", {})
@@ -351,7 +349,7 @@ async def test_renewal_during_a_takeover_confirms_nothing(server: PostgreSQLServ
     begun = asyncio.create_task(calls.pop(first)(slow))
     assert await asyncio.to_thread(held.done.wait, 20.0)
     meanwhile = asyncio.create_task(calls[second](fast))
-    await asyncio.to_thread(wait_for_a_lock, server.url)
+    await asyncio.to_thread(wait_for_a_lock, db_server.url)
     held.go.set()
     if first == "take":
         assert await begun == {"a": 2, "b": 2}
