@@ -29,6 +29,7 @@ from roboglot.console.wire_log import rows
 from roboglot.model.client_context import client, connection, identity, set_client
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Right
+from roboglot.transport.limiter import Limiter
 
 Send = Callable[[str | bytes], Awaitable[None]]
 _numbers = itertools.count(1)
@@ -94,7 +95,7 @@ class Page:
         self._boxes: list[list[object]] = []
         self._wire_at = 0
         self._requests: set[asyncio.Task[None]] = set()
-        self._allowance, self._counted_at = float(MESSAGES_PER_SECOND_MAX), time.monotonic()
+        self._rate = Limiter(MESSAGES_PER_SECOND_MAX, 2.0 * MESSAGES_PER_SECOND_MAX, time.monotonic)
         self._due = asyncio.Event()
         self._refused = ""
         self.person = identity()
@@ -198,10 +199,7 @@ class Page:
 
     def receive(self, text: str | bytes) -> None:
         """Handle a message of the page. Raises ValueError for a bad message, or for too many."""
-        now = time.monotonic()
-        self._allowance += (now - self._counted_at) * MESSAGES_PER_SECOND_MAX
-        self._allowance, self._counted_at = min(self._allowance, 2.0 * MESSAGES_PER_SECOND_MAX) - 1.0, now
-        if self._allowance < 0.0:
+        if not self._rate.take(""):
             raise ValueError("too many messages")
         match msgspec.json.decode(text, type=Message):
             case Ping(at=at):

@@ -134,7 +134,7 @@ class Session:
         self._trial = Trial(self.post)
         self._seat = classroom.seat(self.post)
         self._drawn = -DRAW_EVERY
-        self._allowance, self._counted_at = 2.0 * MESSAGES_PER_SECOND_MAX, time.monotonic()
+        self._rate = Limiter(MESSAGES_PER_SECOND_MAX, 2.0 * MESSAGES_PER_SECOND_MAX, time.monotonic)
 
     async def run(self) -> None:
         """Send until cancelled."""
@@ -198,10 +198,7 @@ class Session:
 
     def receive(self, text: str | bytes) -> None:
         """Handle a message of the page. Raises ValueError for a bad message, or for too many."""
-        now = time.monotonic()
-        self._allowance += (now - self._counted_at) * MESSAGES_PER_SECOND_MAX
-        self._allowance, self._counted_at = min(self._allowance, 2.0 * MESSAGES_PER_SECOND_MAX) - 1.0, now
-        if self._allowance < 0.0:
+        if not self._rate.take(""):
             raise ValueError("too many messages")
         message = _decode(text)
         if isinstance(message, Open):
