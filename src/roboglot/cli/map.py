@@ -65,35 +65,49 @@ def command(
     world: Annotated[str, typer.Option(help="For survey: the world whose floors are drawn.")] = "office",
 ) -> None:
     """Give a robot a map, write its map to a file, build one from a log, or merge the maps of several floors."""
+    floors = floor or []
     try:
-        if way is Way.BUILD:
-            from roboglot.cli.maps.build import build  # it needs the kernels
+        match way:
+            case Way.BUILD:
+                from roboglot.cli.maps.build import build  # it needs the kernels
 
-            build(ros_map, out, relations)
-        elif way is Way.MERGE:
-            ros_map.write_bytes(merged(floor or (), building, lambda address: _call(address, "GET", STCM)))
-            print(f"{', '.join(floor or ())} -> {ros_map}")
-        elif way is Way.SURVEY:
-            description = load_world(world)
-            ros_map.write_bytes(surveyed(description))
-            pose = ",".join(f"{value:.3f}" for value in astuple(first_pose(description, RADIUS)))
-            print(f"{world} -> {ros_map}; its first robot wakes up there at --pose {pose}")
-        elif way is Way.IMPORT:
-            data = _read(ros_map)
-            if file:
-                file.write_bytes(data)
-            else:
-                _give(robot, data, pose)
-            print(f"{ros_map} -> {file or robot}")
-        else:
-            data = file.read_bytes() if file else _call(robot, "GET", STCM)
-            if ros_map.suffix == COMPOSITE:
-                ros_map.write_bytes(data)
-            else:
-                write_ros_map(grid_in(data), ros_map)
-            print(f"{file or robot} -> {ros_map}")
+                build(ros_map, out, relations)
+            case Way.MERGE:
+                ros_map.write_bytes(merged(floors, building, lambda address: _call(address, "GET", STCM)))
+                print(f"{', '.join(floors)} -> {ros_map}")
+            case Way.SURVEY:
+                _survey(world, ros_map)
+            case Way.IMPORT:
+                _import(ros_map, robot, file, pose)
+            case Way.EXPORT:
+                _export(robot, file, ros_map)
     except (ValueError, OSError) as error:  # BadMap, BadFile and the like carry plain messages
         sys.exit(f"roboglot map: {in_words(error)}")
+
+
+def _survey(world: str, target: Path) -> None:
+    description = load_world(world)
+    target.write_bytes(surveyed(description))
+    pose = ",".join(f"{value:.3f}" for value in astuple(first_pose(description, RADIUS)))
+    print(f"{world} -> {target}; its first robot wakes up there at --pose {pose}")
+
+
+def _import(source: Path, robot: str, file: Path | None, pose: str) -> None:
+    data = _read(source)
+    if file:
+        file.write_bytes(data)
+    else:
+        _give(robot, data, pose)
+    print(f"{source} -> {file or robot}")
+
+
+def _export(robot: str, file: Path | None, target: Path) -> None:
+    data = file.read_bytes() if file else _call(robot, "GET", STCM)
+    if target.suffix == COMPOSITE:
+        target.write_bytes(data)
+    else:
+        write_ros_map(grid_in(data), target)
+    print(f"{file or robot} -> {target}")
 
 
 def _read(path: Path) -> bytes:

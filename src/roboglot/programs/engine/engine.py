@@ -132,28 +132,12 @@ class Engine:
         if len(modules) > MODULES_MAX:
             raise ValueError(f"more than {MODULES_MAX} modules")
         program = Program((source, *modules.values()), ("", *modules))
-        request = {
-            "t": "run",
-            "units": [unit.encode("utf-8", "replace").decode() for unit in program.units],
-            "prelude": prelude.to_wire(),
-            "policy": self._policy,
-            "recursion": limits.recursion,
-            "watched": stops is not None,
-            "seed": secrets.randbits(63) if seed is None else seed,
-        }
-        body = _body(request)
+        body = self._run_request(program, prelude, limits, watched=stops is not None, seed=seed)
         memory, page = _shared_memory(program.places.memory()), None
         try:
             page = Page(memory, program.places)
-            run = Run(
-                program,
-                prelude.callable_names(),
-                limits,
-                page,
-                history,
-                watched=stops is not None,
-                share=self._share,
-            )
+            names = prelude.callable_names()
+            run = Run(program, names, limits, page, history, watched=stops is not None, share=self._share)
             if stops is not None:
                 run.position.stop_at(stops.lines)
                 if stops.first:
@@ -171,6 +155,21 @@ class Engine:
         worker.died.add_done_callback(lambda _: self._runs.discard(run))
         asyncio.get_running_loop().call_later(STEPS_BACK_AFTER, self._step_back, worker)
         return run
+
+    def _run_request(
+        self, program: Program, prelude: Prelude, limits: Limits, *, watched: bool, seed: int | None
+    ) -> bytes:
+        return _body(
+            {
+                "t": "run",
+                "units": [unit.encode("utf-8", "replace").decode() for unit in program.units],
+                "prelude": prelude.to_wire(),
+                "policy": self._policy,
+                "recursion": limits.recursion,
+                "watched": watched,
+                "seed": secrets.randbits(63) if seed is None else seed,
+            }
+        )
 
     async def check(
         self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()

@@ -142,35 +142,19 @@ def action_states(states: Iterable[ActionState], version: Version) -> list[dict[
 
 def factsheet(robot: Robot, version: Version, state_period: float, visualization_period: float) -> dict[str, object]:
     """Return the factsheet, which describes the robot before any order."""
-    new, plate = version.new_words, robot.description
-    limits = robot[Base].limits if Base in robot else None
-    speed = limits.twist.x if limits else 0.0
-    brake = limits.linear_acceleration if limits else 0.0
-    across = round(2 * plate.radius, 3)
+    new = version.new_words
     robot_word = "mobileRobot" if new else "agv"
-    kinematics = "OMNIDIRECTIONAL" if limits and limits.holonomic else "DIFFERENTIAL"
-    if not new:
-        kinematics = {"OMNIDIRECTIONAL": "OMNI", "DIFFERENTIAL": "DIFF"}[kinematics]
     return {
         "typeSpecification": {
-            "seriesName": plate.model,
-            f"{robot_word}Kinematics" if new else "agvKinematic": kinematics,
+            "seriesName": robot.description.model,
+            f"{robot_word}Kinematics" if new else "agvKinematic": _kinematics(robot, new),
             f"{robot_word}Class": "CARRIER",
             "maximumLoadMass" if new else "maxLoadMass": 0.0,
             "localizationTypes": ["NATURAL"],
             "navigationTypes": ["FREELY_NAVIGATING" if new else "AUTONOMOUS"],
             **({"supportedZones": []} if new else {}),
         },
-        "physicalParameters": {
-            "minimumSpeed" if new else "speedMin": 0.0,
-            "maximumSpeed" if new else "speedMax": speed,
-            "maximumAcceleration" if new else "accelerationMax": brake,
-            "maximumDeceleration" if new else "decelerationMax": brake,
-            "minimumHeight" if new else "heightMin": plate.height,
-            "maximumHeight" if new else "heightMax": plate.height,
-            "width": across,
-            "length": across,
-        },
+        "physicalParameters": _physical_parameters(robot, new),
         "protocolLimits": _limits(new, state_period, visualization_period),
         "protocolFeatures": {
             "optionalParameters": [
@@ -184,6 +168,28 @@ def factsheet(robot: Robot, version: Version, state_period: float, visualization
         },
         f"{robot_word}Geometry": {},
         "loadSpecification": {"loadPositions": [JACK_POSITION]} if Jack in robot else {},
+    }
+
+
+def _kinematics(robot: Robot, new: bool) -> str:
+    if Base in robot and robot[Base].limits.holonomic:
+        return "OMNIDIRECTIONAL" if new else "OMNI"
+    return "DIFFERENTIAL" if new else "DIFF"
+
+
+def _physical_parameters(robot: Robot, new: bool) -> dict[str, float]:
+    limits, description = robot[Base].limits if Base in robot else None, robot.description
+    speed, acceleration = (limits.twist.x, limits.linear_acceleration) if limits else (0.0, 0.0)
+    across = round(2 * description.radius, 3)
+    return {
+        "minimumSpeed" if new else "speedMin": 0.0,
+        "maximumSpeed" if new else "speedMax": speed,
+        "maximumAcceleration" if new else "accelerationMax": acceleration,
+        "maximumDeceleration" if new else "decelerationMax": acceleration,
+        "minimumHeight" if new else "heightMin": description.height,
+        "maximumHeight" if new else "heightMax": description.height,
+        "width": across,
+        "length": across,
     }
 
 

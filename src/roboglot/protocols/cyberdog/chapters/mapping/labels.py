@@ -119,14 +119,8 @@ async def set_labels(
     names = [label.labelName for label in labels]
     try:
         stored = await library.get(mapName or await _numbered(library, map_id))
-        if only_delete and not names:
-            await library.remove(stored.name)
-            if context.stored_map == stored.name or not await library.names():
-                context.map_gone()
-        elif only_delete:
-            if missing := set(names) - {label.name for label in stored.labels}:
-                raise NotFound(f"there is no label {missing}")
-            await library.put(replace(stored, labels=tuple(x for x in stored.labels if x.name not in names)))
+        if only_delete:
+            await _delete(context, library, stored, names)
         elif len(names) > LABELS_MAX or len(set(names)) < len(names) or not all(x.valid for x in labels):
             return call.refused({"success": 1}, f"at most {LABELS_MAX} labels, each with a name of its own and a place")
         else:
@@ -136,6 +130,18 @@ async def set_labels(
     except NotFound as error:
         return call.refused({"success": 1}, str(error))
     return {"success": 0}
+
+
+async def _delete(context: Context, library: MapLibrary, stored: StoredMap, names: list[str]) -> None:
+    """Delete the labels of these names; without names, the map. Raises NotFound."""
+    if not names:
+        await library.remove(stored.name)
+        if context.stored_map == stored.name or not await library.names():
+            context.map_gone()
+        return
+    if missing := set(names) - {label.name for label in stored.labels}:
+        raise NotFound(f"there is no label {missing}")
+    await library.put(replace(stored, labels=tuple(x for x in stored.labels if x.name not in names)))
 
 
 async def _numbered(library: MapLibrary, number: int) -> str:
