@@ -60,7 +60,7 @@ def test_a_network_is_not_opened_without_a_word(tmp_path: Path) -> None:
     assert not (tmp_path / "data").exists()
 
 
-def test_what_is_open_is_said_in_red(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_open_doors_are_reported_in_red(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
     warn_if_open(Config(robots=(RobotConfig("a", "universal", "0.0.0.0"), RobotConfig("b", "cyberdog2", "127.0.0.1"))))
     said = capsys.readouterr().err

@@ -29,7 +29,7 @@ WIDE = {  # classes with more, and why
 }
 GENERATED = ("_pb2.py", "_pb2_grpc.py")
 WORDS_MAX = 5  # in 10,000 lines
-RIDDLES = set(re.findall(r"\w+", "how if nobody now what when where whether which who whoever whom whose why"))
+RIDDLES = set(re.findall(r"\w+", "how if nobody now what whatever when where whether which who whoever whom whose why"))
 SUBJECT = re.compile(r"(?=.{1,60}$)[a-z][\w ,./-]*: [a-z].*[^.]")  # of a commit
 HEADING = re.compile("#+ [^`]*$")
 HEADING_MAX = 80  # a longer one has swallowed its paragraph
@@ -124,10 +124,19 @@ def test_no_class_is_wide() -> None:
     assert wide == WIDE.keys()
 
 
+def names_of_tests() -> set[str]:
+    """Names of all tests."""
+    return {name for path in TESTS for name, _ in functions(path) if name.startswith("test_")}
+
+
 def test_names_of_tests_are_short() -> None:
     """A name says the behaviour, not its whole story: that stands in the docstring."""
-    names = {name for path in TESTS for name, _ in functions(path) if name.startswith("test_")}
-    assert {name for name in names if len(name.split("_")) - 1 > NAME_MAX} == set()
+    assert {name for name in names_of_tests() if len(name.split("_")) - 1 > NAME_MAX} == set()
+
+
+def test_names_of_tests_begin_with_the_subject() -> None:
+    """As docstrings do: "invalid goals are refused", not "what cannot be is refused"."""
+    assert {name for name in names_of_tests() if name.split("_")[1] in RIDDLES} == set()
 
 
 @pytest.mark.parametrize("texts", [SOURCES, PAGES, TESTS, TOOLS], ids=["src", "docs", "tests", "tools"])

@@ -51,5 +51,5 @@ async def knows_without(robot: Robot) -> object:
     return robot[Gimbal] if Gimbal in robot else robot[Base]
 
 
-def test_what_is_asked_for_is_optional() -> None:
+def test_components_tested_for_are_optional() -> None:
     assert used_by(knows_without) == {Base}

@@ -21,7 +21,7 @@ def test_every_operation_declares_its_right(door: DoorType) -> None:
     assert [operation.key for operation in door.table() if operation.right is None] == []
 
 
-def test_what_moves_the_robot_needs_more_than_sight() -> None:
+def test_moving_the_robot_needs_more_than_see() -> None:
     for table, key in (
         (REST, "POST /api/core/motion/v1/actions"),
         (REST, "POST /api/delivery/v1/tasks"),

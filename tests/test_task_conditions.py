@@ -48,7 +48,7 @@ def test_only_now_is_now() -> None:
         *("* * * * *", "now; reboot", "now\n-f x", "１2:00", "now + 99999days", "now" + " " * 300),
     ],
 )
-def test_what_is_no_moment_is_refused(text: str) -> None:
+def test_invalid_moments_are_refused(text: str) -> None:
     with pytest.raises(BadCondition):
         parse_moment(text)
 
@@ -88,7 +88,7 @@ def test_restricted_days_are_distinguished_from_free_ones() -> None:
         *("* * * *", "* * * jan *", "* * * * * *", "-1 * * * *", "1,,2 * * * *", "1- * * * *"),
     ],
 )
-def test_what_is_no_cycle_is_refused(text: str) -> None:
+def test_invalid_cycles_are_refused(text: str) -> None:
     with pytest.raises(BadCondition):
         parse_cycle(text)
 
@@ -110,6 +110,6 @@ def test_a_module_is_called_by_its_interface(text: str, interface: Interface) ->
     "text",
     ["2foo()", "foo(a=1)", "foo(,ab)", "foo(ab,)", "foo", "def()", "foo(a, a)", "foo(*a)", "foo(a b)", "foo()\nx()"],
 )
-def test_what_is_no_interface_is_refused(text: str) -> None:
+def test_invalid_interfaces_are_refused(text: str) -> None:
     with pytest.raises(BadCondition):
         parse_interface(text)

@@ -144,7 +144,7 @@ def test_nothing_is_compiled_before_it_is_used() -> None:
 
 
 @BOTH
-def test_what_the_library_refuses_is_refused(dataclass: Callable[..., Any]) -> None:
+def test_invalid_dataclasses_are_refused_as_by_the_library(dataclass: Callable[..., Any]) -> None:
     @dataclass(frozen=True)
     class Fixed:
         x: int = 1

@@ -246,7 +246,9 @@ async def test_token_made_just_now_is_valid_at_once(data: Path, monkeypatch: pyt
         other.close()
 
 
-async def test_what_changed_and_what_was_refused_is_kept(runtime: Runtime, store: AccessStore, data: Path) -> None:
+async def test_audit_keeps_changes_and_refusals_without_secrets(
+    runtime: Runtime, store: AccessStore, data: Path
+) -> None:
     secrets = [store.add_machine("cell", [Grant("a", DRIVE)]), "a wrong password"]
     guard_of(runtime).reload()
     async with httpx.AsyncClient(base_url=REST, headers={"authorization": f"Bearer {secrets[0]}"}) as client:
@@ -267,7 +269,7 @@ async def test_what_changed_and_what_was_refused_is_kept(runtime: Runtime, store
         assert not any(secret.encode() in path.read_bytes() for secret in secrets), path
 
 
-async def test_what_the_console_changes_is_kept(runtime: Runtime, store: AccessStore, data: Path) -> None:
+async def test_audit_keeps_changes_by_the_console(runtime: Runtime, store: AccessStore, data: Path) -> None:
     token, seer = store.add_machine("cell", [Grant("a", DRIVE)]), store.add_machine("eye", [Grant("a", SEE)])
     teacher = store.add_machine("boss", [Grant("*", frozenset({Right.ADMIN}))])
     guard_of(runtime).reload()

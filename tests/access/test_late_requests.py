@@ -33,7 +33,7 @@ REST, CONSOLE = "/api/core/motion/v1/actions", "/api/robots/a/go_to"
 
 @pytest.mark.parametrize(("path", "body"), [(REST, GO), (CONSOLE, {"points": [[3.0, 0.0]]})])
 @pytest.mark.parametrize("rotated", [False, True])
-async def test_what_comes_after_the_right_starts_nothing(
+async def test_request_completed_after_revocation_starts_nothing(
     runtime: Runtime, store: AccessStore, path: str, body: dict[str, object], rotated: bool
 ) -> None:
     token = store.add_machine("cell", [Grant("a", MAY_ALL)])

@@ -131,7 +131,7 @@ async def hold(page: ClientConnection) -> None:
 
 
 @pytest.mark.parametrize("way", [by_rest, by_text, by_gait, by_program, by_hand])
-async def test_what_a_revoked_client_does_stops(
+async def test_actions_of_a_revoked_client_stop(
     way: Callable[[Runtime, Path], AbstractAsyncContextManager[tuple[str, Gone]]],
     runtime: Runtime,
     store: AccessStore,

@@ -103,7 +103,7 @@ def test_programs_that_write_at_once_keep_one_chain(tmp_path: Path, url: str) ->
         assert [number for number, _ in trail.rows(after=118)] == [119, 120]
 
 
-def test_what_clients_send_does_not_stop_the_audit(tmp_path: Path, url: str) -> None:
+def test_audit_accepts_any_text_from_clients(tmp_path: Path, url: str) -> None:
     with open_trail(tmp_path, url) as trail:
         trail.add([Entry(1.5, ODD, ODD, ODD, ODD, ODD, ODD, 100 * ODD, 7), note(2)])
         [(_, odd), (_, plain)] = trail.rows()

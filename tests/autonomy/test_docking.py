@@ -49,7 +49,7 @@ async def test_on_the_dock_there_is_nothing_to_do(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_where_no_dock_is_none_is_found(tour: Tour) -> None:
+async def test_no_dock_is_found_in_an_empty_place(tour: Tour) -> None:
     await tour.go((5.0, 5.0))
     tour.robot[Docking].set_home(Pose(*_xy(tour, 5.0, 7.0), 1.0))
     action = await tour.end_of(tour.robot[Docking].dock())

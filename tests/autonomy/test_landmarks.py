@@ -84,7 +84,7 @@ def test_a_pose_moves_only_where_it_is_unsure():
 
 @pytest.mark.slow  # the arithmetic: test_a_pose_moves_only_where_it_is_unsure
 @pytest.mark.world(PASSAGE)
-async def test_they_tell_how_far_along_a_bare_passage(tour):
+async def test_landmarks_fix_the_place_along_a_passage(tour):
     await tour.robot[LaserLandmarks].set_updating(False)
     marks = [PointOfInterest(str(n), Pose(p.x, p.y)) for n, p in enumerate(map(tour.on_map, *zip(*BARE, strict=True)))]
     await tour.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks)))

@@ -169,7 +169,7 @@ async def test_accepts_steps_by_their_tread_without_lidar(stand: Make) -> None:
     assert_pose(dog.world.truth.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3.0)
 
 
-async def test_called_off_midway_it_stands(stand: Make) -> None:
+async def test_cancelled_alignment_leaves_the_dog_standing(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.75, 15.0, 0.0)
     action = dog.alignment.align(UP)
@@ -246,7 +246,7 @@ async def test_nothing_begins_after_an_emergency_stop(stand: Make) -> None:
         dog.alignment.align(UP)
 
 
-async def test_who_lies_gets_up_first(stand: Make) -> None:
+async def test_lying_dog_gets_up_first(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.7, 10.0, 0.0)
     await dog.ended(dog.robot[Legs].lie_down())

@@ -68,7 +68,7 @@ def test_without_a_lidar_a_tread_must_be_seen() -> None:
         np.empty((0, 3)),
     ],
 )
-def test_what_is_no_step(points: np.ndarray) -> None:
+def test_points_without_a_step_give_no_edge(points: np.ndarray) -> None:
     assert find_riser(placed(points, 0.6, 0.0), np.empty((0, 2))) is None
 
 
@@ -92,7 +92,7 @@ def test_mixed_floor_and_abyss_are_no_edge() -> None:
     assert find_drop(np.empty((0, 2)), points) is None
 
 
-def test_a_drop_tells_how_far_it_reaches() -> None:
+def test_reach_of_a_drop_is_found() -> None:
     x, y = np.meshgrid(np.arange(-0.2, 0.2, 0.02), np.linspace(-0.4, 0.4, 41))
     ground = np.stack((x.ravel() + 0.6, y.ravel()), axis=-1)
     lost = (ground[:, 0] > 0.6) | (ground[:, 1] < -0.3)

@@ -110,7 +110,7 @@ async def test_a_tag_of_another_number_is_not_taken(tour):
 
 
 @pytest.mark.world(WORLD, body="hermes")
-async def test_what_cannot_be_is_refused(tour):
+async def test_impossible_goals_are_refused(tour):
     docking = tour.robot[TagDocking]
     for goal in (
         MarkGoal(mark=Mark.BOARD, place=Point(0.2)),

@@ -22,7 +22,7 @@ def round_thing(x: float, y: float, radius: float = 0.2) -> np.ndarray:
 
 
 @given(places, places, st.floats(0.05, 0.3))
-def test_what_stands_alone_is_found_in_its_middle(x: float, y: float, radius: float) -> None:
+def test_isolated_things_are_found_at_their_middle(x: float, y: float, radius: float) -> None:
     points = np.concatenate([WALL, round_thing(x, y, radius)])
     found = thing_at(points, Point(x - radius, y))
     assert found

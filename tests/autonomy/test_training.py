@@ -27,13 +27,13 @@ async def test_a_word_said_three_times(robot, world, forward):
     assert robot[TrainingWords].all() == [TrainedWord("abracadabra", "wave_task")]
 
 
-async def test_no_one_said_anything(robot, forward):
+async def test_training_expires_without_speech(robot, forward):
     teaching = robot[TrainingWords].teach("x", seconds=2.0)
     await forward(seconds=3)
     assert isinstance(teaching.error, Expired)
 
 
-async def test_what_is_known_can_be_replaced_and_forgotten(robot):
+async def test_known_words_can_be_replaced_and_forgotten(robot):
     words = robot[TrainingWords]
     for word in (TrainedWord("a", "1"), TrainedWord("b", "2"), TrainedWord("a", "3")):
         await words.learn(word)

@@ -239,7 +239,7 @@ async def test_hands_break_and_mend_the_robot(served: Served, open_console: Open
     await served.clock.advance(0.2)
 
 
-async def test_what_stands_in_the_world_is_dragged_elsewhere(served: Served, open_console: OpenConsole) -> None:
+async def test_things_in_the_world_can_be_dragged(served: Served, open_console: OpenConsole) -> None:
     hands = served.runtime.fleet.world.hands
     before = hands.robots[0].pose
     page = await open_console(view="world")

@@ -36,7 +36,7 @@ async def announced(page: Any, words: str) -> None:
     await page.evaluate("window.heard.length = 0")
 
 
-async def test_a_run_and_its_halts_are_told(studio: Open) -> None:
+async def test_runs_and_halts_are_announced(studio: Open) -> None:
     page = await loaded(await studio(), COUNTING)
     await page.evaluate(LISTEN)
     await page.evaluate("studio.editor.toggleBreak('say')")
@@ -60,7 +60,7 @@ async def test_a_run_and_its_halts_are_told(studio: Open) -> None:
     assert page.errors == []
 
 
-async def test_messages_of_a_window_are_told_in_it(studio: Open) -> None:
+async def test_messages_of_a_window_are_announced_in_it(studio: Open) -> None:
     page = await loaded(await studio(language="zh"), COUNTING)
     await page.click("button[aria-label=何时运行]")
     await until(page, "document.querySelector('dialog[open]')")

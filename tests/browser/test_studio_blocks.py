@@ -79,12 +79,12 @@ async def test_functions_are_called_with_their_block_s_values(played: dict[str, 
         assert {key: _plain(value) for key, value in values.items()} == wanted, name
 
 
-async def test_what_was_kept_writes_the_same_program(played: dict[str, Any]) -> None:
+async def test_reopened_blocks_write_the_same_program(played: dict[str, Any]) -> None:
     assert played["code"] == played["again"]
     assert played["said"] == []
 
 
-async def test_what_is_loaded_quickly_looks_the_same(page: Any) -> None:
+async def test_quick_loading_draws_the_same_blocks(page: Any) -> None:
     found = await page.evaluate(TOGETHER)
     assert found["elements"] > 1000
     assert found["moved"] == []

@@ -47,7 +47,7 @@ def test_refused_requests_are_listed_with_their_reason(text: str) -> None:
             assert listed == sum(int(of) - int(done) for done, of in cells), (protocol, name)
 
 
-def test_what_drivers_announce_is_what_they_add(text: str) -> None:
+def test_drivers_add_the_components_they_announce(text: str) -> None:
     """Components except those that autonomy adds, and those that only some robots have."""
     for name in DRIVERS:
         assert f"## Approximate parts of `{name}`" in text

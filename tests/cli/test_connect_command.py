@@ -102,7 +102,7 @@ def test_addresses_follow_one_another() -> None:
         (["127.0.0.1", "--robot", "a", "--robot", "a"], "a robot is named twice"),
     ],
 )
-def test_what_cannot_be_connected_ends_with_reasons(
+def test_failed_connections_end_with_their_reasons(
     arguments: list[str], reason: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROBOGLOT_TOKEN", "token")
@@ -111,7 +111,7 @@ def test_what_cannot_be_connected_ends_with_reasons(
     assert reason in f"{ended.output}{ended.exception}"
 
 
-def test_how_to_have_address_of_others_is_explained(tmp_path: Path) -> None:
+def test_another_robots_address_is_explained(tmp_path: Path) -> None:
     data = tmp_path / "data"
     store = open_store(data)
     token = store.add_machine("cell", [Grant("*", frozenset({Right.SEE}))])

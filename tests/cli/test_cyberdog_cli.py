@@ -65,7 +65,7 @@ def test_photo_that_cannot_be_written_is_not_taken(run: Run, tmp_path: Path) -> 
         assert failed.stderr.startswith("roboglot cyberdog: cannot write ")
 
 
-def test_go_tells_the_way_and_map_saves(run: Run) -> None:
+def test_go_reports_arrival_and_map_saves(run: Run) -> None:
     went = run("go", "0.6", "0.0")
     assert "308 arrived" in went.stdout
     far = run("go", "-300", "300")

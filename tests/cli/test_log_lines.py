@@ -103,7 +103,7 @@ def test_running_out_of_files_is_reported_once(caplog: pytest.LogCaptureFixture)
     assert not ran_out(OSError(errno.ECONNRESET, ""))
 
 
-async def test_what_happens_in_world_belongs_to_a_robot() -> None:
+async def test_world_events_are_logged_with_their_robot() -> None:
     database, clock = Database(":memory:"), LockstepClock()
     fleet = build_fleet("empty", [RobotConfig(name="a"), RobotConfig(name="b")], clock=clock, seed=1, database=database)
     heard: dict[str, set[str]] = {}

@@ -143,7 +143,7 @@ async def test_merged_floors_are_floors_of_the_robot(
         (["1F=m.yaml", "2F=http://127.0.0.1:9"], "does not answer"),
     ],
 )
-def test_what_cannot_be_merged_is_one_sentence(
+def test_failed_merge_is_one_sentence(
     floors: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_ros_map(GRID, tmp_path / "m.yaml")

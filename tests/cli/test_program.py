@@ -140,7 +140,7 @@ async def test_modules_and_lists_for_machines(shell: Shell) -> None:
     assert (await shell.call("save", path, "--json")).status == 2
 
 
-async def test_the_list_tells_what_runs_take(shell: Shell) -> None:
+async def test_list_shows_the_use_of_running_programs(shell: Shell) -> None:
     process = await shell.begin("run", shell.file("t.py", "print('on')\nwhile True:\n    pass\n"))
     assert process.stdout
     assert await asyncio.wait_for(process.stdout.readline(), PATIENCE) == b"on\n"

@@ -42,9 +42,7 @@ def test_networks_are_expanded_within_bounds() -> None:
         list(expand(["nowhere"]))
 
 
-def test_what_scan_prints_can_be_copied_into_shell(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_scan_prints_a_line_for_the_shell(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     async def find(hosts: list[str], seconds: float) -> AsyncIterator[scan.Found]:
         yield scan.Found("cyberdog://10.0.0.9?certs=DIR", "CyberDog 2")
 
@@ -89,7 +87,7 @@ async def test_robomasters_that_broadcast_are_reported(monkeypatch: pytest.Monke
     assert [robot.url async for robot in scan.find([], 0.0)] == ["robomaster://10.0.0.5"]
 
 
-async def test_a_mirror_shows_what_the_robot_tells(door: SlamwareDoor, clock: LockstepClock, forward: Forward) -> None:
+async def test_mirror_shows_the_robots_reports(door: SlamwareDoor, clock: LockstepClock, forward: Forward) -> None:
     database = Database(":memory:")
     robots = [RobotConfig("b", f"slamware://127.0.0.1:{door.port}")]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)

@@ -48,7 +48,7 @@ def test_a_default_start_has_no_weak_spot(data: Path) -> None:
     assert not any("127.0.0.1:8765" in each for each in seen)
 
 
-def test_what_is_open_is_named(data: Path) -> None:
+def test_weak_settings_are_named(data: Path) -> None:
     found = weak(Config(robots=OUTSIDE, data=data, insecure=True))
     assert "--access" in found["open to everyone"]
     access = AccessConfig(on=True, gateway="0.0.0.0:50090")

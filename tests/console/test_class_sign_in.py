@@ -91,7 +91,7 @@ async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path, monkeypatch:
     await classes.close()
 
 
-async def test_an_old_class_lets_nobody_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_old_class_admits_no_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The class is closed until its teacher is back."""
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     asking = AccessConfig(on=True, local=True)

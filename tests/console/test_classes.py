@@ -159,7 +159,7 @@ async def test_a_world_that_ends_leaves_the_class(tmp_path: Path, monkeypatch: p
         assert "out of reach" in (await teacher.kind("refused"))["why"]
 
 
-async def test_what_was_handed_in_outlives_the_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_handed_in_work_survives_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     async with world(tmp_path, "w", ADDRESS, shared=False) as shown, page(shown) as teacher, page(shown) as anna:
         code = await opened(teacher)

@@ -130,7 +130,7 @@ def printing(pattern: str) -> str:
         ('allowed = ["forever", "cyberdog.motion.go"]' + TEN_LINES, "no function 'cyberdog.motion.go'"),
     ],
 )
-async def test_what_is_no_mission_is_refused_in_words(wrong: str, why: str, tmp_path: Path) -> None:
+async def test_bad_missions_are_refused_with_the_reason(wrong: str, why: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=why):
         read(wrong)
     (tmp_path / "bad.toml").write_text(wrong, "utf-8")

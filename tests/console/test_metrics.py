@@ -61,7 +61,7 @@ async def test_requests_answers_and_refusals_are_counted_by_operation(shown: Sho
     assert list(refused.values()) == [1.0]
 
 
-async def test_what_a_client_invents_is_no_label(shown: Shown) -> None:
+async def test_unknown_commands_become_no_labels(shown: Shown) -> None:
     await scraped(shown)
     await say("command;", *(f"nonsense{number} now;" for number in range(20)))
     text = " ".join(map(str, await scraped(shown)))

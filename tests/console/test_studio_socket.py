@@ -149,7 +149,7 @@ async def test_page_lights_only_blocks_of_its_own_program(shown: Shown) -> None:
         assert heard == [["frame", "log"], [], ["frame", "log"]]
 
 
-async def test_what_is_wrong_is_said_while_typing(shown: Shown) -> None:
+async def test_problems_are_reported_while_typing(shown: Shown) -> None:
     async with page(shown) as studio:
         await studio.say(type="check", id=1, body="cyberdog.motion.trun(90)\n")
         [problem] = (await studio.kind("checked"))["problems"]
@@ -322,7 +322,7 @@ async def test_names_alone_do_not_fill_a_class(shown: Shown, monkeypatch: pytest
         {"do": "erase"},
     ],
 )
-async def test_wishes_of_a_class_are_bounded(shown: Shown, wish: dict[str, object]) -> None:
+async def test_requests_of_a_class_are_bounded(shown: Shown, wish: dict[str, object]) -> None:
     async with page(shown) as hostile, page(shown) as other:
         await hostile.say(type="class", **wish)
         with pytest.raises(ConnectionClosed):

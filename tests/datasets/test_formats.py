@@ -113,7 +113,7 @@ def test_tables_may_hold_a_reference(tmp_path: Path) -> None:
     assert [item.reference for item in recording.scans] == POSES
 
 
-def test_what_is_not_read_is_counted(tmp_path: Path) -> None:
+def test_unread_lines_are_counted(tmp_path: Path) -> None:
     assert read_drive_log(carmen(tmp_path / "drive.log")).unread == {"lines of SONAR": 12, "broken lines of FLASER": 1}
 
 

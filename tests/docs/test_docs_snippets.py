@@ -71,7 +71,7 @@ async def test_cameras_and_sounds(
 
 
 @pytest.mark.world("playground")
-async def test_what_robots_see(robot: Robot, clock: LockstepClock) -> None:
+async def test_perception_snippet_runs(robot: Robot, clock: LockstepClock) -> None:
     kinds = {kind.__name__: kind for kind in (Vision, Hearing, Reflectors)}
     await run(snippet("worlds/perception.md", "Vision].markers"), clock, robot=robot, **kinds)
 

@@ -32,7 +32,7 @@ def same(one: Robot, other: Robot) -> bool:
     return {p.id: p for p in one[Places].all()} == {p.id: p for p in other[Places].all()}
 
 
-async def test_what_changes_on_one_side_changes_on_other(
+async def test_changes_on_either_side_reach_the_other(
     robot: Robot, slamware_door: SlamwareDoor, drive: Drive, until: Until, forward: Forward
 ) -> None:
     far = robot[Places]

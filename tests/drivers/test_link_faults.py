@@ -328,7 +328,7 @@ async def test_dogs_reckoned_pose_stands_when_its_frames_do(
 
 
 @pytest.mark.parametrize("back", ["cyberdog"])
-async def test_what_clients_receive_names_no_files(
+async def test_errors_for_clients_name_no_files(
     back: str, way: Rig, connect: Connect, rest: OpenRest, tmp_path: Path
 ) -> None:
     async with connect() as driven:

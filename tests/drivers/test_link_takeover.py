@@ -57,7 +57,7 @@ async def test_task_still_running_at_reconnection_is_stopped(
 
 
 @pytest.mark.parametrize("back", ["slamware"])
-async def test_what_is_ours_is_never_taken_for_anothers(back: str, way: Rig, connect: Connect, world: World) -> None:
+async def test_own_action_is_not_taken_for_anothers(back: str, way: Rig, connect: Connect, world: World) -> None:
     async with connect() as driven:
         way.fault.late = b"MoveByAction", 0.4  # the robot reports its number before this answer makes it ours
         with driven.events.subscribe(LinkChanged) as reported:

@@ -49,15 +49,15 @@ async def both_ends(kind: str, robot: Robot, driven: Robot, forward: Forward) ->
     assert not driven.tap.watched
 
 
-async def test_both_ends_of_rest_tell_the_same(driven: Robot, robot: Robot, forward: Forward) -> None:
+async def test_both_ends_of_rest_note_the_same(driven: Robot, robot: Robot, forward: Forward) -> None:
     await both_ends("slamware", robot, driven, forward)
 
 
-async def test_both_ends_of_text_protocol_tell_same(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
+async def test_both_ends_of_text_note_the_same(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
     await both_ends("robomaster", robot, driven_ep, forward)
 
 
-async def test_an_answer_that_does_not_come_is_told(clock: LockstepClock) -> None:
+async def test_missing_answers_are_noted(clock: LockstepClock) -> None:
     tap, heard = Tap("a", clock), list[Exchange]()
     tap.listen(heard.append)
     client = SlamwareClient("127.0.0.1", 9, clock=clock)

@@ -88,7 +88,7 @@ async def test_every_door_opens_for_an_absent_robot(
     database.close()
 
 
-def test_robots_without_a_serial_number_are_told_apart(clock: LockstepClock) -> None:
+def test_robots_without_a_serial_number_differ(clock: LockstepClock) -> None:
     assert device_id(Robot("a", UNKNOWN, clock)) != device_id(Robot("b", UNKNOWN, clock))
 
 

@@ -123,7 +123,7 @@ def test_memory_does_not_grow_with_requests(pair: ServedRobot) -> None:
     assert pair.resident_megabytes - before < 8
 
 
-def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
+def test_acknowledged_data_survives_kill_9(tmp_path: Path) -> None:
     data = tmp_path / "data"
     poi = {"id": "kitchen", "pose": {"x": 1.5, "y": -2.25, "yaw": 0.5}, "metadata": {"display_name": "厨房"}}
     with served(data, "--world", "empty", address=ALONE) as robot:

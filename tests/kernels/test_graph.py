@@ -46,7 +46,7 @@ def test_two_rounds_are_straightened_by_shared_sightings() -> None:
     assert np.abs(seen_twice).max() < 0.02
 
 
-def test_what_fits_already_stays() -> None:
+def test_consistent_poses_stay() -> None:
     poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, np.pi / 2], [1.0, 1.0, np.pi]])
     pairs = np.array([(0, 1), (1, 2)], np.int32)
     measured = np.array([relative(poses[i], poses[j]) for i, j in pairs])

@@ -13,7 +13,7 @@ def test_importing_the_package_imports_no_compiler() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=100).returncode == 0
 
 
-def test_what_is_compiled_is_not_compiled_again() -> None:
+def test_compiled_kernels_are_not_compiled_again() -> None:
     command = [sys.executable, "-m", "roboglot.kernels"]
     subprocess.run(command, check=True, capture_output=True, timeout=200)
     again = subprocess.run(command, check=True, capture_output=True, text=True, timeout=100)

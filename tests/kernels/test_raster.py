@@ -99,7 +99,7 @@ def test_is_not_drawn(quad):
     assert not seen.any()
 
 
-def test_what_reaches_behind_eye_is_cut_off_there():
+def test_surfaces_are_clipped_at_the_eye():
     """A wall along the way, to the left, from 5 m behind to 5 m ahead."""
     seen, depth, *_ = picture([(-5, 1, -1), (5, 1, -1), (5, 1, 1), (-5, 1, 1)])
     assert (seen[:, 0] == FIRST).all()

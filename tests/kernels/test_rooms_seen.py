@@ -51,6 +51,6 @@ def test_wall_hides_next_room_and_door_shows_it():
     assert seen_from(20, 25, 0.0, 1.2, door=True) == {1, 2}
 
 
-def test_what_is_behind_is_not_seen():
+def test_rooms_behind_are_not_seen():
     assert seen_from(20, 25, math.pi, 1.2, door=True) == {1}
     assert seen_from(20, 25, math.pi, math.tau, door=True) == {1, 2}

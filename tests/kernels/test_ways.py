@@ -50,7 +50,7 @@ def test_points_have_the_kind_of_their_cells() -> None:
     assert kinds_at(cells, points, 1, 0, 0.05, OFF).tolist() == [OFF, 0, 3, 5, OFF, OFF, OFF]
 
 
-def test_what_lies_between_is_marked() -> None:
+def test_short_gaps_are_marked() -> None:
     marked = np.array([0, 1, 0, 0, 1, 0, 0, 0, 0, 1], bool)
     join(marked, 3)
     assert np.flatnonzero(marked).tolist() == [1, 2, 3, 4, 9]

@@ -29,7 +29,7 @@ async def test_nothing_happens_until_time_passes() -> None:
 
 
 @pytest.mark.parametrize("loop", [asyncio.new_event_loop, uvloop.new_event_loop])
-def test_what_follows_from_instant_happens_before_the_next(loop: Callable[[], asyncio.AbstractEventLoop]) -> None:
+def test_consequences_come_before_the_next_instant(loop: Callable[[], asyncio.AbstractEventLoop]) -> None:
     with asyncio.Runner(loop_factory=loop) as runner:
         runner.run(chains_of_wake_ups())
 
@@ -63,7 +63,7 @@ def test_callbacks_run_by_time_then_by_registration(times: list[float]) -> None:
     assert asyncio.run(run()) == [i for _, i in sorted((when, i) for i, when in enumerate(times))]
 
 
-async def test_a_timer_called_off_never_fires() -> None:
+async def test_cancelled_timer_never_fires() -> None:
     clock, fired = LockstepClock(), []
     clock.call_later(1, lambda: fired.append(1)).cancel()
     await clock.advance(2)

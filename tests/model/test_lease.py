@@ -124,7 +124,7 @@ async def test_a_name_is_a_line(robot: Robot, name: str) -> None:
     assert robot[Lease].taken_by == ""
 
 
-async def test_what_moves_nothing_needs_no_control(robot: Robot) -> None:
+async def test_sounds_need_no_control(robot: Robot) -> None:
     await robot[Lease].take()
     with acting_for(SCRIPT):
         robot[Speaker].say("hello", source="one")

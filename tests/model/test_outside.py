@@ -41,7 +41,7 @@ async def test_time_waits_for_an_answer(clock: LockstepClock) -> None:
     ]
 
 
-async def test_no_one_is_asked_in_a_rerun(clock: LockstepClock) -> None:
+async def test_rerun_makes_no_outside_calls(clock: LockstepClock) -> None:
     outside = Outside("a", clock)
     outside.play()
     asking = asyncio.ensure_future(outside.call_out("push", never))
@@ -84,7 +84,7 @@ async def test_time_stops_between_timers_of_an_instant(clock: LockstepClock) -> 
     assert (fired, clock.turn) == ([0, 1, 2], 3)
 
 
-async def test_what_an_input_leads_to_is_none(clock: LockstepClock) -> None:
+async def test_consequences_of_an_input_are_no_inputs(clock: LockstepClock) -> None:
     outside, noted = Outside("", clock), list[Input]()
     outside.listen(noted.append)
     with outside.noting("command", "go", {}):

@@ -39,7 +39,7 @@ async def test_timers_fire_by_time_then_by_registration() -> None:
     assert len(hours.timers) == 1
 
 
-async def test_timer_of_the_same_moment_is_called_off() -> None:
+async def test_timer_of_the_same_moment_can_be_cancelled() -> None:
     hours = Hours()
     hours.timers.add(1.0, lambda: second.cancel())
     second = hours.timers.add(1.0, hours.note("second"))
@@ -84,7 +84,7 @@ async def test_nan_stops_no_other_timer() -> None:
     assert hours.rung == ["at once", "next"]
 
 
-async def test_timers_that_were_called_off_take_no_memory() -> None:
+async def test_cancelled_timers_take_no_memory() -> None:
     hours = Hours()
     for number in range(10_000):
         hours.timers.add(1e6 + number, hours.note("never")).cancel()

@@ -32,7 +32,7 @@ def test_half_a_squat_is_none():
     assert counted(up, half, up, half, up) == 0
 
 
-def test_who_is_hardly_seen_does_not_count():
+def test_hardly_visible_people_are_not_counted():
     assert counted(skeleton(), skeleton(False, shoulder=0.52, hip=0.78), skeleton()) == 0
 
 

@@ -34,7 +34,7 @@ def test_it_is_watched_while_someone_follows(clock: LockstepClock) -> None:
     assert not tap.watched
 
 
-def test_who_is_slow_loses_exchanges_and_knows(clock: LockstepClock) -> None:
+def test_slow_viewer_counts_its_lost_exchanges(clock: LockstepClock) -> None:
     tap, heard = Tap("a", clock), list[Exchange]()
     tap.listen(heard.append)
     with tap.subscribe() as viewer:

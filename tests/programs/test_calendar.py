@@ -87,7 +87,7 @@ def test_a_zone_decides_what_its_clocks_show() -> None:
         due_of("single", "* * * * *", now, UTC)
 
 
-def test_when_the_clocks_change() -> None:
+def test_due_times_when_the_clocks_change() -> None:
     skipped = due_of("cycle", "30 2 * * *", at("2026-03-28 12:00"), BERLIN)
     assert shown(skipped, BERLIN) == "2026-03-29 03:30"
     twice = parse_cycle("30 2 * * *")

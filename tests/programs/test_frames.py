@@ -121,7 +121,7 @@ def test_monsters_are_violations(text: str) -> None:
         decode(text.encode())
 
 
-def test_what_cannot_cross_is_refused() -> None:
+def test_unsendable_values_are_refused() -> None:
     assert math.isnan(unpack(pack(math.nan)))
     nested: list[Any] = []
     for _ in range(DEPTH_MAX + 1):

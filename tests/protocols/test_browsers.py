@@ -98,7 +98,7 @@ def test_refusals_are_logged_once_as_warnings(caplog: pytest.LogCaptureFixture) 
 
 
 @pytest.mark.parametrize("origin", ["studio.example", "https://studio.example/path", "http://a b", ""])
-def test_what_is_no_origin_is_refused_by_name(origin: str) -> None:
+def test_invalid_origins_are_refused_by_name(origin: str) -> None:
     with pytest.raises(ValueError, match="is no origin"):
         Browsers("[slamware]", (origin,))
 

@@ -75,7 +75,7 @@ def test_another_place_is_no_difference() -> None:
         ([e for e in session() if e.direction is not Direction.PUSH], "operation"),
     ],
 )
-def test_what_is_different_is_named(other: list[Exchange], what: str) -> None:
+def test_differences_are_named(other: list[Exchange], what: str) -> None:
     assert what in complaints(other)
 
 

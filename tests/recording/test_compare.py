@@ -101,7 +101,7 @@ def test_session_agrees_with_itself_to_the_last_bit() -> None:
     assert "fidelity: 100 %" in reports.table(comparison)
 
 
-def test_what_only_one_session_has_counts_against_it() -> None:
+def test_requests_of_one_session_only_count_against() -> None:
     original = session()
     comparison = compare(original, [e for e in original if e.operation != "chassis move"])
     (row,) = [row for row in comparison.rows if row.operation == "chassis move"]

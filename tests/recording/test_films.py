@@ -66,7 +66,7 @@ async def test_real_robot_video_is_recorded_as_it_comes() -> None:
 
 @pytest.mark.parametrize("photos", [False, True])
 @pytest.mark.parametrize("real", [False, True])
-async def test_photos_of_real_robots_need_a_wish(real: bool, photos: bool) -> None:
+async def test_photos_of_real_robots_are_optional(real: bool, photos: bool) -> None:
     noted = list[Entry]()
     robot = Robot("a", PLATE, LockstepClock())
     if real:

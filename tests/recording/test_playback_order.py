@@ -55,7 +55,7 @@ async def test_answers_and_pushes_keep_times_and_clients_ids() -> None:
     assert pushed[1:] == [(104.1, b"chassis push position 2 0 0;")]
 
 
-async def test_what_was_never_recorded_is_refused_and_noted() -> None:
+async def test_unrecorded_requests_are_refused_and_noted() -> None:
     playback = Playback(pushing_session(), LockstepClock(), 0.0)
     with pytest.raises(NotFound, match="no such request"):
         await ask(playback, b"chassis fly z 3")
@@ -142,7 +142,7 @@ async def test_busy_machine_leaves_answers_before_pushes_that_followed(door: str
     st.lists(st.tuples(st.sampled_from((Direction.PUSH, Direction.REPLY)), st.floats(0.0, 0.5)), max_size=20),
     st.lists(st.floats(0.0, 1.0), max_size=10),
 )
-async def test_what_follows_command_comes_in_the_recorded_order(
+async def test_messages_after_commands_keep_their_recorded_order(
     items: list[tuple[Direction, float]], busy: list[float]
 ) -> None:
     directions, gaps = [direction for direction, _ in items], [gap for _, gap in items]

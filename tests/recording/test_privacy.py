@@ -171,7 +171,7 @@ def test_later_quotes_of_a_secret_are_redacted(word: str, field: str, ascii_only
     assert json.loads(json.loads(nested.payload)["params"]) == {"text": "[redacted]"}
 
 
-def test_what_only_looks_like_a_secret_stays() -> None:
+def test_text_that_resembles_a_secret_stays() -> None:
     redact = Redaction()
     for secret in ("mode", "1234", "Tom", "ok"):
         redact(json.dumps({"password": secret}).encode())
@@ -194,9 +194,7 @@ def test_refusals_of_real_robots_do_not_quote_networks(door: str) -> None:
 
 
 @given(st.permutations(["mode", "describe", "nested", "text", "list"]), WORD, st.integers(0, 2), st.booleans())
-def test_people_have_no_names_whatever_stands_between(
-    order: list[str], name: str, wrapped: int, is_person: bool
-) -> None:
+def test_names_of_people_are_always_removed(order: list[str], name: str, wrapped: int, is_person: bool) -> None:
     name = f"{name}."
     values: dict[str, object] = {
         "mode": "face" if is_person else "tag",

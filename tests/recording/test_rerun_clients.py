@@ -176,7 +176,7 @@ async def test_a_teacher_stops_and_locks(tmp_path: Path) -> None:
     assert names == ["end", "end", "end", "give", "release"]
 
 
-async def test_what_cannot_be_repeated_is_said(tmp_path: Path) -> None:
+async def test_unrepeatable_recordings_are_refused(tmp_path: Path) -> None:
     async with begun(tmp_path) as session:
         await session.clock.advance(0.5)
         await session.rest.get_pose()

@@ -53,7 +53,7 @@ async def say(session: Session, reader: asyncio.StreamReader, writer: asyncio.St
 
 
 @pytest.mark.slow  # below, a pilot is repeated
-async def test_what_goes_out_needs_no_repeat(tmp_path: Path) -> None:
+async def test_outgoing_data_needs_no_repeat(tmp_path: Path) -> None:
     """Video, sound, events and pushes: whether one takes them changes nothing of what a robot does."""
     loop = asyncio.get_running_loop()
     async with begun(tmp_path, robomaster={"push_port": (port := free_port())}) as session:

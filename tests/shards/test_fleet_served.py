@@ -178,7 +178,7 @@ def test_reset_forgets_what_was_stored(fleet: Fleet) -> None:
     assert pois(THIRD) == []
 
 
-def test_what_does_not_exist_is_refused_by_name(fleet: Fleet) -> None:
+def test_unknown_shards_are_refused_by_name(fleet: Fleet) -> None:
     refused = fleet.call("restart", "w9")
     assert refused.returncode == 1
     assert "'w9'" in refused.stderr
@@ -187,7 +187,7 @@ def test_what_does_not_exist_is_refused_by_name(fleet: Fleet) -> None:
     assert "another roboglot uses" in second.stderr
 
 
-def test_logs_and_top_tell_of_a_shard(fleet: Fleet) -> None:
+def test_logs_and_top_show_shards(fleet: Fleet) -> None:
     assert fleet.call("logs", "w1").returncode == 0
     table = fleet.call("top").stdout  # in a pipe: one table
     assert "2 shards, 4 robots" in table

@@ -152,7 +152,7 @@ async def test_without_a_robot_it_happens_to_all(sim):
         (lambda faults: faults.inject("dock_not_found", dock=7), "no dock 7"),
     ],
 )
-def test_what_cannot_be_is_said_in_plain_words(sim, call, message):
+def test_impossible_faults_are_refused_in_plain_words(sim, call, message):
     with pytest.raises(ValueError, match=message):
         call(sim.world.faults)
 
@@ -178,7 +178,7 @@ async def test_dismissed_fault_comes_back_while_its_cause_persists(sim):
         health.dismiss(99)
 
 
-async def test_who_was_lost_is_found_only_when_sure(sim):
+async def test_lost_robot_is_found_only_when_sure(sim):
     class Guess:
         enabled, started, quality, lost = True, True, 0.9, None
 

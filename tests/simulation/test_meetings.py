@@ -45,7 +45,7 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
     return lives, calm, touched
 
 
-async def test_what_is_not_looked_for_does_not_happen(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_skipped_contact_searches_miss_no_contact(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
     simulation = simulate("office", robots=("a", "b"), seed=3)
     simulation.world._physics.load_kernels()
     monkeypatch.setattr(Gliding, "step", lambda *_: False)  # equals MuJoCo's steps up to rounding only

@@ -61,6 +61,6 @@ OPTIONS = [("inject_fault", {"kind": "blocked_path", "robot": "a", "options": {"
 @pytest.mark.parametrize(
     ("name", "values"), [("world_file", {}), ("__init__", {}), ("push", {"name": 3}), ("fly", {}), *OPTIONS]
 )
-async def test_what_is_no_deed_of_hands_is_refused(name: str, values: dict[str, object]) -> None:
+async def test_unknown_inputs_of_hands_are_refused(name: str, values: dict[str, object]) -> None:
     with pytest.raises(ValueError):  # noqa: PT011 - each has its own words
         do_again(world().hands, Input(0.0, 0, "", "hands", name, values))

@@ -169,7 +169,7 @@ async def heard(room, seconds=3.0):
         return viewer.drain()
 
 
-async def test_what_is_said_nearby_is_understood():
+async def test_nearby_speech_is_understood():
     with lab(people=[ANNA]) as room:
         room.world.hands.person("anna").say("坐下")
         (speech,) = await heard(room)

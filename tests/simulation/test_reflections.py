@@ -59,7 +59,7 @@ async def test_glass_and_mirrors_matter_unless_sensors_are_clean(tmp_path: Path)
     assert usual[270] == pytest.approx(2 * 2.94 - 0.25, abs=0.06)  # itself
 
 
-def test_where_nothing_is_met_there_is_nothing() -> None:
+def test_rays_that_meet_nothing_return_nothing() -> None:
     none, eye, way = np.empty((0, 4)), np.zeros((1, 2)), np.array([[1.0, 0.0]])
     mirror = np.array([[2.0, 1.0, 2.0, -1.0]])  # seen from the left
     behind = np.array([np.inf])

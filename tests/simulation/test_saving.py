@@ -25,7 +25,7 @@ def test_shipped_worlds_survive_the_round_trip(name: str, tmp_path: Path) -> Non
     assert load_world(str(path)) == msgspec.structs.replace(world, floors=tuple(whole))
 
 
-async def test_what_hands_did_is_in_the_file(tmp_path: Path) -> None:
+async def test_changes_by_hands_are_saved(tmp_path: Path) -> None:
     world = World(load_world("playground"), [RobotPlacement("a", "universal")], clock=LockstepClock())
     hands = world.hands
     hands.add_obstacle(Pose(2.0, 1.5, math.pi / 6), (0.5, 0.3, 0.8))

@@ -184,7 +184,7 @@ async def test_a_broken_voice_is_as_good_as_none(simulate, monkeypatch, tmp_path
         assert [event.audible for event in spoke.drain()] == [False]
 
 
-async def test_what_cannot_be_said_is_refused(simulate):
+async def test_invalid_texts_and_volumes_are_refused(simulate):
     speaker = simulate("empty").robot[Speaker]
     for text in ("", "  ", "x" * (TEXT_MAX + 1)):
         with pytest.raises(InvalidGoal):

@@ -138,7 +138,7 @@ async def test_robots_start_apart_and_on_the_floor(simulate):
         (RobotPlacement("a", body="unicorn"), "is named 'unicorn', and it is no .toml file; there are .*universal"),
     ],
 )
-def test_what_cannot_be_is_said_in_plain_words(placement, message):
+def test_impossible_placements_are_refused_in_plain_words(placement, message):
     with pytest.raises(ValueError, match=message):
         World(load_world("empty"), [placement], clock=LockstepClock())
 

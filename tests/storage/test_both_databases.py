@@ -260,7 +260,7 @@ async def test_start_waits_for_a_dying_programs_robots(
 
 
 @needs_postgresql
-async def test_who_lost_a_robot_writes_nothing_for_it(db_server: PostgreSQLServer, tmp_path: Path) -> None:
+async def test_program_that_lost_a_robot_writes_nothing(db_server: PostgreSQLServer, tmp_path: Path) -> None:
     first = open_database(tmp_path / "unused", db_server.url, ["a"])
     settings = StoredSettings(first, "a")
     await settings.put("who", "first")

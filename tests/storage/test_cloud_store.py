@@ -50,7 +50,7 @@ async def test_favourites_are_sorted_by_bytes_and_outlive_robots(store: CloudSto
     assert await store.favourites("two", "task", []) == []
 
 
-async def test_what_is_too_much_is_taken_back(store: CloudStore, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_programs_beyond_the_limit_are_refused(store: CloudStore, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cloud, "PROGRAMS_MAX", 2)
     monkeypatch.setattr(cloud, "RECORDS_MAX", 3)
     for account in ("one", "two"):
@@ -101,7 +101,7 @@ def test_newer_formats_are_left_untouched(db_server: PostgreSQLServer) -> None:
         PostgreSQL(db_server.url)
 
 
-def test_no_one_there_is_reported_in_one_line(tmp_path: Path) -> None:
+def test_unreachable_server_is_reported_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="connection") as expected:
         PostgreSQL(f"postgresql:///robots?host={tmp_path}")
     assert "\n" not in str(expected.value)

@@ -43,7 +43,7 @@ async def test_database_on_a_full_disk_refuses_and_recovers(tmp_path: Path) -> N
 
 
 @pytest.mark.world("empty")
-async def test_what_no_client_waits_for_leaves_line_only(fleet, world, caplog: pytest.LogCaptureFixture) -> None:
+async def test_background_writes_only_leave_a_log_line(fleet, world, caplog: pytest.LogCaptureFixture) -> None:
     world.faults.inject("full_disk", "a")
     with caplog.at_level(logging.WARNING):
         await fleet.robots["a"][Settings].keep("slamware.totals", [1.0, 2.0])

@@ -64,7 +64,7 @@ async def test_a_log_keeps_the_newest_entries(database: Database) -> None:
     assert (await tasks.all())[0].state == "shutdown"
 
 
-async def test_what_was_left_running_is_settled_at_start(database: Database) -> None:
+async def test_interrupted_tasks_are_settled_at_start(database: Database) -> None:
     tasks = DatabaseProgramStore(database, "a")
     for id, state in (("t1", "run"), ("t2", "suspend"), ("t3", "wait_run")):
         await tasks.put(program(id, state))
@@ -90,7 +90,7 @@ asyncio.run(main())
 """
 
 
-async def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
+async def test_acknowledged_programs_survive_kill_9(tmp_path: Path) -> None:
     path = tmp_path / "robot.db"
     with child(CHILD, str(path)) as writer:
         assert writer.stdout

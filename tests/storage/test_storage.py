@@ -180,7 +180,7 @@ asyncio.run(main())
 """
 
 
-def test_what_was_acknowledged_survives_kill_9(tmp_path: Path) -> None:
+def test_acknowledged_data_survives_kill_9(tmp_path: Path) -> None:
     path = tmp_path / "robot.db"
     for acknowledge in (1, 7, 23):
         with child(WRITER, str(path)) as writer:

@@ -91,7 +91,7 @@ def test_gitlabs_job_goes_on_only_with_a_robot(tmp_path: Path, world: str, statu
         ("git+https://host/roboglot", "roboglot[up,testing] @ git+https://host/roboglot"),
     ],
 )
-def test_what_is_installed_is_what_was_named(tmp_path: Path, what: str, wanted: str) -> None:
+def test_named_version_is_installed(tmp_path: Path, what: str, wanted: str) -> None:
     (tmp_path / "roboglot").mkdir()
     (tmp_path / "r.whl").touch()
     python = tmp_path / "venv/bin/python"

@@ -32,7 +32,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_what_is_no_scenario_is_refused_with_place(tmp_path: Path, text: str) -> None:
+def test_invalid_scenarios_are_refused_with_their_place(tmp_path: Path, text: str) -> None:
     file = tmp_path / "x.yaml"
     file.write_text(text)
     with pytest.raises(BadScenario, match=WRONG[text]) as refused:

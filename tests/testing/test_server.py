@@ -53,7 +53,7 @@ def test_missing_packages_of_doors_have_a_remedy(monkeypatch: pytest.MonkeyPatch
         RobotServer().start()
 
 
-def test_program_tells_its_blocks_and_what_it_prints(program: Any) -> None:
+def test_program_client_returns_blocks_and_output(program: Any) -> None:
     run = program.run(PROGRAM)
     assert run.blocks == ["one", "two"]
     assert run.printed == ["hello"]

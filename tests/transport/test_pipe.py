@@ -57,7 +57,7 @@ async def turns() -> None:
         await asyncio.sleep(0)
 
 
-async def test_what_is_written_is_received_at_once() -> None:
+async def test_written_bytes_are_received_at_once() -> None:
     caller, callee = Side(), Side(b"ok;")
     joined(caller, callee)
     caller.transport.write(b"command;")

@@ -136,7 +136,9 @@ async def test_handshakes_are_asked_for_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("data", [b"\x16", b"\x16\x03\x01\xff\xff" + bytes(100), b"\x16" * 100_000])
-async def test_what_is_no_handshake_ends(tmp_path: Path, data: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_bytes_without_a_handshake_end_the_connection(
+    tmp_path: Path, data: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(layer, "HANDSHAKE_SECONDS_MAX", 0.2)
     async with port(tmp_path) as (number, _):
         reader, writer = await asyncio.open_connection("127.0.0.1", number)

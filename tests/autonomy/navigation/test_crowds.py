@@ -123,7 +123,7 @@ async def test_a_lidar_sees_no_gap_in_a_robot(looking: str) -> None:
     database.close()
 
 
-async def test_what_stands_below_the_lidar_is_not_touched() -> None:
+async def test_robots_below_the_lidar_are_not_touched() -> None:
     """Two low robots leave no gap; the dog, which sees them from in front only, looks for one."""
     clock, database, bodies = LockstepClock(), Database(":memory:"), ("cyberdog2", "robomaster_ep", "robomaster_ep")
     robots = [RobotConfig(name, body=body) for name, body in zip("abc", bodies, strict=True)]

@@ -23,14 +23,14 @@ PERSON = (0.4, 0.4, 1.7)
 
 
 @pytest.mark.world(NARROW)
-async def test_where_it_got_in_it_gets_out(tour: Tour) -> None:
+async def test_robot_leaves_by_the_door_it_entered(tour: Tour) -> None:
     await tour.clock.advance(1.5)
     for spot in ((6.0, 3.3), (2.0, 3.0), (6.0, 2.5), (2.0, 3.0)):
         action = await tour.go(spot)
         assert action.status is ActionStatus.SUCCEEDED, (spot, action.reason)
 
 
-@pytest.mark.slow  # in short: test_where_it_got_in_it_gets_out
+@pytest.mark.slow  # in short: test_robot_leaves_by_the_door_it_entered
 @pytest.mark.world(NARROW, seed=2)
 async def test_it_gets_through_at_a_slant(tour: Tour) -> None:
     await tour.clock.advance(1.5)

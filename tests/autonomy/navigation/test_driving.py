@@ -289,7 +289,7 @@ async def test_a_lying_robot_stands_up_first(carted: Robot, cart: Cart, clock: L
     assert cart.pose.x == pytest.approx(0.5, abs=0.01)
 
 
-async def test_who_cannot_stand_up_does_not_drive(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
+async def test_robot_that_cannot_stand_up_does_not_drive(carted: Robot, cart: Cart, clock: LockstepClock) -> None:
     slow_legs(carted, Posture.LYING)
     action = carted[Driving].drive(Twist(x=0.5), source="door")
     await clock.advance(1.0)

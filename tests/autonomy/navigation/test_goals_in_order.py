@@ -97,7 +97,7 @@ def _reached(now: Twist, asked: Twist, limits: BaseLimits) -> Twist:
 @pytest.mark.parametrize(
     "body", [pytest.param(body, marks=pytest.mark.world("empty", body=body), id=body) for body in BODIES]
 )
-async def test_who_succeeds_was_at_every_goal(tour: Tour, body: str, spots: list[tuple[float, float]]) -> None:
+async def test_success_means_every_goal_was_reached(tour: Tour, body: str, spots: list[tuple[float, float]]) -> None:
     wanted = [Point(*spot) for spot in spots]
     left: list[int] = []
     tour.robot.events.listen(ActionChanged, lambda event: left.append(_milestones(event.action)))

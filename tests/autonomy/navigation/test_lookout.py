@@ -19,7 +19,7 @@ from roboglot.model.geometry import Point, Pose
     [(0.8, True, 0.0), (0.1, True, 5.0), (0.8, False, 5.0)],
     ids=["behind", "held", "wall"],
 )
-async def test_who_drives_behind_another_is_not_held_up(speed: float, others: bool, held_up: float) -> None:
+async def test_robot_ahead_is_no_obstacle_while_driving_behind(speed: float, others: bool, held_up: float) -> None:
     """Otherwise a robot turns back before the place that the one ahead is about to leave."""
     clock, path = LockstepClock(), np.stack([np.arange(0.0, 3.0, 0.05), np.zeros(60)], axis=1)
     published = list[object]()

@@ -132,7 +132,7 @@ async def test_tracks_are_followed_around_bends(tour: Tour, mode: Tracks) -> Non
     assert_pose(tour.truth, x=8.5, y=5.0)
 
 
-async def test_free_navigation_minds_no_track(tour: Tour) -> None:
+async def test_free_navigation_ignores_tracks(tour: Tour) -> None:
     await draw(tour, track(1.5, 5.0, 8.5, 5.0, (1.5, 9.5), (8.5, 9.5)))
     places = await watched(tour, tour.head_for((8.5, 5.0)))
     assert max(abs(pose.y - 5.0) for pose in places) < 1.0

@@ -110,7 +110,7 @@ def test_robot_that_leaves_moves_none_that_stands(left: EvidenceGrid, far: float
 
 
 @pytest.mark.parametrize(("scans", "believes_wheels"), [(6, True), (10, False)], ids=["just seen", "known well"])
-def test_what_was_just_seen_does_not_overrule_wheels(scans: int, believes_wheels: bool) -> None:
+def test_new_objects_do_not_overrule_the_wheels(scans: int, believes_wheels: bool) -> None:
     """Six scans hardly outweigh ten that saw free floor there. A thing known well shows that the wheels slip."""
     from roboglot.autonomy.slam.contradictions import contested
     from roboglot.autonomy.slam.matcher import FREE, fit

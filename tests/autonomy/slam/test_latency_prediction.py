@@ -36,7 +36,7 @@ def base() -> _Base:
     return _Base()
 
 
-async def test_what_was_sent_within_the_delay_is_added(base: Base, clock: LockstepClock) -> None:
+async def test_commands_within_the_delay_are_added(base: Base, clock: LockstepClock) -> None:
     foresight = Foresight(base, clock)
     assert foresight.ahead(Pose(1.0)) == Pose(1.0)
     foresight.sent(Twist(x=1.0))

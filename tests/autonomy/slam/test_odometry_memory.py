@@ -32,7 +32,7 @@ def misjudged(folder: Path) -> str:
     return str(folder / "misjudged.toml")
 
 
-async def test_what_was_learnt_outlives_a_restart(tmp_path: Path) -> None:
+async def test_learnt_odometry_survives_a_restart(tmp_path: Path) -> None:
     database, learnt = Database(tmp_path / "data.db", in_place=True), []
     for _ in range(2):
         clock = LockstepClock()
@@ -80,7 +80,7 @@ def test_gyro_drift_and_wrong_wheels_are_learnt_fast() -> None:
     assert abs(bias.turn - known) < 0.002
 
 
-def test_what_is_not_learnt_yet_widens_the_doubt() -> None:
+def test_doubt_is_wide_before_learning() -> None:
     bias, moved = LearntBias(), Pose(0.05)
     before = bias.spread(np.zeros((3, 3)), moved, 0.1)
     for _ in range(10):

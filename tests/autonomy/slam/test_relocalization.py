@@ -62,7 +62,9 @@ async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
         *(pytest.param(*place, 0.0, marks=pytest.mark.slow) for place in ((20.0, 9.6, 170.0), (13.0, 6.6, -60.0))),
     ],
 )
-async def test_who_is_carried_on_is_found_there(tour: Tour, x: float, y: float, deg: float, towards: float) -> None:
+async def test_robot_carried_during_the_search_is_found(
+    tour: Tour, x: float, y: float, deg: float, towards: float
+) -> None:
     await tour.go((12.0, 9.8))
     await tour.go((12.0, 6.5))
     for turned in (0.0, 100.0, -130.0):

@@ -26,7 +26,7 @@ def candidate(x: float, fitting: int, hidden: int, floating: int) -> Candidate:
 
 
 @pytest.mark.parametrize(("unknown", "count"), [(0, 1), (8, 2)])
-def test_what_map_does_not_know_speaks_for_rivals(unknown: int, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_points_leave_rival_places_open(unknown: int, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     from roboglot.autonomy.slam import matcher
     from roboglot.autonomy.slam.evidence import EvidenceGrid
     from roboglot.autonomy.slam.scan_points import ScanPoints

@@ -49,7 +49,7 @@ def test_given_floor_keeps_its_place_while_map_grows() -> None:
 
 
 @pytest.mark.parametrize(("body", "painted"), [("universal", False), ("cyberdog2", True)])
-async def test_who_announces_itself_is_not_painted(body: str, painted: bool) -> None:
+async def test_announced_robots_are_not_mapped(body: str, painted: bool) -> None:
     """A dog has no radio: the map has it, as a piece of furniture."""
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig("a", body="hermes"), RobotConfig("b", body=body)]

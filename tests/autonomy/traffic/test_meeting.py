@@ -60,7 +60,7 @@ async def test_three_cross_at_one_place(building: OccupancyGrid) -> None:
 
 @pytest.mark.slow  # in short: test_two_pass_a_corridor_for_one
 @pytest.mark.asyncio(loop_scope="module")
-async def test_who_stands_in_a_door_lets_others_out(building: OccupancyGrid) -> None:
+async def test_robot_in_a_doorway_lets_others_out(building: OccupancyGrid) -> None:
     """Two want out of the room with one door; the third, who goes second, is on its way in."""
     starts = (Pose(9.8, 4.6, math.pi / 2), Pose(10.5, 4.2, math.pi / 2), Pose(10.0, 5.3, -math.pi / 2))
     goals = ((Pose(15.0, 6.0),), (Pose(5.0, 6.0),), (Pose(8.5, 1.7),))

@@ -104,7 +104,7 @@ def straight(start: tuple[float, float], by: tuple[float, float], speed: float) 
         (straight((1.5, 0.0), (0.0, 0.2), 0.0), np.inf),  # stands
     ],
 )
-def test_when_others_leave_the_way(robot: Robot, belief: Belief, way: Way, seconds: float) -> None:
+def test_time_until_others_leave_the_way(robot: Robot, belief: Belief, way: Way, seconds: float) -> None:
     traffic, path = among(robot, belief, way), np.stack([np.arange(0.0, 3.0, 0.05), np.zeros(60)], axis=1)
     assert traffic.leaves(path) == pytest.approx(seconds, abs=0.6)
     traffic.close()
@@ -126,7 +126,7 @@ def test_one_of_two_in_a_corridor_backs_out(robot: Robot, belief: Belief, here: 
 
 
 @pytest.mark.world("empty")
-def test_what_flickers_in_a_corridor_has_no_right(belief: Belief, robot: Robot) -> None:
+def test_flickering_echo_has_no_right_of_way(belief: Belief, robot: Robot) -> None:
     """A robot that comes out of it goes first; a ghost of a wall, seen for a moment, does not."""
     corner, evidence = belief.map.corner, belief.map.evidence
     rows = [int((y - corner.y) / RESOLUTION) for y in (-0.55, 0.55)]

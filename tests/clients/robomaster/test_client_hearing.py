@@ -84,7 +84,7 @@ async def test_events_of_robot_whose_address_was_found_later(client, run, forwar
             assert await asyncio.wait_for(anext(events), 60) == ArmorHit(1, 2)
 
 
-async def test_what_is_watched_ends_with_the_client(client) -> None:
+async def test_watching_ends_with_the_client(client) -> None:
     watched = client.watch()
     await client.close()
     with pytest.raises(StopAsyncIteration):

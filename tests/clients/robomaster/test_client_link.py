@@ -179,7 +179,7 @@ async def test_it_comes_back_by_itself_and_says_so(faked, fake, clock) -> None:
     server.close()
 
 
-async def test_no_one_there(clock) -> None:
+async def test_unreachable_robot_is_reported(clock) -> None:
     client = RoboMasterClient("127.0.0.1", clock=clock, ports=Ports(control=1))
     with pytest.raises(LinkLost, match="cannot be reached"):
         await client.connect()

@@ -164,7 +164,7 @@ async def test_a_script_in_front_drives_and_stops_it(
     assert world.truth.pose_of("a").distance_to(before) < 0.02
 
 
-async def test_it_navigates_and_tells_map_and_pose(driven: Robot, robot: Robot, until: Until, world: World) -> None:
+async def test_it_navigates_and_reports_map_and_pose(driven: Robot, robot: Robot, until: Until, world: World) -> None:
     start = world.truth.pose_of("a")
     assert driven[Mapping].grid.width == robot[Mapping].grid.width
     await done(driven[Navigation].navigate_to([Point(1.0, 0.4)], NavigationOptions(yaw=0.5), source="test"), until)
@@ -254,7 +254,7 @@ async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     assert set(driven.interfaces) - kept_here == APPROXIMATIONS.keys()
 
 
-async def test_its_tap_tells_what_dog_hears_and_answers(driven: Robot, robot: Robot, until: Until) -> None:
+async def test_drivers_tap_equals_the_dogs_tap(driven: Robot, robot: Robot, until: Until) -> None:
     here: list[Exchange] = []
     there: list[Exchange] = []
     leave = driven.tap.listen(here.append), robot.tap.listen(there.append)

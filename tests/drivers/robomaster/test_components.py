@@ -127,7 +127,7 @@ async def test_a_hit_is_reported_to_every_door(script: Script, robot: Robot, dri
     assert [(hit.place, hit.kind) for hit in heard] == [(PlatePlace.GIMBAL_LEFT, HitKind.HAND)]
 
 
-async def test_what_follows_a_setting_knows_it(script: Script, robot: Robot) -> None:
+async def test_commands_after_a_setting_see_it(script: Script, robot: Robot) -> None:
     """A script does not wait until the robot has confirmed its mode."""
     script.client.writer.write(b"robot mode free;gimbal suspend;gimbal resume;gimbal move y 20;")
     await asyncio.sleep(0.05)
@@ -258,7 +258,7 @@ async def test_the_robots_own_packets_reach_the_next_door(driven_ep: Robot, forw
 
 @pytest.mark.world("empty", body="cyberdog2")
 @pytest.mark.parametrize("profile", ["spec"])
-async def test_what_a_robot_has_not_is_not_announced(driven_ep: Robot) -> None:
+async def test_missing_components_are_not_announced(driven_ep: Robot) -> None:
     for part in (Arm, Gripper, Servos, Blaster, Armor, Gimbal, Light):
         assert part not in driven_ep
     assert Camera in driven_ep

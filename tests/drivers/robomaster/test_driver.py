@@ -95,7 +95,7 @@ async def test_drifting_attitude_at_rest_bends_no_way(
     assert_pose(world.truth.pose_of("a").relative_to(start), x=0.8, y=0.0, deg=0.0)
 
 
-async def test_what_robot_tells_is_in_the_models_units(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
+async def test_reports_are_in_the_models_units(driven_ep: Robot, robot: Robot, forward: Forward) -> None:
     driven_ep[Driving].drive(Twist(x=0.3, y=0.2, yaw=0.5), source="test")
     await forward(seconds=2)
     twist, real = driven_ep[Odometry].reading.twist, robot[Odometry].reading.twist

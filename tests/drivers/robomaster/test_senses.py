@@ -55,7 +55,7 @@ async def test_pwm_outputs_hold_also_after_a_lost_link(
     await until(lambda: robot[PwmPorts].signal(2) == PwmSignal(0.4, 1000.0))
 
 
-async def test_sensor_adapters_tell_volts_levels_and_periods(
+async def test_sensor_adapters_report_volts_levels_and_periods(
     driven_ep: Robot, robot: Robot, world: World, text_door: Open, until: Until, forward: Forward
 ) -> None:
     script, adapters = await text_door(driven_ep), driven_ep[SensorAdapters]

@@ -167,7 +167,7 @@ async def test_its_network_is_reported_and_set(driven: Robot, robot: Robot, unti
 
 
 @pytest.mark.world("empty", body="cyberdog2")
-async def test_what_a_robot_has_not_is_not_announced(driven: Robot) -> None:
+async def test_missing_components_are_not_announced(driven: Robot) -> None:
     for part in (Jack, Cargo, EmergencyStop, Light):
         assert part not in driven
 

@@ -208,7 +208,7 @@ async def test_a_paused_way_goes_on(driven: Robot, world: World, forward: Forwar
     assert action.status is ActionStatus.SUCCEEDED
 
 
-async def test_what_robot_senses_arrives_in_the_models_units(driven: Robot, robot: Robot, forward: Forward) -> None:
+async def test_readings_are_in_the_models_units(driven: Robot, robot: Robot, forward: Forward) -> None:
     await forward(seconds=3)
     scan, real = driven[Lidar].scan, robot[Lidar].scan
     assert scan is not None
@@ -224,7 +224,7 @@ async def test_what_robot_senses_arrives_in_the_models_units(driven: Robot, robo
     assert driven[Link].age("battery") <= 1.0
 
 
-async def test_the_lease_tells_who_moves_the_robot(
+async def test_lease_names_the_client_that_moves_it(
     driven: Robot, slamware_door: SlamwareDoor, forward: Forward
 ) -> None:
     async with SlamwareClient("127.0.0.1", slamware_door.port, clock=driven.clock) as other:
@@ -254,7 +254,7 @@ async def test_the_lease_tells_who_moves_the_robot(
         assert mine.status is ActionStatus.SUCCEEDED
 
 
-async def test_what_it_cannot_do_is_refused(driven: Robot) -> None:
+async def test_unsupported_motions_are_refused(driven: Robot) -> None:
     with pytest.raises(Refused, match="one by one"):
         driven[Driving].drive(WheelSpeeds(1, 1, 1, 1), source="test")
     with pytest.raises(Refused, match="present place"):

@@ -264,7 +264,7 @@ async def test_run_that_becomes_too_long_is_given_up(monkeypatch: pytest.MonkeyP
         ("cyberdog.motion.state", False),
     ],
 )
-def test_what_only_reads_may_be_asked_again(name: str, acts: bool) -> None:
+def test_reading_calls_may_be_repeated(name: str, acts: bool) -> None:
     assert does_something(name) is acts
 
 

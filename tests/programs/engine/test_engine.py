@@ -166,7 +166,7 @@ async def test_without_filter_programs_run_if_operator_says_so(
         assert (await play(engine, other_walls)).output == "kept in\n"
 
 
-async def test_filter_applies_whatever_the_operator_says(caplog: pytest.LogCaptureFixture) -> None:
+async def test_available_filter_always_applies(caplog: pytest.LogCaptureFixture) -> None:
     async with Engine(filter_required=False) as engine:
         assert "seccomp" in engine.layers
     assert caplog.text == ""

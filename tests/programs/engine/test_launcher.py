@@ -16,7 +16,7 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.launcher import Launcher
 
 
-async def test_a_start_that_is_called_off_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_cancelled_start_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     begin, started = launcher._start_process, list[subprocess.Popen[bytes]]()
 
     def slowly(descriptor: int, filter_required: bool) -> subprocess.Popen[bytes]:

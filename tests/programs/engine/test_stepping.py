@@ -179,7 +179,7 @@ async def test_run_that_no_one_watches_does_not_halt(engine: Engine) -> None:
     assert await walked(run) == ([], "0\n1\n3\n6\n")
 
 
-async def test_what_is_only_done_again_does_not_halt(engine: Engine) -> None:
+async def test_replayed_statements_do_not_halt(engine: Engine) -> None:
     source = "print(cyberdog.echo(1))\nprint(cyberdog.echo(2))\nprint(3)\n"
     history = [Answer("cyberdog.echo", b'{"t":"value","value":7}')]
     run = await engine.start(source, PRELUDE, history=history, stops=stops(1, 2, 3))

@@ -27,7 +27,7 @@ async def test_lidar_that_is_gone_has_no_new_scan(caller: Caller, world: World) 
     assert caller.clock.time() - begun > 1.9
 
 
-async def test_battery_tells_its_charge_and_that_nothing_drives(caller: Caller, world: World) -> None:
+async def test_battery_is_low_and_nothing_drives(caller: Caller, world: World) -> None:
     world.faults.inject("low_battery", "a", charge=0.08)
     world.faults.inject("emergency_stop", "a")
     await caller.clock.advance(0.5)

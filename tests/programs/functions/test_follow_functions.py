@@ -69,7 +69,7 @@ async def test_suspended_it_waits_and_at_end_it_stops(caller: Caller, world: Wor
     assert caller.robot[Vision].faces.latest is None
 
 
-async def test_who_takes_over_ends_it(caller: Caller, anna: Actor) -> None:
+async def test_another_clients_motion_ends_following(caller: Caller, anna: Actor) -> None:
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna")
     await caller.clock.advance(1.5)
@@ -88,7 +88,7 @@ async def test_it_goes_around_what_stands_between(caller: Caller, world: World, 
     assert world.truth.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.3)
 
 
-async def test_what_the_program_drives_itself_comes_first(caller: Caller, world: World, anna: Actor) -> None:
+async def test_own_motion_of_the_program_comes_first(caller: Caller, world: World, anna: Actor) -> None:
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)
     await caller.clock.advance(1.0)
@@ -122,12 +122,12 @@ async def test_out_of_sight_it_gives_up(caller: Caller, world: World, anna: Acto
         ("cancel_follow", ()),
     ],
 )
-async def test_whom_it_cannot_follow(caller: Caller, anna: Actor, name: str, args: tuple[str, ...]) -> None:
+async def test_unknown_people_cannot_be_followed(caller: Caller, anna: Actor, name: str, args: tuple[str, ...]) -> None:
     assert code(await caller(f"cyberdog.follow.{name}", *args)) == 1
     assert not caller.robot.actions.running()
 
 
-async def test_who_is_struck_off_is_followed_no_more(caller: Caller, anna: Actor) -> None:
+async def test_removed_person_is_not_followed_any_more(caller: Caller, anna: Actor) -> None:
     await caller("cyberdog.follow.add_personnel", "Anna")
     assert code(await caller("cyberdog.follow.follow_personnel", "Anna", 6.0)) == 1
     assert code(await caller("cyberdog.follow.follow_personnel", "Anna", math.nan)) == 1

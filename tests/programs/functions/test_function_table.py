@@ -51,7 +51,7 @@ async def test_huge_numbers_are_refused_like_any_other(bare_caller: Caller) -> N
         assert field(result, "response.code") == 3010
 
 
-async def test_what_is_not_built_says_so(bare_caller: Caller) -> None:
+async def test_missing_function_is_reported(bare_caller: Caller) -> None:
     with pytest.raises(NotImplementedError, match=r"cyberdog.skin.shine is not built yet"):
         await bare_caller("cyberdog.skin.shine", "anna")
 

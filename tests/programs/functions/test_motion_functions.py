@@ -99,7 +99,7 @@ async def test_neither_distance_nor_time_is_one_command(caller: Caller) -> None:
         ("trot_walking", (0.1, 0, 0, 0.03, 0.001)),
     ],
 )
-async def test_what_the_limits_forbid_moves_nothing(
+async def test_values_outside_the_limits_move_nothing(
     caller: Caller, world: World, name: str, args: tuple[float]
 ) -> None:
     before = world.truth.pose_of("a")
@@ -200,7 +200,7 @@ async def test_pausing_holds_a_walk_and_its_time(caller: Caller, world: World) -
     assert_pose(world.truth.pose_of("a").relative_to(before), x=1.0, y=0.0, within=0.1)
 
 
-async def test_who_takes_the_base_away_is_reported(caller: Caller) -> None:
+async def test_takeover_of_the_base_is_reported(caller: Caller) -> None:
     walking = caller.start("cyberdog.motion.go_straight", 0.25, 0, 10)
     await caller.clock.advance(1.0)
     caller.robot[Driving].drive(Twist(), lifetime=0.1, source="someone")

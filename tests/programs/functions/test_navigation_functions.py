@@ -93,7 +93,7 @@ async def test_goals_that_cannot_be_reached(home: Caller) -> None:
         assert result_of(await home(f"cyberdog.navigation.{name}", *args)) == (1, expected), (name, args)
 
 
-async def test_who_takes_over_cancels_the_drive(home: Caller) -> None:
+async def test_takeover_cancels_the_drive(home: Caller) -> None:
     await home("cyberdog.navigation.turn_on_navigation")
     going = home.start("cyberdog.navigation.navigation_to_preset", "kitchen")
     await home.clock.advance(0.6)
@@ -102,7 +102,7 @@ async def test_who_takes_over_cancels_the_drive(home: Caller) -> None:
     assert result_of(going.result()) == (1, 5)
 
 
-async def test_a_drive_is_called_off(home: Caller, world: World) -> None:
+async def test_drive_can_be_cancelled(home: Caller, world: World) -> None:
     await home("cyberdog.navigation.turn_on_navigation")
     going = home.start("cyberdog.navigation.navigation_to_preset", "kitchen")
     await home.clock.advance(0.8)

@@ -116,7 +116,7 @@ async def test_turning_about_a_fulcrum_moves_the_body(caller: Caller) -> None:
         ("small_jump_walking", {"z_jump_velocity": 29}),
     ],
 )
-async def test_what_the_limits_forbid_moves_no_leg(caller: Caller, name: str, kwargs: dict[str, float]) -> None:
+async def test_values_outside_the_limits_move_no_leg(caller: Caller, name: str, kwargs: dict[str, float]) -> None:
     legs = caller.robot[Legs]
     before = (legs.body_height, legs.attitude, legs.gait)
     result = await caller(f"cyberdog.motion.{name}", **kwargs)

@@ -145,14 +145,14 @@ async def test_volume_out_of_range_is_refused_without_speech(caller: Caller, int
             assert field(result, "state.describe") == f"volume = {volume} is outside of 0 to 100 %"
 
 
-async def test_no_one_trains(caller: Caller, anna: Actor) -> None:
+async def test_exercise_of_no_one_is_not_counted(caller: Caller, anna: Actor) -> None:
     result = await caller("cyberdog.skeleton.sports_recognition", 1, 2, 5, False)
     assert field(result, "response").fields.items() >= {"result": 1, "algo_switch": 2, "counts": 0}.items()
     assert caller.robot[Vision].skeletons.latest is None
 
 
 @pytest.mark.parametrize(("sport", "counts", "timeout"), [(0, 1, 60), (7, 1, 60), (1, 0, 60), (1, 1, 4), (1, 1, 301)])
-async def test_what_cannot_be_counted(caller: Caller, sport: int, counts: int, timeout: int) -> None:
+async def test_impossible_counts_are_refused(caller: Caller, sport: int, counts: int, timeout: int) -> None:
     result = await caller("cyberdog.skeleton.turn_on_recognition", sport, counts, timeout)
     assert (field(result, "state.code"), field(result, "response.result")) == (1, 1)
     assert field(await caller("cyberdog.skeleton.instant_recognized"), "response.algo_switch") == 3

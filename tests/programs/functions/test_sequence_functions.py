@@ -157,7 +157,7 @@ def refused() -> list[tuple[Record, str]]:
     ]
 
 
-async def test_what_makes_no_sense_moves_nothing(caller: Caller) -> None:
+async def test_invalid_sequences_move_nothing(caller: Caller) -> None:
     for made, words in refused():
         result = await caller("cyberdog.motion.run_sequence", made)
         assert field(result, "state.code") == 1, words

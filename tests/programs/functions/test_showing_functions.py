@@ -95,7 +95,7 @@ async def test_the_figures_of_the_eyes(caller: Caller, figure: str, look: LightE
         ("freed", (0,), 1121),
     ],
 )
-async def test_what_cannot_be_shown(caller: Caller, name: str, args: tuple[int, ...], expected: int) -> None:
+async def test_invalid_lights_change_nothing(caller: Caller, name: str, args: tuple[int, ...], expected: int) -> None:
     before = [caller.robot[Light].state(zone) for zone in ("head", "tail", "eyes")]
     result = await caller(f"cyberdog.led.{name}", *args)
     assert (field(result, "state.code"), code(result)) == (1, expected)
@@ -182,7 +182,7 @@ async def test_music_is_heard_to_its_end(caller: Caller, number: int, piece: Cal
         ("offline_play", (4000, -2)),
     ],
 )
-async def test_what_cannot_be_played(caller: Caller, name: str, args: tuple[object, ...]) -> None:
+async def test_invalid_sounds_play_nothing(caller: Caller, name: str, args: tuple[object, ...]) -> None:
     before = caller.robot[Speaker].volume
     result = await caller(f"cyberdog.audio.{name}", *args)
     assert (field(result, "state.code"), field(result, "response.status")) == (1, 1)

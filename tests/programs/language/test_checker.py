@@ -66,7 +66,7 @@ def test_syntax_is_explained(source: str, line: int, column: int | None, english
     assert not problem.chinese.startswith("语法错误")
 
 
-def test_what_python_suggests_is_passed_on() -> None:
+def test_suggestions_of_python_are_passed_on() -> None:
     """From Python 3.14 on, which recognizes misspelled keywords."""
     problem = from_syntax_error("invalid syntax. Did you mean 'while'?", 1, 1)
     assert problem.english == "This is not a valid statement; perhaps 'while' is meant."
@@ -100,7 +100,7 @@ def test_what_python_suggests_is_passed_on() -> None:
         "try: pass\nexcept* ValueError: pass",
     ],
 )
-def test_what_leaves_the_language_is_refused(source: str) -> None:
+def test_code_outside_the_language_is_refused(source: str) -> None:
     problems = check(source)
     assert problems
     assert {problem.kind for problem in problems} == {ProblemKind.POLICY}

@@ -50,7 +50,7 @@ def credentials(pems: Pems) -> grpc.ServerCredentials:
     return grpc.ssl_server_credentials(((pems.key, pems.certificate),), pems.ca, require_client_auth=True)
 
 
-async def test_a_heartbeat_tells_the_robot_s_states(phoned, app, robot, passing: Passing) -> None:
+async def test_heartbeat_carries_the_robots_state(phoned, app, robot, passing: Passing) -> None:
     await passing(lambda: app.connected)
     ticks = app.ticks[0]
     assert ticks.ip == ADDRESS
@@ -323,7 +323,7 @@ async def test_an_outbox_keeps_order_and_drops_the_oldest() -> None:
         ("", ""),
     ],
 )
-def test_who_called(peer: str, host: str) -> None:
+def test_host_of_a_peer(peer: str, host: str) -> None:
     assert host_of(peer) == host
 
 

@@ -87,7 +87,7 @@ async def test_work_ends_with_its_only_waiting_app(client, robot, gadget, code, 
     assert work.reason == "no app waits for it any more"
 
 
-async def test_what_is_not_there_cannot_be_connected(client, robot, gadget, forward) -> None:
+async def test_absent_devices_cannot_be_connected(client, robot, gadget, forward) -> None:
     gadget.on = False
     assert await answered(client, 8002, {"selected_device": WANTED}, forward) == {"result": 1}
     assert await client.ask(8002, {"selected_device": {"mac": BRACELET}}) == {"error_code": 323}

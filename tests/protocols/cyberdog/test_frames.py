@@ -154,7 +154,7 @@ async def test_list_too_large_for_message_comes_in_parts(phone: Phone) -> None:
     assert all(len(text.encode()) < PUSH_ROOM for _, text in phone.app.pushed)
 
 
-async def test_what_is_no_json_is_answered_by_frame(phone: Phone) -> None:
+async def test_invalid_json_is_answered_by_a_frame(phone: Phone) -> None:
     assert await phone.client.raw(2002, "{not json") == []
     await until(lambda: phone.frames)
     assert phone.frames[0]["feedback"]["state"] == FeedbackState.NOT_JSON

@@ -38,7 +38,7 @@ async def settle() -> None:
         await asyncio.sleep(0)
 
 
-async def test_what_comes_at_once_is_sent_in_order() -> None:
+async def test_simultaneous_pushes_keep_their_order() -> None:
     clock, app = LockstepClock(), App()
     played = PlayedPushes(Playback([], clock, 0.0), cast(AppLink, app), clock, "cyberdog")
     played.put("2001", b"too old")

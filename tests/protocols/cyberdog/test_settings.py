@@ -182,7 +182,7 @@ async def test_voiceprints_are_asked_for_when_the_app_connects(client, app, pass
     await asyncio.sleep(0)
 
 
-async def test_the_electronic_skin_shows_what_the_app_tells(client, robot) -> None:
+async def test_electronic_skin_follows_the_app(client, robot) -> None:
     skin = robot[ElectronicSkin]
     assert await client.ask(11002, {"mode": 2, "wave_cycle_time": 500}) == {"success": True}
     assert (skin.state.pattern, skin.state.cycle) == (SkinPattern.REARWARD, 0.5)

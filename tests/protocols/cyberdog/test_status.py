@@ -62,7 +62,7 @@ async def test_the_self_check_waits_for_the_first_scan(client, forward: Forward)
         ("battery", FaultLevel.WARNING, 0, {}),
     ],
 )
-async def test_whatever_fails_is_in_the_self_check(client, robot, forward, part, level, code, expected) -> None:
+async def test_self_check_reports_every_failed_part(client, robot, forward, part, level, code, expected) -> None:
     await forward(seconds=1)
     robot[Health].set("broken for the test", True, part, level)
     well = {"motion_manager": 0, "device": {"bms": 0}, "sensor": {"lidar": 0}}

@@ -64,7 +64,7 @@ async def test_stop_waits_for_no_other_client(scene: Scene) -> None:
     assert scene.robot[Odometry].reading.pose.x > 0.1
 
 
-async def test_who_goes_away_lets_go(scene: Scene) -> None:
+async def test_drive_ends_when_its_viewer_leaves(scene: Scene) -> None:
     viewer = await publisher(scene, "/goal_pose", "geometry_msgs/PoseStamped")
     await viewer.publish(stamped(3.0, 0.0))
     await viewer.settled()
@@ -114,7 +114,7 @@ async def test_the_pose_is_set(scene: Scene) -> None:
     assert (pose.x, pose.y, pose.yaw) == pytest.approx((1.0, 2.0, 0.5), abs=0.01)
 
 
-async def test_what_makes_no_sense_is_refused(scene: Scene) -> None:
+async def test_invalid_messages_are_refused(scene: Scene) -> None:
     viewer = await publisher(scene, "/cmd_vel")
     await viewer.advertise("/fly", "geometry_msgs/Twist", 2)
     await viewer.advertise("/a/goal_pose", "geometry_msgs/PoseStamped", 3, encoding="cdr")
@@ -154,7 +154,7 @@ class Visitors(Admission):
             raise Forbidden(f"{operation} needs {right}")
 
 
-async def test_who_may_only_see_only_sees(scene: Scene) -> None:
+async def test_viewer_with_right_to_see_cannot_drive(scene: Scene) -> None:
     scene.robot.admission = Visitors()
     viewer = await publisher(scene, "/cmd_vel")
     await viewer.publish(FORWARD)

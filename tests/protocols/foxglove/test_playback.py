@@ -263,7 +263,7 @@ async def test_after_the_end_it_begins_anew(playing: Scene, film: Path) -> None:
         (0, 1e6, "times as fast"),
     ],
 )
-async def test_what_makes_no_sense_is_refused(playing: Scene, command: int, speed: float, why: str) -> None:
+async def test_invalid_playback_requests_are_refused(playing: Scene, command: int, speed: float, why: str) -> None:
     viewer = await playing.connect()
     await viewer.until(lambda: states(viewer))
     await viewer.socket.send(struct.pack("<BBfBQI", 3, command, speed, 0, 0, 0))

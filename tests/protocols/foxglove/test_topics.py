@@ -98,7 +98,7 @@ async def test_a_newcomer_gets_the_state_at_once(scene: Scene) -> None:
     await viewer.until(lambda: viewer.data.get(number))  # no robot time passes
 
 
-async def test_what_other_doors_hear_is_topic_without_secrets(scene: Scene) -> None:
+async def test_requests_at_doors_are_topics_without_secrets(scene: Scene) -> None:
     viewer = await scene.connect()
     await viewer.topic("/a/pose")
     async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448") as client:

@@ -147,7 +147,7 @@ async def test_beads_are_felt_by_robot_that_they_hit(client, robot, world, forwa
     assert await events_of(reader) == b"armor event hit 2 0;"
 
 
-async def test_armor_tells_every_reader_until_it_is_off(client, world, forward, listen) -> None:
+async def test_armor_events_reach_every_reader_until_off(client, world, forward, listen) -> None:
     first, second = await listen("events"), await listen("events")
     await client.ask("armor event hit on;")
     await client.ask("armor event hit on;")

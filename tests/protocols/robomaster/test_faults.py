@@ -33,7 +33,7 @@ async def test_moves_fail(client, world: World, clock: LockstepClock, forward: F
 
 
 @pytest.mark.world("empty")
-async def test_numbers_tell(client, world: World, clock: LockstepClock, forward: Forward) -> None:
+async def test_faults_change_the_reported_numbers(client, world: World, clock: LockstepClock, forward: Forward) -> None:
     await reply_to(client, clock, "ir_distance_sensor measure on;")
     await forward(seconds=0.3)
     far = float((await reply_to(client, clock, "ir_distance_sensor distance 1 ?;")).rstrip(";"))

@@ -35,7 +35,7 @@ async def test_keys_and_mouse_reach_the_client(client, door, robot, pushes, forw
 
 @PILOT
 @pytest.mark.parametrize("text", ["press W", "jump", "", "click nose", "mouse 2 0", "mouse x", "mouse 1", "press \xff"])
-async def test_what_is_no_input_is_reported(door, robot, text: str) -> None:
+async def test_invalid_input_is_reported(door, robot, text: str) -> None:
     pilot = await asyncio.open_connection(ADDRESS, port_of(door, "pilot"))
     assert (await say(pilot, f"{text}\n")).startswith("error: ")
     assert robot[InputDevice].state.keys == ()
@@ -60,9 +60,7 @@ async def test_it_is_closed_unless_asked_for(door) -> None:
         port_of(door, "pilot")
 
 
-async def test_where_everybody_knows_the_robot_nothing_is_announced(
-    robot, forward, door, broadcasts, monkeypatch
-) -> None:
+async def test_fixed_addresses_are_not_announced(robot, forward, door, broadcasts, monkeypatch) -> None:
     """The robot's own Wi-Fi and its USB cable have fixed addresses."""
     assert {"192.168.2.1", "192.168.42.2"} == server.KNOWN_ADDRESSES
     await door.close()

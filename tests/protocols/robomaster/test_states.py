@@ -160,7 +160,7 @@ words = st.one_of(
 @pytest.mark.parametrize("profile", ["spec", *(pytest.param(fw, marks=pytest.mark.slow) for fw in ("fw60", "fw70"))])
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(head=heads, tail=st.lists(words, max_size=8))
-def test_whatever_comes_is_answered_once_and_nothing_breaks(lab: Lab, profile: str, head: str, tail: list[str]) -> None:
+def test_every_command_is_answered_once(lab: Lab, profile: str, head: str, tail: list[str]) -> None:
     async def run() -> None:
         context = session_of(lab, profile)
         context.begin()

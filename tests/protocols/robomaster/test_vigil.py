@@ -107,7 +107,7 @@ def test_one_answer_among_many_losses_is_life(driver: DrivingClient) -> None:
         assert not driver.missing(True, 0.0)
 
 
-def test_what_the_connection_acknowledges_is_life_too(driver: DrivingClient) -> None:
+def test_acknowledged_data_counts_as_life(driver: DrivingClient) -> None:
     driver.missing(True, 0.0)
     assert not any(driver.missing(False, 3600.0) for _ in range(20))
 
@@ -119,7 +119,7 @@ def test_hosts_of_this_machine_are_not_asked() -> None:
     assert not DrivingClient("10.0.0.1:5000", "10.0.0.1", None).askable
 
 
-async def test_who_drives_nothing_is_never_gone(driver: DrivingClient) -> None:
+async def test_idle_client_is_never_reported_gone(driver: DrivingClient) -> None:
     gone: list[str] = []
     vigil = Vigil(lambda: [driver], lambda _name: False, gone.append)
     vigil._echoes = Echoes()

@@ -180,7 +180,7 @@ async def test_goal_is_reached_and_the_pose_is_set(opened: Opened) -> None:
     assert scene.robot[Localization].pose.x == pytest.approx(2.0, abs=0.05)
 
 
-async def test_what_cannot_be_done_is_line_of_log(opened: Opened) -> None:
+async def test_refused_commands_are_logged(opened: Opened) -> None:
     scene = await opened()
     peer: Peer = scene.peer
     peer.listen("/rosout", LOG)

@@ -113,7 +113,7 @@ UPGRADES = [
 
 @pytest.mark.parametrize("upgrade", UPGRADES)
 @pytest.mark.parametrize("pieces", [1, 3, 1000])
-async def test_who_wishes_for_another_protocol_gets_plain_answer(
+async def test_upgrade_request_gets_a_plain_answer(
     bare_door: SlamwareDoor,
     bare_client: httpx.AsyncClient,
     caplog: pytest.LogCaptureFixture,
@@ -137,7 +137,7 @@ async def test_who_wishes_for_another_protocol_gets_plain_answer(
     assert not caplog.records
 
 
-async def test_no_one_is_connected_elsewhere(bare_door: SlamwareDoor) -> None:
+async def test_connect_requests_are_refused(bare_door: SlamwareDoor) -> None:
     assert (await raw(bare_door, b"CONNECT example.org:443 HTTP/1.1\r\nHost: example.org:443\r\n\r\n")).startswith(
         b"HTTP/1.1 400 "
     )

@@ -24,7 +24,7 @@ TRIES_MAX = 200  # of 50 ms of robot time each: longer means that it hangs
 @pytest.mark.parametrize(
     ("seed", "count"), [(1, QUICK), *(pytest.param(n, COUNT, marks=pytest.mark.slow) for n in (1, 2))]
 )
-async def test_whatever_document_allows_is_answered_as_it_says(
+async def test_documented_requests_get_documented_answers(
     client: httpx.AsyncClient, forward: Forward, caplog: pytest.LogCaptureFixture, seed: int, count: int
 ) -> None:
     await forward(seconds=1)

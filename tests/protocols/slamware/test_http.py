@@ -82,7 +82,7 @@ def test_literals_win_over_parameters() -> None:
 
 
 @pytest.mark.parametrize("id", ["a/b", "50%", "100%2F", "大厅", "a b?c#d", "x:y", "😀" * 64])
-async def test_whatever_id_was_taken_can_be_asked_for(bare_client: httpx.AsyncClient, id: str) -> None:
+async def test_every_accepted_id_can_be_requested(bare_client: httpx.AsyncClient, id: str) -> None:
     assert (await bare_client.post(POIS, json={"id": id, "pose": {"x": 1, "y": 2}})).status_code == 200
     one = f"{POIS}/{quote(id, safe='')}"
     assert (await bare_client.get(one)).json()["id"] == id

@@ -95,7 +95,7 @@ async def test_power_supply_is_a_wire_not_the_dock(robot: Robot, client: httpx.A
         assert (power["isDCConnected"], power["dockingStatus"], power["isCharging"]) == (wire, "on_dock", True)
 
 
-async def test_a_healthy_robot_has_nothing_to_tell(client: httpx.AsyncClient) -> None:
+async def test_healthy_robot_reports_no_errors(client: httpx.AsyncClient) -> None:
     health = await get(client, f"{SYSTEM}/robot/health")
     assert isinstance(health, dict)
     assert health["baseError"] == []

@@ -106,7 +106,7 @@ async def test_pause_holds_and_cancel_ends(yard: Opened) -> None:
         (lambda o: o.update(version="2.1.0"), "VALIDATION_FAILURE"),
     ],
 )
-async def test_what_cannot_be_is_refused_in_standards_words(yard: Opened, change: Any, error: str) -> None:
+async def test_impossible_orders_are_refused_in_standard_words(yard: Opened, change: Any, error: str) -> None:
     one = await yard()
     made = order("bad", [(0, 0), (1, 0)])
     change(made)

@@ -72,7 +72,7 @@ def test_an_order_with_a_horizon_is_not_finished() -> None:
     assert refusal(book, order("two", [(0, 0)])) is ErrorKind.OTHER_ORDER
 
 
-def test_what_waits_fails_when_the_order_is_cancelled() -> None:
+def test_waiting_actions_fail_when_order_is_cancelled() -> None:
     book = OrderBook()
     made = order("one", [(0, 0), (1, 0)])
     made["nodes"][1]["actions"] = [action("waitForTrigger", "w")]
@@ -192,7 +192,7 @@ def test_anything_else_is_malformed(data: bytes) -> None:
 
 @settings(max_examples=50)
 @given(st.lists(valid_orders() | st.just("reach") | st.just("cancel"), max_size=8))
-def test_whatever_comes_the_book_stays_consistent(steps: list[Any]) -> None:
+def test_book_stays_consistent_after_any_steps(steps: list[Any]) -> None:
     book = OrderBook()
     for step in steps:
         if step == "reach" and (left := list(book.base)):

@@ -152,7 +152,7 @@ async def test_favourites_of_one_robot_run_on_the_other(robots: Robots, database
     assert await two.printed("t1") == ["from the cloud"] * 2
 
 
-async def test_what_happens_is_recorded_in_order(robots: Robots, database: Database) -> None:
+async def test_operations_are_recorded_in_order(robots: Robots, database: Database) -> None:
     app = await robots.robot("one", database)
     await app.save("t", "pass")
     await app.ask("run", "t")
@@ -335,7 +335,7 @@ async def test_address_that_is_no_cloud_is_reported_plainly(cloud: Cloud) -> Non
             CloudLink(url, token, "a")
 
 
-async def test_who_never_answers_is_given_up(clock: LockstepClock) -> None:
+async def test_silent_cloud_is_given_up(clock: LockstepClock) -> None:
     connected = asyncio.Event()
 
     async def silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

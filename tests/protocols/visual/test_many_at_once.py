@@ -24,7 +24,7 @@ IDS = ("t", "t1", "t10", "t2")
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
-async def test_whatever_comes_the_states_agree(app: FrontEnd, seed: int) -> None:
+async def test_states_agree_after_random_operations(app: FrontEnd, seed: int) -> None:
     dice = random.Random(seed)
     pids: set[int] = set()
 

@@ -34,7 +34,7 @@ async def test_a_task_calls_a_module_that_calls_another(app: FrontEnd) -> None:
     assert await app.printed("t") == ["twice 42", "two 2"]
 
 
-async def test_lists_tell_dependencies_both_ways(app: FrontEnd) -> None:
+async def test_lists_show_dependencies_both_ways(app: FrontEnd) -> None:
     await module(app, "m1", "double(n)", "return 2 * n", describe="doubles", style="[]", mode="sequence")
     await module(app, "m2", "say(n)", "print(double(n))")
     await app.save("t", "say(1)")
@@ -57,7 +57,7 @@ async def test_lists_tell_dependencies_both_ways(app: FrontEnd) -> None:
     assert [item["id"] for item in one["list"]] == ["m2"]
 
 
-async def test_what_is_called_cannot_be_deleted(app: FrontEnd) -> None:
+async def test_called_modules_cannot_be_deleted(app: FrontEnd) -> None:
     await module(app, "m1", "f()", "pass")
     await module(app, "m10", "g()", "f()")
     await app.save("t", "g()")
@@ -109,7 +109,7 @@ async def test_wrong_module_is_kept_and_stops_its_callers(app: FrontEnd) -> None
     assert await app.printed("t") == ["2"]
 
 
-async def test_errors_in_a_module_tell_its_line(app: FrontEnd) -> None:
+async def test_errors_in_a_module_name_its_line(app: FrontEnd) -> None:
     await module(app, "m", "f(n)", "x = n\nreturn 1 / x")
     await app.start("t", "print('on')\nf(0)")
     await app.ends("t")

@@ -96,7 +96,7 @@ async def test_wrong_body_is_kept_as_a_located_error(app: FrontEnd) -> None:
     assert (await app.save("t", "x = 1"))["state"] == 0
 
 
-async def test_what_robot_cannot_do_is_reported_in_answer(app: FrontEnd) -> None:
+async def test_unsupported_calls_are_reported_in_their_answer(app: FrontEnd) -> None:
     await app.start("t", "print(cyberdog.led.freed(9).response.code)\n")
     await app.ends("t")
     assert await app.printed("t") == ["1121"]
@@ -218,7 +218,7 @@ async def test_a_line_ends_where_the_program_ends_it(app: FrontEnd) -> None:
     assert entries[-2:] == [("print", "half"), ("error", "ZeroDivisionError")]
 
 
-async def test_what_runs_tells_what_it_takes(app: FrontEnd) -> None:
+async def test_running_tasks_report_their_use(app: FrontEnd) -> None:
     await app.start("t", "x = bytearray(20_000_000)\nprint('ready')\nwhile True: pass")
     await app.until(lambda: app.service.running()[0].cpu > 0.02 and app.service.running()[0].memory > 20_000_000)
     [figures] = app.service.running()
@@ -228,7 +228,7 @@ async def test_what_runs_tells_what_it_takes(app: FrontEnd) -> None:
     assert app.service.running() == []
 
 
-async def test_delete_answers_per_target_and_minds_similar_ids(app: FrontEnd) -> None:
+async def test_delete_answers_per_target_with_similar_ids(app: FrontEnd) -> None:
     for id in ("t1", "t10", "t2"):
         await app.save(id, "pass")
     await app.start("t2", BUSY)

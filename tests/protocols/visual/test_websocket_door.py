@@ -188,7 +188,7 @@ async def test_only_pages_of_this_host_may_come_in(address: str, origin: str, st
     assert (b"s3pPLMBiTxaQ9kYGzzhZRbK+xOo=" in answer) is (status == 101)
 
 
-async def test_what_is_no_websocket_is_reported(address: str) -> None:
+async def test_plain_http_is_refused(address: str) -> None:
     with pytest.raises(BadAnswer, match="404"):
         await TextLink.open(address, "/else")
     assert b" 426 " in await raw(address, "GET /programs HTTP/1.1\r\nHost: x\r\n\r\n")
@@ -279,7 +279,7 @@ async def test_frames_behind_the_request_are_read(address: str) -> None:
     writer.close()
 
 
-async def test_where_a_program_is(address: str) -> None:
+async def test_position_of_a_program(address: str) -> None:
     link, where = await TextLink.open(address, "/programs"), await TextLink.open(address, "/where")
 
     async def place(task: str) -> tuple[str, int, str, str]:
@@ -377,7 +377,7 @@ async def test_a_program_waits_only_for_readers_that_read(
     asleep.close()
 
 
-async def test_who_waits_for_a_reader_can_be_ended(
+async def test_program_waiting_for_a_reader_can_be_ended(
     door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(websocket_writer, "STALLED_SECONDS_MAX", 600.0)

@@ -63,7 +63,7 @@ def test_file_opens_with_the_reader_of_mcap_itself(tmp_path: Path) -> None:
 
 @pytest.mark.timeout(900)  # a hang
 @pytest.mark.parametrize(("rounds", "kills"), [(1, 2), pytest.param(10, KILLS, marks=pytest.mark.slow)])
-def test_what_was_written_survives_kill_9(tmp_path: Path, rounds: int, kills: int) -> None:
+def test_written_messages_survive_kill_9(tmp_path: Path, rounds: int, kills: int) -> None:
     for number in range(rounds):
         (tmp_path / str(number)).mkdir()
         kill_writers(tmp_path / str(number), kills)

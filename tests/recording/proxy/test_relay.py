@@ -83,7 +83,7 @@ async def by_text(address: str) -> list[bytes]:
     ],
     ids=["slamware", "slamware drive", "robomaster", "visual"],
 )
-async def test_what_passes_is_what_robots_own_tap_says(url: str, script: Any, tmp_path: Path) -> None:
+async def test_proxy_and_the_robots_tap_agree(url: str, script: Any, tmp_path: Path) -> None:
     own, passed, sums = tmp_path / "own.mcap", tmp_path / "passed.mcap", list[str]()
 
     async def through(_: str) -> Any:
@@ -217,7 +217,7 @@ async def test_full_disk_stops_the_recording_but_no_client(tmp_path: Path, monke
     assert said[0] == b"ok;"
 
 
-async def test_what_is_not_understood_passes_all_the_same(tmp_path: Path) -> None:
+async def test_unreadable_bytes_are_passed_on(tmp_path: Path) -> None:
     ended = asyncio.Event()
 
     async def echo(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -338,7 +338,7 @@ async def test_dog_s_message_that_cannot_be_read_passes(tmp_path: Path) -> None:
         (("--listen", BETWEEN, "--to", "nowhere/new.mcap"), "nowhere/new.mcap: No such file or directory"),
     ],
 )
-def test_what_cannot_begin_leaves_no_file(
+def test_failed_start_leaves_no_file(
     words: tuple[str, ...], why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

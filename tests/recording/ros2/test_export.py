@@ -95,7 +95,7 @@ async def test_one_robot_alone(drive: tuple[Path, float], tmp_path: Path) -> Non
     assert "/rosout" not in mine
 
 
-async def test_what_cannot_be_is_said(drive: tuple[Path, float], tmp_path: Path) -> None:
+async def test_impossible_exports_are_refused(drive: tuple[Path, float], tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     for source, bag in ((drive[0], tmp_path / "there"), (tmp_path / "no.mcap", tmp_path / "x")):
         ended = CliRunner().invoke(loaded("export"), [str(source), "--rosbag2", str(bag)])

@@ -182,7 +182,7 @@ async def test_a_raised_foot_stays_up(dog):
         (TROT, (Foothold(),) * 3, "4 footholds"),
     ],
 )
-async def test_what_no_dog_can_do_moves_nothing(dog, falls, holds, words):
+async def test_impossible_dances_move_nothing(dog, falls, holds, words):
     with pytest.raises(InvalidGoal, match=words):
         dog.robot[Legs].dance([Step(1.0, footholds=holds)], falls)
     assert not dog.robot.actions.history

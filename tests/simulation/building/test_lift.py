@@ -56,7 +56,7 @@ async def test_robot_rides_to_second_floor_and_drives_out(simulate):
     assert sim.robot[Lidar].scan is not None
 
 
-async def test_it_tells_in_order_what_it_does(simulate):
+async def test_lift_reports_its_moves_in_order(simulate):
     sim, lift, heard = start(simulate, BEFORE, floor=1)
     lift.call(1)
     assert reported(heard) == [("LiftCalled", 1)]

@@ -53,7 +53,7 @@ def test_each_step_is_level_and_rises_sheer(x, y, height):
         ("{ at = [5.0, 5.0] }", "steps"),
     ],
 )
-def test_what_cannot_be_built_is_reported(entry, message, tmp_path):
+def test_impossible_stairs_are_refused(entry, message, tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text(f'name = "bad"\n[[floors]]\nsize = [10, 10]\nstairs = [{entry}]\n')
     with pytest.raises(BadFile, match=message):
@@ -82,7 +82,7 @@ async def test_the_eyes_see_riser_and_tread():
 
 
 @pytest.mark.parametrize("pose", [Pose(3.5, 4.0), Pose(5.4, 4.0, math.pi), Pose(2.0, 2.0)])
-async def test_what_comes_back_lies_on_rays_from_eye(pose):
+async def test_echoes_lie_on_rays_from_the_eye(pose):
     world, robot, _ = await put("cyberdog2", pose)
     for name in robot[TimeOfFlight].names:
         reading = robot[TimeOfFlight].reading(name)

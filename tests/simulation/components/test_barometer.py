@@ -19,7 +19,7 @@ async def test_pressure_is_that_of_the_height(simulate):
     assert reading.pressure == pytest.approx(pressure_at(height), abs=OFFSET)
 
 
-async def test_a_floor_up_is_felt_whatever_the_offset(simulate):
+async def test_next_floor_is_measured_with_any_offset(simulate):
     sim = simulate("office", body="universal")
     ground = sim.robot[Barometer].reading.pressure
     sim.world.hands.place("a", Pose(6.0, 10.0), floor=1)

@@ -177,7 +177,7 @@ async def test_a_pressed_bumper_stops_the_wheels(simulate):
 
 
 @pytest.mark.parametrize(("twist", "zone"), [(Twist(y=0.5), "left"), (Twist(y=-0.5), "right"), (Twist(-0.5), "rear")])
-async def test_the_bumper_tells_the_side(simulate, twist, zone):
+async def test_bumper_reports_the_side(simulate, twist, zone):
     sim = simulate(start=Pose(9.5, 9.5, {"left": 0.0, "right": math.pi, "rear": math.pi}[zone]))
     sim.world.start()
     sim.robot[Base].set_velocity(twist)

@@ -62,7 +62,7 @@ async def test_tof_sees_an_obstacle_on_its_side_only(dog):
         tof.reading("nose")
 
 
-async def test_tof_tells_too_near(dog):
+async def test_tof_reports_too_near(dog):
     dog.world.hands.place("a", Pose(9.68, 5.0))
     await dog.clock.advance(0.2)
     grid = dog.robot[TimeOfFlight].reading("head left").distances

@@ -91,7 +91,7 @@ async def test_a_single_lamp_of_a_ring(light):
         ({"zone": "gimbal_left", "lamp": 1, "effect": LightEffect.BREATH}, InvalidGoal),
     ],
 )
-async def test_what_cannot_be_shown_is_refused(light, given, error):
+async def test_invalid_lights_are_refused(light, given, error):
     with pytest.raises(error):
         light.shine(**given)
     assert light.lamps("front") == (DARK,)

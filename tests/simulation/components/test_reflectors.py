@@ -40,7 +40,7 @@ async def test_a_strip_does_not_shine(things):
         assert await shining(room) == ()
 
 
-async def test_no_one_looks_unless_asked():
+async def test_detector_works_only_with_viewers():
     with lab(reflectors=[STRIP], furniture=[BEHIND]) as room:
         detector = room.robot[Reflectors].detector
         await room.clock.advance(0.5)

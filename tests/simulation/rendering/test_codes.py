@@ -27,7 +27,7 @@ def test_tags_are_read(number):
     assert numbers.ravel().tolist() == [number]
 
 
-def test_what_cannot_be_printed():
+def test_too_long_codes_are_refused():
     with pytest.raises(ValueError, match="up to 106 bytes"):
         qr("y" * (QR_BYTES_MAX + 1))
     with pytest.raises(ValueError, match="tags 0 to 586"):

@@ -170,7 +170,7 @@ async def test_a_marker_cannot_be_read(change, furniture):
         assert await room.see("markers") == []
 
 
-async def test_who_puts_something_before_a_marker_hides_it():
+async def test_obstacle_before_a_marker_hides_it():
     with lab(markers=[ONE]) as room:
         number = room.world.hands.add_obstacle(Pose(5, 5))
         assert await room.see("markers") == []
@@ -178,7 +178,7 @@ async def test_who_puts_something_before_a_marker_hides_it():
         assert len(await room.see("markers")) == 1
 
 
-async def test_tags_tell_their_pose_against_the_robot():
+async def test_tags_are_seen_with_their_relative_pose():
     robot = Pose(2, 5, 0.3)
     tags = [
         {"at": [4.5, 6.2], "facing": 200, "text": "42", "height": 0.5},

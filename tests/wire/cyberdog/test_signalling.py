@@ -44,7 +44,7 @@ names = ["offer_sdp", "answer_sdp", "c_sdp", "uid", "height", "width", "alignmen
 
 
 @given(signals)
-def test_what_one_end_writes_the_other_reads(signal) -> None:
+def test_written_signals_are_read_back(signal) -> None:
     assert read_signal(json.loads(json.dumps(fields_of(signal)))) == signal
 
 

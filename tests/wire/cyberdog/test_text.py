@@ -41,7 +41,7 @@ def test_all_json_is_read(value: object) -> None:
 
 
 @given(st.dictionaries(st.sampled_from("nvbsx"), JSON))
-def test_what_does_not_fit_counts_as_left_out(values: dict[str, object]) -> None:
+def test_unfit_values_count_as_absent(values: dict[str, object]) -> None:
     kept = fitting(values, FIELDS)
     assert kept.items() <= values.items() or set(kept) <= set("nvbs")
     msgspec.convert({"n": 0, **kept}, FIELDS, strict=False)  # 303.0 counts as 303

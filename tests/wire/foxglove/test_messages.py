@@ -32,7 +32,7 @@ def test_anything_is_read_or_refused(data: str | bytes) -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.binary())
-def test_what_is_published_arrives(channel: int, data: bytes) -> None:
+def test_published_messages_are_read(channel: int, data: bytes) -> None:
     request = read_request(b"\x01" + channel.to_bytes(4, "little") + data)
     assert request == Request("messageData", {"channel": channel, "data": data})
 

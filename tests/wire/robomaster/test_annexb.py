@@ -36,7 +36,7 @@ def test_anything_else_is_kept_whole(parts: list[bytes]) -> None:
     assert b"".join(parts).startswith(b"".join(got))
 
 
-def test_what_is_no_video_ends() -> None:
+def test_stream_without_pictures_is_refused() -> None:
     splitter = AccessUnitSplitter()
     assert list(splitter.feed(b"\x00" * ACCESS_UNIT_MAX)) == []
     with pytest.raises(ValueError, match="a picture of more"):

@@ -132,7 +132,7 @@ def test_a_value_is_never_not_a_number(text: str) -> None:
     st.booleans(),
     st.none() | st.integers(min_value=0, max_value=SEQ_MAX),
 )
-def test_what_is_written_is_read_back(words: list[str], query: bool, seq: int | None) -> None:
+def test_written_commands_are_read_back(words: list[str], query: bool, seq: int | None) -> None:
     command = Command(tuple(words), query, seq)
     assert parse(str(command)) == command
 

@@ -45,7 +45,7 @@ def test_captured_events() -> None:
     assert list(parse_pushes(b"game msg push [0, 6, 1, 0, 0, 255, 1, 87];")) == [GameInput(0, (1, 0, 0, 255, 1, 87))]
 
 
-def test_what_is_seen() -> None:
+def test_recognised_targets_are_parsed() -> None:
     assert list(parse_pushes(b"AI push person 1 0.5 0.5 0.3 0.7;")) == [
         TargetsSeen("person", (Target(0.5, 0.5, 0.3, 0.7),))
     ]
@@ -61,7 +61,7 @@ def test_what_is_seen() -> None:
 
 @pytest.mark.parametrize("profile", [SPEC, FW60, FW70], ids=lambda profile: profile.name)
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=2), st.tuples(*[st.floats(-1e6, 1e6)] * 3))
-def test_what_our_robots_say_is_understood(profile: Profile, xy: list[float], angles: tuple[float, ...]) -> None:
+def test_pushes_of_our_robots_are_parsed(profile: Profile, xy: list[float], angles: tuple[float, ...]) -> None:
     position, attitude = parse_pushes(profile.push("chassis", ("position", xy), ("attitude", angles), separator=" ; "))
     assert isinstance(position, ChassisPosition)
     assert isinstance(attitude, ChassisAttitude)
@@ -95,7 +95,7 @@ def test_broadcasts(data: bytes, address: str | None) -> None:
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-1e999", "1e10"])
-def test_what_is_no_number_is_left_out(number: str) -> None:
+def test_invalid_numbers_are_skipped(number: str) -> None:
     for text in (f"chassis push attitude 0 {number} 0;", f"AI push people 1 {number} 0.5 0.5 0.5;"):
         assert list(parse_pushes(f"{text}chassis push position 1 2;".encode())) == [ChassisPosition(1, 2)]
     with pytest.raises(ValueError, match="no number"):

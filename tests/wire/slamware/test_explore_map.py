@@ -32,7 +32,7 @@ def test_the_layout_byte_by_byte() -> None:
 
 
 @given(arrays(np.int8, array_shapes(min_dims=2, max_dims=2, min_side=0, max_side=20)))
-def test_what_was_encoded_comes_back(cells: np.ndarray) -> None:
+def test_encoded_maps_are_decoded_unchanged(cells: np.ndarray) -> None:
     back = decode_explore_map(encode_explore_map(ExploreMap(1.0, -2.0, 0.25, cells)))
     assert (back.x, back.y, back.resolution) == (1.0, -2.0, 0.25)
     assert np.array_equal(back.cells, cells)

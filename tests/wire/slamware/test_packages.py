@@ -20,7 +20,7 @@ def test_name_and_version_of_an_app(wide: bool) -> None:
     assert parse_manifest(manifest("org.x", number=12, wide=wide)) == Apk("org.x", "12")
 
 
-def test_what_firmware_brings() -> None:
+def test_firmware_packages_are_described() -> None:
     text = b'{"version": "2.1.0", "model": "Hermes", "modules": {"motion": "1.4"}}'
     found = read_firmware(io.BytesIO(archive(firmware__json=text, image__bin=b"\0" * 1000)))
     assert (found.version, found.model, found.modules) == ("2.1.0", "Hermes", {"motion": "1.4"})

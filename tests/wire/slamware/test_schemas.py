@@ -54,7 +54,7 @@ def test_a_flag_is_found_among_others() -> None:
     assert convert({"mode": 0, "flags": ["precise", "with_yaw"]}, MoveOptions).has("with_yaw")
 
 
-def test_what_we_do_not_know_is_ignored() -> None:
+def test_unknown_fields_are_ignored() -> None:
     options = convert({"direction": 3, "linear_velocity": 0.2, "speed_ratio": 1}, MoveByOptions)
     assert options.direction == 3
     assert convert({"target": {"x": 1, "y": 2, "z": 0, "w": 5}, "more": []}, MoveToOptions).target.y == 2

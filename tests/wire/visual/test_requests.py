@@ -103,7 +103,7 @@ def test_the_first_bad_field_decides(change: dict[str, Any], state: FeedbackStat
 @pytest.mark.parametrize(
     "text", ["", "{", "[]", "null", "NaN", '{"a": NaN}', "[" * 100_000, "1" * 5000, '{"a":1,}', " " * (FRAME_MAX + 1)]
 )
-def test_what_is_no_json_object(text: str) -> None:
+def test_invalid_json_is_refused(text: str) -> None:
     with pytest.raises(BadFrame) as refusal:
         parse_request(text)
     assert refusal.value.state is FeedbackState.NOT_JSON

@@ -76,7 +76,7 @@ async def test_a_recording_is_an_mp4_of_its_length(client, robot, forward, folde
     await passing(lambda: list(folder.iterdir()) == [])
 
 
-async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
+async def test_refusals_come_as_a_chunk(client, robot) -> None:
     for code, params, error in (
         (4002, {"command": 3}, 5),  # nothing is recorded
         (4002, {"command": 9}, 1),
@@ -94,7 +94,7 @@ async def test_what_is_refused_comes_as_a_chunk(client, robot) -> None:
     assert await client.ask(4002, {"command": 3}) == {"result": 5}  # it began no recording
 
 
-async def test_what_was_not_fetched_is_offered_and_fetched(client, app: App, robot, folder, passing) -> None:
+async def test_unfetched_files_are_offered_again(client, app: App, robot, folder, passing) -> None:
     assert await client.ask(4002, {"command": 1}) == {"result": 0}
     assert await client.ask(4002, {"command": 1}) == {"result": 0}
     names = sorted(path.name for path in folder.iterdir())

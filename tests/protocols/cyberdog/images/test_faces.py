@@ -70,7 +70,7 @@ async def test_no_one_is_recognised_there(client, app, robot, anna, world, passi
 
 
 @pytest.mark.slow  # minutes; in short: test_no_one_is_recognised_there
-async def test_no_one_there(client, app, robot, anna, world, passing, forward) -> None:
+async def test_enrolling_fails_without_a_face(client, app, robot, anna, world, passing, forward) -> None:
     world.hands.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
     assert await client.ask(7001, {"command": 1}) == {"result": 5903}
     assert await client.ask(7001, {"command": 0, "username": "anna"}) == {"result": 0}

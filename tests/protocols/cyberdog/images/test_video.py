@@ -171,7 +171,7 @@ async def test_without_way_to_the_app_it_gives_up(watch, monkeypatch) -> None:
     assert not watcher.signals("is_closed")  # that name is gone
 
 
-async def test_what_is_no_offer_is_reported(watch, client, app) -> None:
+async def test_invalid_offers_are_reported(watch, client, app) -> None:
     for sdp in ("v=0", {"type": "offer", "sdp": "nonsense\r\nm=video"}, {"type": "offer", "sdp": "m=" * 99}):
         assert await client.ask(4001, {"offer_sdp": sdp, "uid": "bad"}) == ""
         await until(lambda: app.of(4001))

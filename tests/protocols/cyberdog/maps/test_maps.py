@@ -113,7 +113,7 @@ async def test_the_dock_goes_with_the_map(client, door, robot, world, forward, p
     assert (await client.ask(10001))["charging_status"]["wireless_charging"] is True
 
 
-async def test_why_it_cannot_charge_is_reported(client, robot, world, forward, passing: Passing) -> None:
+async def test_failed_charging_is_reported_with_the_reason(client, robot, world, forward, passing: Passing) -> None:
     world.hands.place("a", Pose(6.0, 6.0, 0.0))
     await forward(seconds=0.5)
     robot[Docking].set_home(None)

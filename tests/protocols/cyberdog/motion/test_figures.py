@@ -90,7 +90,7 @@ async def test_a_lying_dog_gets_up_for_a_figure(client, robot, forward) -> None:
     assert robot[Legs].posture is Posture.STANDING
 
 
-async def test_what_stands_in_the_way_is_reported(client, robot, world, forward) -> None:
+async def test_obstacle_before_a_figure_is_reported(client, robot, world, forward) -> None:
     world.hands.place("a", Pose(0.45, 4.0, math.pi))  # before the wall
     await forward(seconds=0.5)
     assert (await answered(client, 1004, {"motion_id": 132}, forward))["code"] == 3041

@@ -56,7 +56,7 @@ async def test_the_person_chosen_is_followed(client: Client, app: App, robot, wo
 
 
 @pytest.mark.slow  # long; tests/autonomy/test_following.py has losing a person
-async def test_who_is_lost_for_long_ends_the_task(client, app, robot, world, anna, passing) -> None:
+async def test_long_loss_of_the_person_ends_following(client, app, robot, world, anna, passing) -> None:
     stream = Stream(client, 6004, {"type": 13})
     await passing(lambda: any(push["body_info_roi"] for push in app.of(6007)))
     await client.ask(6008, {"roi": app.of(6007)[-1]["body_info_roi"][0]["roi"]})

@@ -64,7 +64,7 @@ async def test_integers_in_float_arrays_count(client, robot, world, forward) -> 
 
 
 @pytest.mark.parametrize("velocity", [[0.4], [0.4, 0.0, 0.0, 0.0], "fast", [0.4, "0", None]])
-async def test_what_is_no_velocity_stands_still(client, robot, world, forward, velocity) -> None:
+async def test_invalid_velocity_moves_nothing(client, robot, world, forward, velocity) -> None:
     before = world.truth.pose_of("a")
     await client.ask(1002, {"motion_id": 303, "vel_des": velocity})
     await forward(seconds=0.15)
@@ -251,7 +251,7 @@ async def test_another_door_takes_over(client, robot, world, forward) -> None:
     assert (await walking)["code"] == 3001
 
 
-async def test_device_information_tells_what_was_asked(client, robot, world) -> None:
+async def test_device_information_has_the_requested_fields(client, robot, world) -> None:
     assert await client.ask(1001) == {"non-standing": False}
     answer = await client.ask(1001, {"is_sn": True, "is_bat_info": True, "is_wifi": True, "is_stand": 1, "uid": 3})
     assert answer.keys() == {"sn", "bat_info", "wifi", "non-standing"}

@@ -111,7 +111,7 @@ async def test_a_foot_is_held_out(client, robot, forward) -> None:
     assert (await client.ask(1004, {**params, "contact": 0b1010}))["code"] == 3010  # too long to stand on two feet
 
 
-async def test_what_a_program_danced_is_danced_again(client, robot, world, forward) -> None:
+async def test_dance_of_a_program_can_be_repeated(client, robot, world, forward) -> None:
     assert (await client.ask(1004, {"motion_id": 400}))["code"] == 3031
     assert (await client.ask(1004, {"motion_id": 401, "vel_des": [0.1, 0, 0]}))["code"] == 3031
     steps = [Step(1.0, Twist(0.2), BodyPose(attitude=Orientation(roll=0.1))), Step(1.0, Twist(yaw=0.5))]

@@ -243,7 +243,7 @@ async def test_transcript(client, robot) -> None:
         ("version;", "version 00.00.00.70;"),
     ],
 )
-async def test_what_robots_answer(client, text: str, reply: str) -> None:
+async def test_answers_equal_those_of_real_robots(client, text: str, reply: str) -> None:
     assert await client.ask(text) == reply
 
 

@@ -158,7 +158,7 @@ async def test_an_industrial_round(screen: Screen, cloud: Path) -> None:
     assert task["status"] == "SUCCEEDED"
 
 
-async def test_what_a_robot_cannot_do_and_nonsense(
+async def test_impossible_and_unknown_tasks_are_refused(
     screen: Screen, robot: Robot, world: World, cloud: Path, forward: Forward
 ) -> None:
     await screen.prepare(R101=(2.0, 0.0, "ROOM"))

@@ -192,7 +192,7 @@ async def test_leaves_its_dock_for_an_order_and_returns(screen: Screen, robot: R
     assert robot[DockContact].docked
 
 
-async def test_what_is_refused(screen: Screen) -> None:
+async def test_unacceptable_orders_are_refused(screen: Screen) -> None:
     await screen.prepare(R101=(1.0, 0.0, "ROOM"))
     await screen.client.put(f"{TASKS}/:task_execution", json={"enable_task_execution": False})
     await screen.create("R101", "TAKEOUT", 0)

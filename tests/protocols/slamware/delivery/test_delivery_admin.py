@@ -152,7 +152,7 @@ async def test_password_language_configuration_and_voice(screen: Screen) -> None
     assert (await get(screen, "voice_resources"))["result"] is False
 
 
-async def test_boxes_tell_how_their_last_operation_went(screen: Screen, robot: Robot) -> None:
+async def test_boxes_report_their_last_operation(screen: Screen, robot: Robot) -> None:
     from roboglot.model.components.logistics.cargo import Cargo
 
     await screen.prepare()

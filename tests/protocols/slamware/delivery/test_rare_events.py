@@ -212,7 +212,7 @@ FAILED_RIDES = [
 
 
 @pytest.mark.world("empty", body="hermes")
-async def test_where_a_ride_fails(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+async def test_failed_rides_raise_their_events(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     """The rides themselves, with what is in their way, are in tests/autonomy/navigation/test_floors.py."""
     for stage, error, events in FAILED_RIDES:
 

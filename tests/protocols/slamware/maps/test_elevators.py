@@ -113,7 +113,7 @@ async def test_elevators_of_the_map(client: httpx.AsyncClient, forward: Forward,
     assert (await client.get(f"{ELEVATORS}/{LIFT}")).json() == elevator
 
 
-async def test_where_the_robot_is_relative_to_them(client: httpx.AsyncClient, forward: Forward, origin: Pose) -> None:
+async def test_relation_of_the_robot_to_elevators(client: httpx.AsyncClient, forward: Forward, origin: Pose) -> None:
     await forward(seconds=1)
     await client.post(AREAS, json=area_of(origin))
     for x, relation in ((1.0, "in_elevator"), (2.1, "close_to_elevator_sill"), (-0.3, "out_of_elevator")):
@@ -202,7 +202,7 @@ async def test_to_a_place_on_another_floor_and_back(
     assert world.truth.floor_of("a") == 0
 
 
-async def test_what_is_nowhere_fails(client: httpx.AsyncClient, forward: Forward) -> None:
+async def test_unknown_place_fails_the_action(client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     id = await start(client, "MultiFloorMoveAction", target={"poi_name": "nowhere"})
     ended, _ = await finish(client, forward, id)

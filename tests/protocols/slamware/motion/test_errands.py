@@ -278,7 +278,7 @@ async def test_the_jack_as_an_action(robot: Robot, client: httpx.AsyncClient, fo
     assert robot[Jack].stage is JackStage.UP
 
 
-async def test_what_is_lifted_is_carried_to_a_place(
+async def test_lifted_shelf_is_carried_to_a_place(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     await forward(seconds=1)

@@ -31,7 +31,7 @@ def crossing(seed: int) -> list[tuple[float, float]]:
     ],
 )
 @pytest.mark.world("empty", body="hermes")
-async def test_who_succeeds_was_at_every_goal(
+async def test_success_means_every_goal_was_reached(
     world: World, client: httpx.AsyncClient, forward: Forward, name: str, spots: list[tuple[float, float]]
 ) -> None:
     await forward(seconds=1)

@@ -132,7 +132,7 @@ async def test_through_several_points(client: httpx.AsyncClient, world: World, f
     assert_pose(map_pose(world, origin), x=3.0, y=-1.0, within=0.08)
 
 
-async def test_what_lies_off_the_map_cannot_be_reached(client: httpx.AsyncClient, forward: Forward) -> None:
+async def test_goal_off_the_map_cannot_be_reached(client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     info = await start(client, "MoveToAction", target={"x": 500.0, "y": 0.0})
     state = await finish(client, forward, info["action_id"], within=120)
@@ -141,7 +141,7 @@ async def test_what_lies_off_the_map_cannot_be_reached(client: httpx.AsyncClient
 
 @pytest.mark.world("tests/autonomy/worlds/closed_room.toml", body="hermes")
 @pytest.mark.parametrize("x", [6.0, 8.0], ids=["in the wall", "in a closed room"])
-async def test_where_no_way_leads_cannot_be_reached(client, world, forward: Forward, x: float) -> None:
+async def test_enclosed_goal_cannot_be_reached(client, world, forward: Forward, x: float) -> None:
     await forward(seconds=1)
     goal = Pose(x, 3.0).relative_to(world.truth.pose_of("a"))
     info = await start(client, "MoveToAction", target={"x": goal.x, "y": goal.y})
@@ -321,7 +321,7 @@ async def test_the_stop_button_stops_what_anybody_began(
         ("GoHomeAction", {"gohome_options": {"flags": ""}}),
     ],
 )
-async def test_what_cannot_be_created(
+async def test_invalid_actions_are_not_created(
     client: httpx.AsyncClient, forward: Forward, name: str, options: dict[str, object]
 ) -> None:
     reply = await client.post(ACTIONS, json={"action_name": FIRMWARE_4 + name, "options": options})
