@@ -14,6 +14,7 @@ import pytest
 
 from roboglot.cli.map import Way, command, grid_in, write_ros_map
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.geometry import Point, Pose
@@ -131,6 +132,17 @@ async def test_merged_floors_are_floors_of_the_robot(
         (found,) = (await client.get("/api/multi-floor/map/v1/pois", params={"floor": "2F", "building": "T"})).json()
         assert found["poi_name"] == "upstairs"
     await door.close()
+
+
+def test_floors_mapped_by_one_robot_have_docks_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    dock = PointOfInterest("home dock of this robot", Pose(1.0), {"display_name": "home"})
+    floor = FloorMap(FloorName(), GRID, Annotations(docks=(dock,)))
+    (tmp_path / "one.stcm").write_bytes(encode_stcm(composite_of(floor)))
+    monkeypatch.chdir(tmp_path)
+    command(Way.MERGE, Path("both.stcm"), floor=["1F=one.stcm", "2F=one.stcm"])
+    below, above = (floor.annotations.docks[0].id for floor in floors_of(decode_stcm(Path("both.stcm").read_bytes())))
+    assert below == dock.id
+    assert above != below
 
 
 @pytest.mark.parametrize(

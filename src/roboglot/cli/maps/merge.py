@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.simulation.world.world_files import read_ros_grid
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
@@ -26,6 +28,7 @@ def merged(floors: Sequence[str], building: str, fetch: Callable[[str], bytes]) 
         raise ValueError(f"1 to {FLOORS_MAX} floors are needed: --floor 1F=ground.stcm --floor 2F=first.stcm")
     layers: list[Layer] = []
     names: set[str] = set()
+    ids: set[str] = set()
     for order, text in enumerate(floors):
         name, separator, source = text.partition("=")
         if not separator or not name.strip() or not source:
@@ -33,7 +36,7 @@ def merged(floors: Sequence[str], building: str, fetch: Callable[[str], bytes]) 
         if name in names:
             raise ValueError(f"there are two floors {name!r}")
         names.add(name)
-        floor = _floor_of(name, source, fetch)
+        floor = _with_own_ids(_floor_of(name, source, fetch), name, ids)
         label = FloorName(building, name, order, default=order == 0)
         kept = tuple(_labelled(layer, label) for layer in floor.layers)
         layers += composite_of(replace(floor, name=label, layers=kept)).layers
@@ -56,6 +59,21 @@ def _floor_of(name: str, source: str, fetch: Callable[[str], bytes]) -> FloorMap
         there = ", ".join(floor.name.floor for floor in floors)
         raise BadMap(f"{source} has the floors {there}, and {name!r} is not one of them")
     return named[0] if len(floors) > 1 else floors[0]
+
+
+def _with_own_ids(floor: FloorMap, name: str, ids: set[str]) -> FloorMap:
+    """Return the floor with new ids for docks and places whose ids are in ``ids``, and add all to these.
+
+    A robot has one id for the docks that it finds by itself.
+    """
+
+    def own(mark: PointOfInterest) -> PointOfInterest:
+        id = str(uuid.uuid5(uuid.NAMESPACE_OID, f"{mark.id} {name}")) if mark.id in ids else mark.id
+        ids.add(id)
+        return replace(mark, id=id)
+
+    docks = tuple(map(own, floor.annotations.docks))
+    return replace(floor, annotations=replace(floor.annotations, docks=docks), places=tuple(map(own, floor.places)))
 
 
 def _labelled(layer: Layer, label: FloorName) -> Layer:

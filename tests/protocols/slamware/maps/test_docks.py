@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import httpx
 
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.storeys import Storeys
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of
 from roboglot.testing import Forward
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, encode_stcm
 from tests.protocols.slamware.drawings import ok
 
 SLAM, MULTI = "/api/core/slam/v1", "/api/multi-floor/map/v1"
@@ -75,3 +81,30 @@ async def test_clearing_docks_answers_the_former_home_or_null(client: httpx.Asyn
     assert (await client.put(docks, json=[entry])).status_code == 200
     assert (await client.delete(docks)).json()["id"] == "d"
     assert (await client.delete(docks)).json() is None
+
+
+def with_dock(floor: FloorMap, id: str) -> FloorMap:
+    dock = PointOfInterest(id, Pose(1.0), {"display_name": id})
+    return replace(floor, annotations=replace(floor.annotations, docks=(dock,)))
+
+
+async def test_home_is_on_the_start_floor_unless_a_dock_is_bound(
+    robot: Robot, client: httpx.AsyncClient, drawn: None
+) -> None:
+    grid, current = robot[Mapping].grid, f"{MULTI}/floors/:current"
+    lower, upper = (FloorMap(FloorName("A", name, order, default=not order), grid) for order, name in enumerate("12"))
+    layers = (*composite_of(with_dock(lower, "below")).layers, *composite_of(with_dock(upper, "above")).layers)
+    await ok(await client.post(f"{MULTI}/stcm", content=encode_stcm(CompositeMap(layers))))
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))
+
+    async def start_floors() -> list[str]:
+        return [floor["floor"] for floor in (await client.get(f"{MULTI}/floors")).json() if floor["is_default_floor"]]
+
+    maps = robot[Storeys].maps
+    assert maps is not None
+    await ok(await client.put(current, json={"building": "A", "floor": "2"}))
+    assert (maps.current, maps.home(), await start_floors()) == ("A/2", "A/1", ["1"])  # although this one has a dock
+    await ok(await client.put(f"{MULTI}/homedocks/:current", json={"dock_id": "above"}))
+    assert (maps.home(), await start_floors()) == ("A/2", ["2"])
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))  # as after a restart
+    assert (await client.get(current)).json()["floor"] == "2"

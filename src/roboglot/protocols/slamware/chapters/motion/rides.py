@@ -10,11 +10,10 @@ from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
-from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, RobotError, Unreachable
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
-from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, NAME
+from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
 from roboglot.protocols.slamware.chapters.motion.homing import head_home
 from roboglot.protocols.slamware.chapters.motion.moves import navigate, navigation_options
 from roboglot.protocols.slamware.chapters.multi_floor.elevators import (
@@ -78,13 +77,11 @@ def multi_floor_back_home(context: Context, options: GoHomeOptions) -> Action:
 
 
 def home_floor(context: Context) -> FloorMap | None:
-    """Return the floor of the home dock; None if that is this one, or unknown."""
-    bound = context.robot[Settings].get(BOUND)
-    docks = [(floor, dock.id) for floor in context.maps.floors for dock in floor.annotations.docks]
-    found = next((floor for floor, id in docks if id == bound), None)
-    if found is None and context.robot[Docking].home is None and docks:
-        found = docks[0][0]
-    return found
+    """Return the start floor if it has a dock; else None, which is this one, or the first that has one."""
+    start, docked = context.maps.start_floor, [floor for floor in context.maps.floors if floor.annotations.docks]
+    if start in docked:
+        return start
+    return docked[0] if docked and context.robot[Docking].home is None else None
 
 
 def _place(context: Context, name: str) -> tuple[FloorMap, Pose]:

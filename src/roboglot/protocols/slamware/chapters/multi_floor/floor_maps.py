@@ -28,7 +28,7 @@ class LoadedStoreys:
         return [StoreyPlace(_label(floor.name), place) for floor in others for place in floor.places]
 
     def home(self) -> str:
-        """Return the bound dock's floor; else this one if it has a dock, else the first that has one."""
+        """Return the floor of the home dock."""
         found = home_floor(self._context)
         return _label(found.name) if found else self.current
 

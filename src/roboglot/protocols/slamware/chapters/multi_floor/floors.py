@@ -103,8 +103,8 @@ async def unbind_scene(context: Context, body: Unbinding | None = None) -> None:
 @TABLE.on(f"GET {MAP}/floors", right=Right.SEE)
 def get_floors(context: Context) -> list[FloorInfo]:
     """Return the floors of the loaded map; none before the first load."""
-    names = (floor.name for floor in context.maps.floors)
-    return [FloorInfo(name.building, name.floor, name.order, name.default) for name in names]
+    start, names = context.maps.start_floor, [floor.name for floor in context.maps.floors]
+    return [FloorInfo(n.building, n.floor, n.order, start is not None and n == start.name) for n in names]
 
 
 @TABLE.on(f"GET {MAP}/floors/:current", right=Right.SEE, needs=(Localization, MapAnnotations))

@@ -31,7 +31,7 @@ from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
-from roboglot.protocols.slamware.chapters.motion.home_docks import before, home_dock, known_docks, settle_home
+from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, before, home_dock, known_docks, settle_home
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
@@ -60,6 +60,15 @@ class MapKeeper:
         self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
         self._loaded = ""  # the digest of that file
         self.current = FloorName()
+
+    @property
+    def start_floor(self) -> FloorMap | None:
+        """Floor of the bound dock, else the loaded file's default one."""
+        return self._start_of(self.floors) if self.floors else None
+
+    def _start_of(self, floors: Sequence[FloorMap]) -> FloorMap:
+        bound = self._robot[Settings].get(BOUND)
+        return max(floors, key=lambda f: (bound in {dock.id for dock in f.annotations.docks}, f.name.default))
 
     async def start(self) -> None:
         """Load the map on disk, if there is one and the robot can map."""
@@ -91,8 +100,8 @@ class MapKeeper:
             raise InvalidGoal(str(error)) from None
 
     async def use(self, data: bytes, pose: Pose) -> None:
-        """Use the map of a file's default floor from now on, in memory only."""
-        floor = _start_floor(await self._parse(data))
+        """Use the map of a file's start floor from now on, in memory only."""
+        floor = self._start_of(await self._parse(data))
         async with self._turn:
             await self._use(floor, pose, self._put_drawings(floor, {}))  # the present drawings belong to no file
 
@@ -147,7 +156,7 @@ class MapKeeper:
                 await self._fetch()
                 data = await self._robot[FileStore].read(FILE)
                 floors, digest = await self._parse(data), _digest(data)
-                floor = _start_floor(floors)
+                floor = self._start_of(floors)
                 keep = newer_drawings and digest in self._basis
                 draw = self._turn_over(floor, digest) if keep else self._put_drawings(floor, {digest: NOT_MOVED})
                 await self._use(floor, pose, draw)
@@ -294,7 +303,3 @@ def _parsed(data: bytes) -> list[FloorMap]:
 
 def _digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
-
-
-def _start_floor(floors: list[FloorMap]) -> FloorMap:
-    return next((floor for floor in floors if floor.name.default), floors[0])
