@@ -26,6 +26,12 @@ def test_log_lines_are_visible_too() -> None:
     assert VisibleFormatter("%(message)s").format(record) == "a said: \\x1b]0;mine\\x07"
 
 
+def test_errors_of_the_system_are_logged_without_their_numbers() -> None:
+    wrapped = RuntimeError(str(ConnectionRefusedError(111, "Connection refused")))
+    record = logging.LogRecord("x", logging.INFO, "", 0, "no broker: %s", (wrapped,), None)
+    assert VisibleFormatter("%(message)s").format(record) == "no broker: Connection refused"
+
+
 @given(st.text())
 def test_any_text_fits_into_xml(text: str) -> None:
     element = ElementTree.Element("case", name=xml_text(text))

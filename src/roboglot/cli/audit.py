@@ -13,6 +13,7 @@ import typer
 
 from roboglot.access.trail import FILE, Entry, Trail, open_trail
 from roboglot.config import Config
+from roboglot.hosting.error_text import in_words
 from roboglot.storage.transactions import DatabaseError
 
 LOOK_PERIOD = 0.5  # s
@@ -42,7 +43,7 @@ def command(
                 time.sleep(LOOK_PERIOD)
                 last = _print(trail, robot, last)
     except (ValueError, OSError, sqlite3.Error, DatabaseError) as error:
-        sys.exit(f"roboglot audit: {error}")
+        sys.exit(f"roboglot audit: {in_words(error)}")
 
 
 def _print(trail: Trail, robot: str, after: int) -> int:

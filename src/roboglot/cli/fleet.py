@@ -94,7 +94,7 @@ def up(
                 (folder / PLAN).unlink(missing_ok=True)
             sys.exit(f"roboglot fleet: {error}")
         except (ValueError, OSError, FolderInUse, NotWarm, MissingExtra) as error:
-            sys.exit(f"roboglot fleet: {error}")
+            sys.exit(f"roboglot fleet: {in_words(error)}")
 
 
 @app.command("list")
@@ -200,7 +200,7 @@ def where(
         homes = asyncio.run(Homes(database).all())
         database.close()
     except (ValueError, OSError, DatabaseError, sqlite3.Error) as error:
-        sys.exit(f"roboglot fleet: {error}")
+        sys.exit(f"roboglot fleet: {in_words(error)}")
     if robot and robot not in homes:
         sys.exit(f"roboglot fleet: the registry knows no robot {robot!r}")
     for home in [homes[robot]] if robot else homes.values():

@@ -27,7 +27,14 @@ def xml_text(text: str) -> str:
 
 
 class VisibleFormatter(logging.Formatter):
-    """Escapes log lines, so that no text of clients and programs reaches the terminal as a command."""
+    """Escapes log lines, so that no text of clients and programs reaches the terminal as a command.
+
+    The system's errors lose their numbers.
+    """
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's name
+        """Return the line without its traceback."""
+        return re.sub(r"\[Errno -?\d+\] ", "", super().formatMessage(record))
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line, escaped."""

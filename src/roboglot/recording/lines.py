@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
 from roboglot.clients.errors import ClientError, LinkLost
+from roboglot.hosting.error_text import in_words
 from roboglot.model.clock import Clock
 from roboglot.recording.redaction import FILES
 from roboglot.wire.foxglove.messages import SUBPROTOCOLS, ClientOpcode
@@ -100,7 +101,7 @@ class TextLine(Line):
             connecting = asyncio.open_connection(self.host, self.port, limit=LINE_MAX, local_addr=local)
             self._reader, self._writer = await self.clock.wait_for(connecting, PATIENCE)
         except (OSError, TimeoutError) as error:
-            raise LinkLost(f"{self.host}:{self.port} cannot be reached: {error}") from None
+            raise LinkLost(f"{self.host}:{self.port} cannot be reached: {in_words(error)}") from None
 
     async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:  # noqa: ARG002
         self._writer.write(payload.rstrip(b" ;") + b";")
@@ -109,7 +110,7 @@ class TextLine(Line):
         try:
             reply = await self.clock.wait_for(self._reader.readuntil(b";"), PATIENCE)
         except (OSError, EOFError, TimeoutError, asyncio.LimitOverrunError) as error:
-            raise LinkLost(f"no answer to {payload[:60]!r}: {error}") from None
+            raise LinkLost(f"no answer to {payload[:60]!r}: {in_words(error)}") from None
         return [(reply, status_of("robomaster", reply))]
 
     async def drain(self) -> None:
@@ -198,7 +199,7 @@ class FrameLine(Line):
                 address = f"ws://{self.host}:{self.port}{path}"
                 socket = await self.clock.wait_for(connect(address, max_size=LINE_MAX), PATIENCE)
             except (OSError, TimeoutError, WebSocketException) as error:
-                raise LinkLost(f"{address} cannot be reached: {error}") from None
+                raise LinkLost(f"{address} cannot be reached: {in_words(error)}") from None
             self._sockets[path] = socket
             if self._draining is not None:
                 self._draining.append(asyncio.ensure_future(_drain(socket)))
@@ -258,7 +259,7 @@ class FoxgloveLine(Line):
             while not SHOWN.search(await self._text()):
                 pass
         except (OSError, TimeoutError, WebSocketException) as error:
-            raise LinkLost(f"{address} cannot be reached: {error}") from None
+            raise LinkLost(f"{address} cannot be reached: {in_words(error)}") from None
 
     async def _text(self) -> str:
         message = await self.clock.wait_for(self._socket.recv(), PATIENCE)

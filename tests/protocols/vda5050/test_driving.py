@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
@@ -147,6 +148,15 @@ async def test_another_client_is_seen_and_control_is_respected(yard: Opened) -> 
     )
     await one.clock.advance(3)
     assert distance(one, stood.x, stood.y) < 0.05
+
+
+async def test_robot_is_localized_from_its_first_scan_on(yard: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
+    scanned = False
+    monkeypatch.setattr(LidarLocalization, "started", property(lambda _: scanned))
+    one = await yard()
+    await one.until(lambda: one.control.state["mobileRobotPosition"]["localized"] is False)
+    scanned = True
+    await one.until(lambda: one.control.state["mobileRobotPosition"]["localized"] is True, seconds=2.0)  # not the 30
 
 
 async def test_version_2_1_has_its_own_words(yard: Opened) -> None:

@@ -139,6 +139,13 @@ async def test_no_mqtt_ends_the_connection(sent: bytes, dialled: Dialled, refusa
     assert await refusals.get() == "headerId is missing"
 
 
+async def test_missing_certificates_are_named_at_the_start(robot: Robot) -> None:
+    door = Vda5050Door(robot, Vda5050Config(broker="127.0.0.1", tls=True, ca="/nowhere/ca.pem"))
+    with pytest.raises(OSError, match=r"/nowhere/ca\.pem: No such file"):
+        await door.start()
+    await door.close()
+
+
 async def test_only_the_beginning_of_long_messages_is_kept(
     dialled: Dialled, refusals: Refusals, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,6 +16,7 @@ from roboglot.access.trail import open_trail
 from roboglot.cli.checks.finding import Finding
 from roboglot.cli.checks.listeners import holder_of
 from roboglot.config import Config, is_loopback
+from roboglot.hosting.error_text import in_words
 from roboglot.operations import Right
 from roboglot.protocols import DOORS
 from roboglot.protocols.door import PortKind
@@ -112,7 +113,7 @@ def _fingerprints(config: Config) -> Iterator[Finding]:
             try:
                 yield Finding(label, True, f"SHA-256 {fingerprint(path)}")
             except (OSError, ValueError) as error:
-                yield Finding(label, False, str(error), f"remove {path.parent} to have new ones")
+                yield Finding(label, False, in_words(error), f"remove {path.parent} to have new ones")
 
 
 def _identities(config: Config) -> list[Identity]:

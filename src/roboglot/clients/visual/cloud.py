@@ -43,7 +43,7 @@ class CloudLink:
         except TimeoutError:
             raise TimedOut(f"the cloud at {self._url} did not answer within {TIMEOUT:g} s") from None
         except OSError as error:
-            raise LinkLost(f"the cloud at {self._url} cannot be reached: {error}") from None
+            raise LinkLost(f"the cloud at {self._url} cannot be reached: {error.strerror or error}") from None
         head, end, body = answer.partition(b"\r\n\r\n")
         if not end or not head.startswith(b"HTTP/1."):
             raise BadAnswer(f"the server at {self._url} does not speak HTTP")

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 
 from roboglot.extras import explained
+from roboglot.hosting.error_text import in_words
 from roboglot.protocols.foxglove.channels import Source
 from roboglot.protocols.foxglove.context import Context
 from roboglot.protocols.foxglove.dispatch import answer
@@ -45,6 +46,6 @@ class Session:
         except ModuleNotFoundError as error:
             self.context.status(Level.ERROR, explained(error, "the robot's topics") or str(error))
         except (OSError, ValueError) as error:
-            self.context.status(Level.ERROR, f"the recording cannot be read: {error}")
+            self.context.status(Level.ERROR, f"the recording cannot be read: {in_words(error)}")
         finally:
             self.context.joined.set()

@@ -76,10 +76,11 @@ class Vda5050Door:
         return f"{config.interface}/{self._version.level}/{_level(config.manufacturer)}/{self._serial}/{name}"
 
     async def start(self) -> None:
-        """Begin to connect. Raises MissingExtra without aiomqtt."""
+        """Begin to connect. Raises MissingExtra without aiomqtt, OSError for certificates that cannot be read."""
         if self._config.broker:
             with explaining("the VDA 5050 door", "vda5050"):
                 import aiomqtt  # noqa: F401 - said now rather than at the first try
+            _tls(self._config)  # refused now rather than at each try
             self._task = asyncio.get_running_loop().create_task(self._dial())
             self._context.run_beside(self._context.maps.follow())
 
@@ -119,7 +120,6 @@ class Vda5050Door:
 
         config = self._config
         broken = "CONNECTION_BROKEN" if self._version.new_words else "CONNECTIONBROKEN"
-        tls = ssl.create_default_context(cafile=config.ca or None) if config.tls else None
         will = aiomqtt.Will(
             self._topic("connection"), self._message("connection", {"connectionState": broken}), 1, True
         )
@@ -131,7 +131,7 @@ class Vda5050Door:
             will=will,
             keepalive=KEEPALIVE,
             timeout=LINK_SECONDS,
-            tls_context=tls,
+            tls_context=_tls(config),
             queue_type=Intake,
         ) as client:
             self._client = client
@@ -296,15 +296,24 @@ async def _until_one_ends(*jobs: Awaitable[None]) -> None:
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
+def _tls(config: Vda5050Config) -> ssl.SSLContext | None:
+    try:
+        return ssl.create_default_context(cafile=config.ca or None) if config.tls else None
+    except OSError as error:
+        raise OSError(error.errno, f"vda5050.ca: {config.ca}: {error.strerror}") from None
+
+
 def _level(text: str) -> str:
     """Return a text as a level of a topic."""
     return "".join("_" if sign in "/+#\0 " else sign for sign in text) or "_"
 
 
 def _coarse(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the state without pose, speed and small changes of the charge, to detect changes."""
+    """Return the state without coordinates, speed and small changes of the charge, to detect changes."""
     fine = ("agvPosition", "mobileRobotPosition", "velocity", "powerSupply", "batteryState", "distanceSinceLastNode")
     battery = state.get("powerSupply") or state.get("batteryState") or {}
     charge = battery.get("stateOfCharge", battery.get("batteryCharge", 0.0))
     kept = {key: value for key, value in state.items() if key not in fine}
+    place = state.get("mobileRobotPosition") or state.get("agvPosition") or {}
+    kept |= {key: place.get(key) for key in ("localized", "positionInitialized", "mapId")}
     return kept | {"charging": battery.get("charging"), "charge": int(charge)}

@@ -49,7 +49,7 @@ def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
             "y": round(pose.y, 4),
             "theta": round(wrap_angle(pose.yaw), 5),
             "mapId": map_id,
-            known: localization.lost is None,
+            known: localization.started and localization.lost is None,
             "localizationScore": round(min(1.0, max(0.0, localization.quality)), 3),
         }
     }

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from google.protobuf.message import DecodeError
 
+from roboglot.hosting.error_text import in_words
 from roboglot.media.recorder import Recorder
 from roboglot.model.admission import Forbidden
 from roboglot.model.components.sensing.camera import Camera
@@ -99,5 +100,5 @@ async def camera(call: Call, *, command: Int32) -> dict[str, int]:
             case _:
                 return call.refused({"result": int(FileError.ARGUMENTS)}, f"there is no command {command}")
     except (RobotError, OSError) as error:
-        return call.refused({"result": int(error_of(error))}, str(error))
+        return call.refused({"result": int(error_of(error))}, in_words(error))
     return {"result": int(FileError.NONE)}
