@@ -134,7 +134,7 @@ async def test_merged_floors_are_floors_of_the_robot(
     await door.close()
 
 
-def test_floors_mapped_by_one_robot_have_docks_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_merged_floors_have_docks_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dock = PointOfInterest("home dock of this robot", Pose(1.0), {"display_name": "home"})
     floor = FloorMap(FloorName(), GRID, Annotations(docks=(dock,)))
     (tmp_path / "one.stcm").write_bytes(encode_stcm(composite_of(floor)))

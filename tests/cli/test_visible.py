@@ -26,7 +26,7 @@ def test_log_lines_are_visible_too() -> None:
     assert VisibleFormatter("%(message)s").format(record) == "a said: \\x1b]0;mine\\x07"
 
 
-def test_errors_of_the_system_are_logged_without_their_numbers() -> None:
+def test_system_errors_are_logged_without_numbers() -> None:
     wrapped = RuntimeError(str(ConnectionRefusedError(111, "Connection refused")))
     record = logging.LogRecord("x", logging.INFO, "", 0, "no broker: %s", (wrapped,), None)
     assert VisibleFormatter("%(message)s").format(record) == "no broker: Connection refused"

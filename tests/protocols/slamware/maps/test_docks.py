@@ -88,9 +88,7 @@ def with_dock(floor: FloorMap, id: str) -> FloorMap:
     return replace(floor, annotations=replace(floor.annotations, docks=(dock,)))
 
 
-async def test_home_is_on_the_start_floor_unless_a_dock_is_bound(
-    robot: Robot, client: httpx.AsyncClient, drawn: None
-) -> None:
+async def test_home_is_on_start_or_bound_floor(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
     grid, current = robot[Mapping].grid, f"{MULTI}/floors/:current"
     lower, upper = (FloorMap(FloorName("A", name, order, default=not order), grid) for order, name in enumerate("12"))
     layers = (*composite_of(with_dock(lower, "below")).layers, *composite_of(with_dock(upper, "above")).layers)
