@@ -180,8 +180,8 @@ class Ledger:
 
 
 async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever they send, the server's thread has most of its time for others.
     """The server's thread keeps most of its time for others, no matter what programs send.
+
     That each frame is charged, and the time that it takes to read a long one, holds exactly. What is spent in all is
     compared over several spans: other work on the machine makes some of them dearer.
     """
