@@ -59,14 +59,14 @@ class ClosedDoor:
     name: str
 
     async def start(self) -> None:
-        """Listen nowhere."""
+        """Open nothing."""
 
     async def close(self) -> None:
         """Do nothing."""
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """None."""
+        """Return no endpoints: the door is closed."""
         return ()
 
 

@@ -121,7 +121,7 @@ class ClusterFleet:
     """One fleet on a joined cluster. ``lasting``: its shards outlive this program."""
 
     def __init__(self, plan: FleetPlan, folder: Path, where: str, *, lasting: bool = False) -> None:
-        """Raises FolderInUse."""
+        """Lock ``folder`` for this program. Raises FolderInUse."""
         self.plan, self.folder, self._lasting, self._local = plan, folder, lasting, where == LOCAL
         self._lock = lock_folder(folder)
         self.shards = {p.name: Shard(n, p, folder / "shards" / p.name) for n, p in enumerate(plan.shards, start=1)}

@@ -71,7 +71,7 @@ class Turn:
             await self._make_way()
 
     def end(self) -> None:
-        """Let the next one go."""
+        """End this robot's turn, so that the next one may ride."""
         if TrafficRadio in self._robot:
             self._take(None)
 

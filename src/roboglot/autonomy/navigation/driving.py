@@ -85,7 +85,7 @@ class _Moving:
     move: _Move | None
     action: Action = field(init=False)
     begun: bool = False
-    minding: asyncio.Task[None] | None = None
+    supervision: asyncio.Task[None] | None = None
 
 
 class OdometryDriving(Driving):
@@ -141,7 +141,8 @@ class OdometryDriving(Driving):
         moving.action = start_on_base(self._robot, "move by", run, goal=offset, source=source)
         if before is not None:  # it was cancelled just now and stops nothing
             before.action.hands_over = True
-            moving.minding = asyncio.get_running_loop().create_task(self._supervise(moving), name="taking over a move")
+            loop = asyncio.get_running_loop()
+            moving.supervision = loop.create_task(self._supervise(moving), name="taking over a move")
         self._moving = moving
         return moving.action
 

@@ -1,4 +1,4 @@
-"""Patience of a drive: gives up without progress, with wheels turning in vain, or when lost."""
+"""Patience of a drive: gives up without progress, with slipping wheels, or when lost."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Patience:
             await self._clock.sleep(LOOK)
 
     def look(self, follower: Follower) -> bool:
-        """Note the distance left; return whether it shrank. Raises Blocked if the wheels turn in vain."""
+        """Note the distance left; return whether it shrank. Raises Blocked if the wheels slip."""
         now, tuning = self._clock.time(), self._tuning
         closer = follower.left < self._closest - tuning.progress
         if closer:

@@ -43,7 +43,7 @@ class Belief:
     denied: bool = False  # whether the map contradicts it
     compared_at: float = -math.inf  # robot time at which the newest scan that was compared with the map began
     asked: bool = False  # compare the next scan, even if the robot stands
-    slipped: float = 0.0  # m by which scans showed that wheels turned in vain, so far
+    slipped: float = 0.0  # m of wheel slip that scans have shown so far
     search: bool = False  # match the next scan in a wide window
     map: EvidenceGrid = field(default_factory=EvidenceGrid)
     revision: int = 0  # of the map

@@ -35,7 +35,7 @@ class DisplacementWatch:
     def __init__(self) -> None:
         # stamp; x, y in map; x, y driven by odometry in map; m, the prior's standard deviation
         self._corrections: deque[tuple[float, float, float, float, float, float]] = deque()
-        self.slips = False  # whether wheels that turned in vain explain the newest displacement
+        self.slips = False  # whether wheel slip explains the newest displacement
         self._quiet_until = -math.inf
 
     def forget(self, stamp: float) -> None:
@@ -134,6 +134,6 @@ class Carried:
         if self._strayed:
             raise NotLocalized("the scans no longer fit the map: something may have moved the robot")
         if self._belief is not None and self._belief.slipped > self._slipped:
-            raise Blocked("the wheels turned in vain: the robot did not get as far as they say")
+            raise Blocked("the wheels slip: the robot did not get as far as its odometry says")
         if self._shoved:
             raise Blocked(f"something displaced the robot by {self._shoved:.2f} m")

@@ -219,7 +219,7 @@ class Slam:
         return self._belief.search or self._belief.lost is not None or not self.whereabouts.sure
 
     def _is_held(self, scan: LaserScan, odometry: Pose) -> bool:
-        """Return whether the wheels turn in vain, and keep the belief's place then."""
+        """Return whether the wheels slip; if so, keep the believed place."""
         belief, last = self._belief, self._matched_odometry or odometry
         before = belief.map_to_odom.compose(last)
         stayed = self._slip.check(scan, odometry, belief.map_to_odom.compose(odometry))

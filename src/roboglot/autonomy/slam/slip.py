@@ -1,4 +1,4 @@
-"""Detects wheels that turn in vain, by two scans: ranges that should change stay, at an obstacle close by.
+"""Detects slipping wheels by two scans: ranges that should change stay, at an obstacle close by.
 
 Needed where matches cannot detect it: in a corridor, pressed against an obstacle that hides its end.
 """

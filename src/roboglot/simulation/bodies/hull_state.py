@@ -61,12 +61,12 @@ class HullState:
 
     @property
     def x(self) -> float:
-        """Of base_link, m."""
+        """Coordinate of base_link in the world, m."""
         return self._row[HULL_X]
 
     @property
     def y(self) -> float:
-        """Of base_link, m."""
+        """Coordinate of base_link in the world, m."""
         return self._row[HULL_Y]
 
     @property

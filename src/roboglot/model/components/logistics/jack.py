@@ -47,11 +47,11 @@ class Jack(Component):
 
     @abstractmethod
     def raise_platform(self, *, source: str = "") -> Action:
-        """Lift; aborts with Blocked, or with Refused while an alarm is active."""
+        """Raise the platform; aborts with Blocked, or with Refused while an alarm is active."""
 
     @abstractmethod
     def lower_platform(self, *, source: str = "") -> Action:
-        """Set down; as above."""
+        """Lower the platform; aborts with Blocked, or with Refused while an alarm is active."""
 
     @abstractmethod
     def clear_alarm(self) -> None:

@@ -47,7 +47,7 @@ class SerialLine(asyncio.Transport):
         asyncio.get_running_loop().remove_reader(self._master)
 
     def resume_reading(self) -> None:
-        """Read again."""
+        """Resume reading from the serial line."""
         if not self._closing:
             asyncio.get_running_loop().add_reader(self._master, self._read)
 

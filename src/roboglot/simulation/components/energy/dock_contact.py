@@ -53,7 +53,7 @@ class SimulatedDockContact(DockContact):
 
     @property
     def index(self) -> int:
-        """Its row."""
+        """Row of this part in the table of all robots."""
         return self._hull.seat.index
 
     @property

@@ -58,7 +58,7 @@ class SimulatedMotionStatus(MotionStatus):
 
     @property
     def index(self) -> int:
-        """Its row."""
+        """Row of this part in the table of all robots."""
         return self._hull.seat.index
 
     @property

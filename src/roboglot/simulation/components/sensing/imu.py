@@ -116,7 +116,7 @@ class SimulatedImu(Imu, ImuConverters):
 
     @property
     def index(self) -> int:
-        """Its row."""
+        """Row of this part in the table of all robots."""
         return self._hull.seat.index
 
     @property

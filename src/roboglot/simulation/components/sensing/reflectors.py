@@ -55,7 +55,7 @@ class ReflectorDetector(Detector[ReflectorSeen]):
         return self._feed.subscribe()
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop the detector."""
         self._feed.close()
 
     def _begin(self) -> None:
@@ -106,7 +106,7 @@ class SimulatedReflectors(Reflectors):
         self.detector = self._detector
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop the detector."""
         self._detector.close()
 
 

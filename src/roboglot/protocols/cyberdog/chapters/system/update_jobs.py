@@ -152,7 +152,7 @@ class UpdateJobs:
         return {}
 
     async def reboot(self, _: Goal) -> dict[str, object]:
-        """Restart."""
+        """Restart the robot."""
         if self._robot[Firmware].progress.state in (FirmwareState.INSTALLING, FirmwareState.REBOOTING):
             raise Unable(BUSY, "an update is under way")
         self._updates.restart()
