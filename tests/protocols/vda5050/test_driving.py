@@ -11,6 +11,7 @@ from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import PERSON, Lease
 from roboglot.model.geometry import Twist
 from roboglot.protocols.vda5050 import vocabulary
@@ -227,3 +228,32 @@ async def test_an_order_whose_driving_breaks_is_reported(yard: Opened, monkeypat
     one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
     await one.until(lambda: one.control.errors == ["NODE_UNREACHABLE"])
     assert one.control.state["errors"][0]["errorLevel"] == "CRITICAL"
+
+
+async def test_pause_holds_driving_actions_too(yard: Opened) -> None:
+    one = await yard()
+    made = order("one", [(0, 0), (2, 0)])
+    made["nodes"][1]["actions"] = [action("startCharging", "dock", "HARD")]
+    one.control.send("order", made)
+    await one.until(lambda: status(one, "dock") == "RUNNING" and one.control.state["driving"])
+    one.control.send("instantActions", instant(action("startPause", "p", "NONE")))
+    await one.until(lambda: one.control.state["paused"] and not one.control.state["driving"], seconds=5.0)
+    held = one.robot[Localization].pose
+    await one.clock.advance(5)
+    assert distance(one, held.x, held.y) < 0.05
+    assert status(one, "dock") == "PAUSED"
+    one.control.send("instantActions", instant(action("stopPause", "q", "NONE")))
+    await one.until(lambda: status(one, "dock") == "FINISHED")
+    assert one.control.state["powerSupply"]["charging"] is True
+
+
+async def test_cancelled_docking_stands_when_cancel_finishes(yard: Opened) -> None:
+    one = await yard()
+    made = order("one", [(0, 0), (2, 0)])
+    made["nodes"][1]["actions"] = [action("startCharging", "dock", "HARD")]
+    one.control.send("order", made)
+    await one.until(lambda: status(one, "dock") == "RUNNING" and one.robot[Odometry].reading.twist.x > 0.3)
+    one.control.send("instantActions", instant(action("cancelOrder", "c", "NONE")))
+    await one.until(lambda: status(one, "c") == "FINISHED")
+    first = next(state for state in one.control.heard["state"] if "FINISHED" in str(state["instantActionStates"]))
+    assert first["driving"] is False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Protocol
 
 from roboglot.model.errors import RobotError
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from roboglot.wire.vda5050.versions import Version
 
 log = logging.getLogger(__name__)
+DOING: ContextVar[ActionState] = ContextVar("doing")  # the action of the present task
 
 
 class Performing(Protocol):
@@ -37,11 +39,12 @@ class Performing(Protocol):
 
 
 async def ended(action: RobotAction) -> None:
-    """Wait until the robot's part of an action has succeeded; cancelling the wait cancels it."""
+    """Wait until the robot's part of an action has succeeded; cancelling the wait cancels it and lets it end."""
     try:
         await action.succeeded()
     finally:
         action.cancel("fleet control cancelled it")
+        await action.done()
 
 
 class Performer:
@@ -84,6 +87,7 @@ class Performer:
     async def _try(self, state: ActionState, operation: Operation[str], instant: bool) -> None:
         context, action = self._context, state.action
         state.status = ActionStatus.RUNNING
+        DOING.set(state)
         context.touch()
         try:
             context.check(operation.key, operation.right)

@@ -9,7 +9,6 @@ from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import Pose
 from roboglot.operations import Right
 from roboglot.protocols.vda5050.context import SOURCE, Context
-from roboglot.protocols.vda5050.performing import ended
 from roboglot.protocols.vda5050.table import TABLE
 from roboglot.wire.vda5050.orders import Angle, Id, Metres, Text, Texts
 
@@ -97,14 +96,14 @@ async def initialize_position(
 @TABLE.on("startCharging", right=Right.DRIVE, needs=(Docking,))
 async def start_charging(context: Context) -> str:
     """Drive to the dock and onto its contacts."""
-    await ended(context.robot[Docking].dock(source=SOURCE))
+    await context.carry_out(context.robot[Docking].dock(source=SOURCE))
     return "charging"
 
 
 @TABLE.on("stopCharging", right=Right.DRIVE, needs=(Docking,))
 async def stop_charging(context: Context) -> str:
     """Leave the dock."""
-    await ended(context.robot[Docking].undock(source=SOURCE))
+    await context.carry_out(context.robot[Docking].undock(source=SOURCE))
     return ""
 
 

@@ -17,7 +17,6 @@ from roboglot.model.components.system.system_log import SystemLog
 from roboglot.model.errors import NotFound
 from roboglot.operations import Right
 from roboglot.protocols.vda5050.context import SOURCE, Context
-from roboglot.protocols.vda5050.performing import ended
 from roboglot.protocols.vda5050.table import TABLE
 from roboglot.wire.vda5050.orders import Text
 
@@ -84,7 +83,7 @@ async def fine_positioning(
     robot = context.robot
     texts = frozenset({stationName}) if stationName and stationType is Mark.PRINTED else frozenset[str]()
     goal = MarkGoal(mark=stationType, start=robot[Localization].pose, texts=texts)
-    await ended(robot[TagDocking].dock_at(goal, source=SOURCE))
+    await context.carry_out(robot[TagDocking].dock_at(goal, source=SOURCE))
     pose = robot[Localization].pose
     return f"at {pose.x:z.3f} {pose.y:z.3f} {pose.yaw:z.3f}"
 
