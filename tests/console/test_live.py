@@ -13,7 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from roboglot.console.live import Page
 from roboglot.console.server import those_due
-from roboglot.console.settings import BEAT_PAGES
+from roboglot.console.settings import BEAT_PAGES, OTHERS_BEATS
 from roboglot.model.components.system.lease import Lease
 from tests.console.conftest import Shown
 
@@ -29,7 +29,7 @@ async def test_page_without_map_gets_poses_each_second(shown: Shown) -> None:
                 frames[name] += 1
             elif json.loads(text)["type"] == "moment":
                 counts[name] += 1
-            if counts["drawing"] >= 40:
+            if counts["drawing"] >= 2 * OTHERS_BEATS:
                 return
 
     live = shown.url.replace("http", "ws") + "/live"
