@@ -169,6 +169,19 @@ def test_docstrings_begin_with_verb_or_noun(files: list[Path]) -> None:
     assert found == []
 
 
+def test_functions_say_what_they_do() -> None:
+    """A function's docstring begins with a verb ("Return the map"), a property's with a noun."""
+    found = []
+    for path in SOURCES:
+        for node in statements_of(path):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (text := ast.get_docstring(node)):
+                made = " ".join(map(ast.unparse, node.decorator_list))
+                noun = node.name == "__init__" or any(word in made for word in ("property", "fixture"))
+                if not noun and text.split()[0] in {"A", "All", "An", "It", "The", "They"}:
+                    found.append(f"{path.relative_to(ROOT)}:{node.lineno}")
+    assert found == []
+
+
 @pytest.mark.parametrize("files", [SOURCES, TESTS, TOOLS], ids=["src", "tests", "tools"])
 def test_docstrings_say_nothing_twice(files: list[Path]) -> None:
     """Sentences were doubled where docstrings had been wrapped by a tool."""

@@ -134,7 +134,7 @@ class Tools:
         return Image(data=await _answer_of(self._console.fetch("robots", robot, "camera.jpg")), format="jpeg")
 
     async def map_picture(self, robot: Robot = DEFAULT) -> Image:
-        """The robot's map from above, with the robot on it."""
+        """Draw the robot's map from above, with the robot on it."""
         return Image(data=await _answer_of(self._console.fetch("robots", robot, "map.png")), format="png")
 
     async def go_to(self, x: Meters, y: Meters, robot: Robot = DEFAULT, wait: Wait = 60.0) -> dict[str, object]:

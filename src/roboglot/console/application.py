@@ -244,7 +244,7 @@ class Application:
     def _renew_pages_of(self, who: str) -> None:
         for page in self.pages:
             if page.person == who:
-                page.begin_anew()
+                page.resend_all()
 
     def _close_pages_of(self, who: str) -> None:
         for listening in [task for task, owner in self._listening.items() if owner == who]:

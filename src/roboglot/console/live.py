@@ -99,15 +99,15 @@ class Page:
         self._due = asyncio.Event()
         self._refused = ""
         self.person = identity()
-        self._anew = True
+        self._resends_all = True
 
     # -- out --
 
     async def run(self) -> None:
         """Send until cancelled."""
         while True:
-            if self._anew:
-                self._anew = False
+            if self._resends_all:
+                self._resends_all = False
                 self._sent.clear()
                 await self._send_message({"type": "hello", **self._desk.hello(), "now": milliseconds()})
             await self._due.wait()
@@ -125,9 +125,9 @@ class Page:
         """True if the page draws a robot and needs updates as often as possible."""
         return self._watch.moving
 
-    def begin_anew(self) -> None:
+    def resend_all(self) -> None:
         """Send robots and rights again: they have changed."""
-        self._anew = True
+        self._resends_all = True
         self._due.set()
 
     def beat(self, number: int) -> None:

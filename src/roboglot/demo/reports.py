@@ -38,7 +38,7 @@ def from_cyberdog(x: float, y: float, yaw: float) -> Report:
 
 
 def from_program(blocks: list[str]) -> Report:
-    """The text of the program's last block: "x y qz qw" of its odometer."""
+    """Return the report in the text of the program's last block: "x y qz qw" of its odometer."""
     x, y, qz, qw = map(float, blocks[-1].split())
     words = f"position.x {x:z.3f}, position.y {y:z.3f}, orientation.z {qz:.3f}"
     return Report("block program", words, Pose(x, y, 2 * math.atan2(qz, qw)))
@@ -51,7 +51,7 @@ def agree(reports: list[Report], driven: float) -> bool:
 
 
 def apart(reports: list[Report]) -> tuple[float, float]:
-    """The largest distance (m) and angle (degrees) between any two reports."""
+    """Return the largest distance (m) and angle (degrees) between any two reports."""
     pairs = [(a.pose, b.pose) for a in reports for b in reports]
     return (
         max(a.distance_to(b) for a, b in pairs),

@@ -69,7 +69,7 @@ def _apply(pairs: Int32Array, slopes: FloatArray, system: FloatArray, step: Floa
 
 @kernel("Tuple((float64[:,:,::1], float64[:,:,::1]))(int64, int32[:,::1], float64[:,:,::1], float64[:,::1])")
 def _chain(count: int, pairs: Int32Array, slopes: FloatArray, system: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The part of the normal matrix along the chain of poses, factorised: inverted blocks, and those beside them."""
+    """Return the normal matrix along the chain of poses, factorised: inverted blocks, and those beside them."""
     blocks, beside = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
@@ -120,7 +120,7 @@ def _solve_chain(blocks: FloatArray, beside: FloatArray, right: FloatArray, resu
 
 @kernel("float64(float64[:,::1], float64[:,::1])")
 def _product(left: FloatArray, right: FloatArray) -> float:
-    """The sum of the products of the elements."""
+    """Return the sum of the products of the elements."""
     total = 0.0
     for i in range(left.shape[0]):
         for c in range(3):
@@ -138,7 +138,7 @@ def _follow(direction: FloatArray, share: float, fresh: FloatArray) -> None:
 
 @kernel("float64[:,::1](int64, int32[:,::1], float64[:,:,::1], float64[:,::1])", error_model=CHECKED)
 def _solve(count: int, pairs: Int32Array, slopes: FloatArray, system: FloatArray) -> FloatArray:
-    """The Gauss-Newton step, by conjugate gradients after the chain's part, which is solved exactly."""
+    """Return the Gauss-Newton step, by conjugate gradients after the chain's part, which is solved exactly."""
     right = np.zeros((count, 3))
     for k in range(pairs.shape[0]):
         for r in range(3):

@@ -37,14 +37,14 @@ class Lanes:
         self._builder, self.value = builder, value
 
     def __add__(self, other: Lanes) -> Lanes:
-        add = self._builder.fadd if self._broken else self._builder.add
+        add = self._builder.fadd if self._is_float else self._builder.add
         return Lanes(self._builder, add(self.value, other.value))
 
     def __sub__(self, other: Lanes) -> Lanes:
         return Lanes(self._builder, self._builder.sub(self.value, other.value))
 
     def __mul__(self, other: Lanes) -> Lanes:
-        multiply = self._builder.fmul if self._broken else self._builder.mul
+        multiply = self._builder.fmul if self._is_float else self._builder.mul
         return Lanes(self._builder, multiply(self.value, other.value))
 
     def __and__(self, other: Lanes | int) -> Lanes:
@@ -62,7 +62,7 @@ class Lanes:
         return Lanes(self._builder, self._builder.sub(self._like(whole), self.value))
 
     def rounded(self) -> Lanes:
-        """Return the numbers, which may be negative, without their 16 bits behind the point."""
+        """Return the integer parts (floor) of signed 16.16 fixed-point numbers."""
         return Lanes(self._builder, self._builder.ashr(self.value, self._like(16)))
 
     def at_most(self, limit: Lanes) -> Lanes:
@@ -77,7 +77,7 @@ class Lanes:
         return Lanes(builder, builder.fdiv(self._like(1.0), number))
 
     def whole(self) -> Lanes:
-        """Return fractions without what is behind the point."""
+        """Return floating-point numbers truncated to integers."""
         return Lanes(self._builder, self._builder.fptosi(self.value, INTS))
 
     def bytes(self) -> ir.Value:
@@ -85,8 +85,8 @@ class Lanes:
         return self._builder.trunc(self.value, ir.VectorType(BYTE, LANES))
 
     @property
-    def _broken(self) -> bool:
-        """True for fractions in the processor's own form."""
+    def _is_float(self) -> bool:
+        """True for floating-point numbers."""
         return bool(self.value.type == FLOATS)
 
     def _like(self, other: Lanes | float) -> ir.Value:

@@ -59,7 +59,7 @@ def _surfaces(
 def _line(
     around: FloatArray, i: int, count: int, x: float, y: float, beam_x: float, beam_y: float
 ) -> tuple[float, float, float, float, float]:
-    """The surface around (x, y) as ``surface_near`` has it, from the ``count`` rows of ``around[i]``."""
+    """Return the surface around (x, y) as ``surface_near`` has it, from the ``count`` rows of ``around[i]``."""
     total = mean_x = mean_y = xx = xy = yy = 0.0
     place = around[np.uintp(i)]
     for k in range(count):
@@ -104,7 +104,7 @@ def surface_near(
     beam_y: float,
     resolution: float,
 ) -> tuple[float, float, float, float, float]:
-    """The surface around (x, y) as seen along the beam: mean x and y, normal x and y (0, 0: unclear), weight."""
+    """Return the surface around (x, y) as seen along the beam: mean x and y, normal x and y (0, 0: unclear), weight."""
     around = np.empty((1, CELLS, 5))
     row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
     return _line(around, 0, _surfaces(slots, surfaces, evidence, row, col, resolution, around, 0), x, y, beam_x, beam_y)
@@ -258,7 +258,7 @@ def match(
     resolution: float,
     iterations: int,
 ) -> tuple[FloatArray, FloatArray, float, int, int]:
-    """The pose (x, y from the grid's corner, yaw) at which ``points`` (n, 2; base_link, m) fit the grid best.
+    """Return the pose (x, y from the grid's corner, yaw) at which ``points`` (n, 2; base_link, m) fit the grid best.
 
     Begins at ``start``; ``covariance`` (3, 3) is the prior's; ``sensor`` the lidar's x, y in base_link. Returns the
     pose, its covariance, the squared distance from the prior in the prior's standard deviations, the points that fit

@@ -51,7 +51,7 @@ def _bound(fields: ByteArray, level: int, offsets: Int32Array, row: int, col: in
 
 @kernel("int32[:,:,::1](float64[:,::1], int64, float64)")
 def turned_offsets(points: FloatArray, headings: int, resolution: float) -> Int32Array:
-    """For each heading the (row, column) of each point (n, 2; m) relative to the cell in whose middle base_link is."""
+    """Return by heading the (row, column) of each point (n, 2; m) relative to the cell with base_link at its centre."""
     result = np.empty((headings, points.shape[0], 2), np.int32)
     for heading in range(headings):
         yaw = 2.0 * np.pi * heading / headings
@@ -64,7 +64,7 @@ def turned_offsets(points: FloatArray, headings: int, resolution: float) -> Int3
 
 @kernel("int64[:,::1](uint8[:,:,::1], uint8[:,:,::1], int32[:,:,::1], int64)")
 def _roots(fields: ByteArray, floors: ByteArray, offsets: Int32Array, enough: int) -> IntArray:
-    """The largest squares with floor in them, for every heading: (bound, heading, row, col)."""
+    """Return the largest squares with floor in them, for every heading: (bound, heading, row, col)."""
     top = fields.shape[0] - 1
     size = 1 << top
     height, width = fields.shape[1] - size, fields.shape[2] - size
@@ -108,7 +108,7 @@ def _best_below(
     turned: int,
     roots: IntArray,
 ) -> tuple[int, int, int, int]:
-    """The best (score, heading, row, col) above ``enough``, away from ``taken``, in the squares ``roots``."""
+    """Return the best (score, heading, row, col) above ``enough``, away from ``taken``, in the squares ``roots``."""
     top = fields.shape[0] - 1
     pad = 1 << top
     height, width = fields.shape[1] - pad, fields.shape[2] - pad

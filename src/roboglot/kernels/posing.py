@@ -17,7 +17,7 @@ SIDES = 8  # of limbs, trunks and heads
 AROUND = np.array([(math.cos(math.tau * side / SIDES), math.sin(math.tau * side / SIDES)) for side in range(SIDES + 1)])
 CLOSED, CLOSING = 0.08, 0.5  # ends of limbs: radius of the last ring, and how far it is off, by the limb's radius
 EYE, EYE_WIDTH, EYE_HEIGHT = 0.016, 0.012, 0.009  # m before the joint; half its size
-HIPS, SPINE, LEFT, EARS, EAR, FACE, CROWN, EYES = 0, 1, 2, 3, 4, 5, 6, 7  # points of ``clothe`` behind the limbs'
+HIPS, SPINE, LEFT, EARS, EAR, FACE, CROWN, EYES = 0, 1, 2, 3, 4, 5, 6, 7  # points of ``draw_person`` behind the limbs'
 
 
 @kernel()
@@ -76,7 +76,7 @@ def _limb(start: FloatArray, end: FloatArray, limb: FloatArray, axes: FloatArray
     "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], int64[::1],"
     " float64[:,:,::1])"
 )
-def clothe(
+def draw_person(
     joints: FloatArray,
     mixing: FloatArray,
     offsets: FloatArray,

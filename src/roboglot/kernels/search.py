@@ -22,7 +22,7 @@ STEP = 0.5  # cells between two samples of a line
 
 @kernel("int32[:,::1](int8[::1], int64, int64, int64)")
 def _trace(came: Int8Array, start: int, goal: int, width: int) -> Int32Array:
-    """The cells from start to goal; ``came`` holds the step (0-8) by which each was reached."""
+    """Return the cells from start to goal; ``came`` holds the step (0-8) by which each was reached."""
     count, cell = 1, goal
     while cell != start:
         step = came[cell]

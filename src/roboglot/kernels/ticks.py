@@ -49,7 +49,7 @@ from roboglot.kernels.layouts import (
     WAITS,
     WATCHED,
 )
-from roboglot.kernels.together import drive, follow, measure, reckon, see, still, touch, watch
+from roboglot.kernels.together import dead_reckon, drive, follow, measure, see, still, touch, watch
 
 LINES, TABLES = "UniTuple(float64[::1], {})", "UniTuple(float64[:,::1], {})"
 
@@ -185,7 +185,7 @@ def _sense(robots: tuple[FloatArray, ...], settings: tuple[float, ...], stamp: f
     if not count:
         stage, count = WATCHED, watch(hulls, imus, statuses, stamp, blow_gravity, speed_square, turn_rate, others)
     if not count:
-        stage, count = RECKONED, reckon(hulls, imus, odometries, slips, stamp, seconds, others)
+        stage, count = RECKONED, dead_reckon(hulls, imus, odometries, slips, stamp, seconds, others)
     return int(count * COUNT_UNIT + stage * STAGE_UNIT if count else DONE)
 
 

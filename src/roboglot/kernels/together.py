@@ -299,7 +299,7 @@ def watch(
 
 
 @kernel("int64(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64, float64, int64[::1])")
-def reckon(
+def dead_reckon(
     hulls: FloatArray,
     imus: FloatArray,
     odometries: FloatArray,

@@ -65,7 +65,7 @@ def _nearest_next(costs: FloatArray) -> IntArray:
 
 @kernel("float64(float64[:,::1], int64, int64)")
 def _step(costs: FloatArray, a: int, b: int) -> float:
-    """The cost from a to b; b below 0: the tour ends with a."""
+    """Return the cost from a to b; b below 0: the tour ends with a."""
     return costs[a, b] if b >= 0 else 0.0
 
 
@@ -124,7 +124,7 @@ def _improve(costs: FloatArray, order: IntArray, closed: bool) -> bool:
 
 @kernel("int64[::1](float64[:,::1], int64, boolean)")
 def visiting_order(costs: FloatArray, passes: int, closed: bool) -> IntArray:
-    """The places 0 to n-1 in the order of a short tour from place 0, and back to it if ``closed``.
+    """Return the places 0 to n-1 in the order of a short tour from place 0, and back to it if ``closed``.
 
     ``costs`` (n, n) symmetric, finite. Exact up to EXACT_MAX places besides the start; beyond, at most ``passes``
     improvements of the whole tour.

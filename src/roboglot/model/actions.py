@@ -34,7 +34,7 @@ class Actions:
         self._guards: list[Callable[[Action], None]] = []
 
     def guard(self, admit: Callable[[Action], None]) -> None:
-        """Also call ``admit`` before an action is accepted; it raises RobotError to refuse the action."""
+        """Call ``admit`` before an action is accepted; it raises RobotError to refuse the action."""
         self._guards.append(admit)
 
     def start(

@@ -255,7 +255,7 @@ class RealTimers:
         return timer
 
     def note_cancelled(self) -> None:
-        """One in the heap was called off; when they are the most, they are thrown out."""
+        """Count a cancelled timer in the heap; drop all of them once they are the majority."""
         self._cancelled += 1
         if self._cancelled > CANCELLED_MAX and 2 * self._cancelled > len(self._heap):
             self._heap = [entry for entry in self._heap if entry[2].callback is not None]

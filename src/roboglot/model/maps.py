@@ -47,7 +47,7 @@ class OccupancyGrid:
         )
 
     def window(self, min_x: float, min_y: float, max_x: float, max_y: float) -> OccupancyGrid:
-        """The part that overlaps the rectangle, on the same cell borders; empty where nothing does."""
+        """Return the part that overlaps the rectangle, on the same cell borders; empty where nothing does."""
         row0, col0 = self.cell_of(Point(min_x, min_y))
         row1, col1 = (
             int(np.ceil((v - o) / self.resolution)) for v, o in ((max_y, self.origin.y), (max_x, self.origin.x))
@@ -58,7 +58,7 @@ class OccupancyGrid:
         return OccupancyGrid(self.log_odds[row0 : max(row0, row1), col0 : max(col0, col1)], self.resolution, origin)
 
     def trimmed(self) -> OccupancyGrid:
-        """The smallest window that holds every known cell; empty if none is known."""
+        """Return the smallest window that holds every known cell; empty if none is known."""
         rows, cols = (np.flatnonzero(self.log_odds.any(axis=axis)) for axis in (1, 0))
         if not len(rows):
             return OccupancyGrid(self.log_odds[:0, :0], self.resolution, self.origin)

@@ -45,7 +45,7 @@ class SoundBlock:
 
 
 def tone(frequency: float, seconds: float, loudness: float = 0.3) -> Sound:
-    """A sine of ``frequency`` Hz with soft ends; ``loudness`` 0..1 of full scale."""
+    """Return a sine of ``frequency`` Hz with soft ends; ``loudness`` 0..1 of full scale."""
     if not 20.0 <= frequency <= 20_000.0 or not 0.0 < seconds <= SECONDS_MAX or not 0.0 <= loudness <= 1.0:
         raise ValueError("a tone has 20 to 20000 Hz, takes up to 300 s and is 0 to 1 loud")
     time = np.arange(round(seconds * SAMPLE_RATE)) / SAMPLE_RATE

@@ -134,9 +134,9 @@ class _Link:
             case Hello():
                 raise ValueError("it sent its name twice")
             case _:
-                self._hear_page(message)
+                self._on_page_message(message)
 
-    def _hear_page(self, message: PageRequest | At | Drawn | Left) -> None:
+    def _on_page_message(self, message: PageRequest | At | Drawn | Left) -> None:
         match message:
             case PageRequest():
                 self._take(self._seat(message.seat), message)

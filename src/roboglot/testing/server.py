@@ -181,14 +181,14 @@ class RobotServer:
         return next(iter(self.runtime.fleet.robots.values()))
 
     @property
-    def truth(self) -> _There:
+    def truth(self) -> _LoopProxy:
         """Ground truth of the world (``roboglot.simulation.world.truth``)."""
-        return _There(self.runtime.fleet.world.truth, self.loop)
+        return _LoopProxy(self.runtime.fleet.world.truth, self.loop)
 
     @property
-    def stage(self) -> _There:
+    def stage(self) -> _LoopProxy:
         """Interventions in the world: place, push, add_obstacle, inject_fault, person (``roboglot.model.stage``)."""
-        return _There(self.runtime.fleet.world.hands, self.loop)
+        return _LoopProxy(self.runtime.fleet.world.hands, self.loop)
 
     def pose(self, robot: str = "") -> Pose:
         """Return the true pose of a robot (default: the first) in the world's frame."""
@@ -252,7 +252,7 @@ class RobotServer:
             stage.inject_fault(fault.kind, fault.robot, **dict(fault.options))
 
 
-class _There:
+class _LoopProxy:
     """A proxy that calls an object's methods, and those of the results, in the robots' loop."""
 
     def __init__(self, target: object, loop: Loop) -> None:
@@ -265,7 +265,7 @@ class _There:
 
         def call(*arguments: object, within: float = PATIENCE, **named: object) -> object:
             result = self._loop.run(value, *arguments, within=within, **named)
-            return _There(result, self._loop) if hasattr(result, "walk_to") else result
+            return _LoopProxy(result, self._loop) if hasattr(result, "walk_to") else result
 
         return call
 

@@ -30,7 +30,7 @@ async def test_robot_ahead_is_no_obstacle_while_driving_behind(speed: float, oth
         _robot=SimpleNamespace(events=SimpleNamespace(publish=published.append)),
         _clock=clock,
         _action=None,
-        _mind_others=lambda *_: None,
+        _stop_for_others=lambda *_: None,
         blocked=False,
     )
     route = SimpleNamespace(ahead=lambda *_: path, centre=lambda *_: (1.0, False))

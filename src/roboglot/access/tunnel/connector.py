@@ -52,7 +52,7 @@ class Trust(Protocol):
     """Verifies the certificates of gateways."""
 
     def check(self, gateway: str, certificate: bytes) -> tuple[str, bool]:
-        """The fingerprint, and whether it is new here. Raises NotTrusted."""
+        """Return the fingerprint, and whether it is new here. Raises NotTrusted."""
 
 
 class KnownGateways:
@@ -62,7 +62,7 @@ class KnownGateways:
         self._path = path
 
     def check(self, gateway: str, certificate: bytes) -> tuple[str, bool]:
-        """The fingerprint, and whether it is new here. Raises NotTrusted."""
+        """Return the fingerprint, and whether it is new here. Raises NotTrusted."""
         shown = hashlib.sha256(certificate).hexdigest()
         try:
             known = json.loads(self._path.read_text()) if self._path.exists() else {}

@@ -225,7 +225,7 @@ class LiftFloors(Floors):
         new = await self._others.take(floor)
         here, stamp = belief.pose, robot.clock.time()
         if new is None:
-            belief.start_anew()
+            belief.forget_map()
             new = Storey(belief.map, None, Annotations(), waiting.relative_to(here), inside.relative_to(here))
         else:
             belief.take_map(new.map, new.inside.compose(here.relative_to(inside)))

@@ -102,7 +102,7 @@ class Lookout:
         follower.slow_at = follower.along + tight
         free = planner.free_way(path, points, pose, tuning.touch_margin) if math.isfinite(tight) else tight
         follower.stop_at, blocked = follower.along + free, math.isfinite(free)
-        self._mind_others(follower, pose, path, aim)
+        self._stop_for_others(follower, pose, path, aim)
         if blocked:
             self.blocked_place = Point(*path[min(int(free / SPACING), len(path) - 1)].tolist())
         follows = follower.speed > FOLLOWS and self._traffic.is_among_others(pose)
@@ -112,7 +112,9 @@ class Lookout:
             self._robot.events.publish(PathBlocked(stamp=self.blocked_at, action=self._action, at=self.blocked_place))
         self.blocked = blocked
 
-    def _mind_others(self, follower: Follower, pose: Pose, path: NDArray[np.float64], aim: tuple[Point, float]) -> None:
+    def _stop_for_others(
+        self, follower: Follower, pose: Pose, path: NDArray[np.float64], aim: tuple[Point, float]
+    ) -> None:
         """Stop for moving objects and robots with right of way, and announce this robot's route."""
         traffic = self._traffic
         way = follower.route.ahead(pose, *aim, ANNOUNCED_MAX) if traffic.asks_for_way else path

@@ -23,7 +23,7 @@ class Patience:
         self._closest, self._closest_at = math.inf, clock.time()
         self._free_at, self._lost_at = clock.time(), math.inf
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Restart after a hold: the time until now does not count."""
         self._closest_at = self._free_at = self._clock.time()
 

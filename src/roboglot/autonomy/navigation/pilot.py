@@ -162,7 +162,7 @@ class Pilot:
         follower.take(await self._first_route(follower.left + aside))
         self._lookout.follower = follower  # the robot may have given way again meanwhile, along another route
         self._patience.take(follower.left)
-        self._patience.begin_anew()
+        self._patience.restart()
         return State.FOLLOWING
 
     def _is_over(self, follower: Follower, pose: Pose) -> bool:
@@ -243,7 +243,7 @@ class Pilot:
         """Stand while paused."""
         if await self._action.hold(self._brake):
             follower.halt()
-            self._patience.begin_anew()
+            self._patience.restart()
             self._replanner.distrust()
 
     # -- feedback --

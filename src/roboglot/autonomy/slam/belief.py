@@ -85,7 +85,7 @@ class Belief:
         self.map, self.frame, grid.given = grid, grid.fingerprint(), grid.evidence < 0
         self.revision += 1
 
-    def start_anew(self) -> None:
+    def forget_map(self) -> None:
         """Forget the map; the present pose becomes the new origin."""
         self.move_to(ORIGIN, self.odometry.reading.pose)
         self.covariance, self.search, self.map, self.frame = _sure(), False, EvidenceGrid(), ""

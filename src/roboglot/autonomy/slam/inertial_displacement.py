@@ -61,7 +61,7 @@ class InertialDisplacement:
         return self._pause()
 
     def _pause(self) -> float:
-        """At half the period of the readings, so that each is seen once."""
+        """Return the pause between two looks: half the period of the readings, so that each is seen once."""
         return max(PERIOD / 2, self._imu.reading.stamp + MISSED - self._robot.clock.time())
 
     def _check(self) -> float | None:

@@ -48,7 +48,7 @@ class LidarMapping(Mapping):
 
     def clear(self) -> None:
         origin = self._belief.pose
-        self._belief.start_anew()
+        self._belief.forget_map()
         self._robot.events.publish(MapReplaced(stamp=self._robot.clock.time(), origin=origin))
 
     def load(self, grid: OccupancyGrid, pose: Pose) -> None:

@@ -154,7 +154,7 @@ class Slam:
             self._given_at, self._missed = event.stamp, 0.0
             self._unseen = self._compared is self._belief.map  # on a map just loaded it may be anywhere
             self._witness.forget()
-            self.whereabouts.be_given(event.stamp)
+            self.whereabouts.note_given(event.stamp)
 
     @property
     def started(self) -> bool:

@@ -106,7 +106,7 @@ class Whereabouts:
         seconds = max(0.0, stamp - self._lost_at)
         self._events.publish(LocalizationRecovered(stamp=stamp, means=means, pose=belief.pose, seconds=seconds))
 
-    def be_given(self, stamp: float) -> None:
+    def note_given(self, stamp: float) -> None:
         """Note a pose given by a client, which scans have to confirm before any is added to the map."""
         self.find(RecoveryMeans.GIVEN, stamp)
         self.be_displaced(stamp)

@@ -61,13 +61,13 @@ class Chapter:
 
 
 def spell(command: str, *words: Parameter, **parameters: Parameter) -> str:
-    """The command's text: bare words, then parameters by name; those that are None are left out."""
+    """Return the command's text: bare words, then parameters by name; those that are None are left out."""
     named = (f"{name} {_word(value)}" for name, value in parameters.items() if value is not None)
     return " ".join((command, *(_word(word) for word in words if word is not None), *named))
 
 
 def on_off(on: bool | None) -> str | None:
-    """The manual's switch."""
+    """Return the manual's word for a switch: "on" or "off"."""
     return None if on is None else "on" if on else "off"
 
 

@@ -1,5 +1,4 @@
-"""Pairing of answers with commands: by ``seq`` where the robot repeats it, else by order. Knows no
-sockets.
+"""Pairing of answers with commands: by ``seq`` where the robot repeats it, else by order. Knows no sockets.
 
 A robot answers each command once and in order, but builds differ in what ends an answer, and the oldest end it with
 nothing at all; the next expected number marks the end even there.
@@ -18,34 +17,34 @@ _NUMBERED = re.compile(r"(.*?) ?\bseq (\d{1,20})", re.DOTALL)
 
 
 class Pairing:
-    """Numbers of the commands under way, oldest first, and the text that has come so far."""
+    """Numbers of the unanswered commands, oldest first, and the text received so far."""
 
     def __init__(self) -> None:
         self._waiting: deque[int] = deque()
         self._bare: set[int] = set()  # those that were sent without a number
         self._text = ""
-        self.wordings: dict[int, str] | None = None  # the raw answers by number, if it is a dict
+        self.wordings: dict[int, str] | None = None  # raw answers by number, kept if this is a dict
         self.as_robots = False  # whether an answer had the format of real robots' builds
 
     def __len__(self) -> int:
         return len(self._waiting)
 
     def sent(self, number: int, *, bare: bool = False) -> None:
-        """A command with ``seq number`` went out; ``bare``: without it."""
+        """Note a sent command with ``seq number``; ``bare``: without it."""
         self._waiting.append(number)
         if bare:
             self._bare.add(number)
 
     def received(self, data: bytes) -> list[tuple[int, str]]:
-        """The answers that ``data`` completes: the command's number and the answer without it and without its end.
+        """Return the answers completed by ``data``: each command's number, and its answer without number and end.
 
-        Raises ValueError if the robot talks beyond ANSWER_MAX without an end.
+        Raises ValueError for an answer of more than ANSWER_MAX bytes.
         """
         self._text = (self._text + data.decode(errors="replace")).lstrip("; \r\n")
         answers = []
         while self._waiting and self._text:
             head, semicolon, tail = self._text.partition(";")
-            found = self._ended(head, tail) if semicolon else self._endless(head)
+            found = self._ended(head, tail) if semicolon else self._ended_without_semicolon(head)
             if found is None:
                 break
             answers += found
@@ -57,7 +56,7 @@ class Pairing:
         return answers
 
     def _ended(self, head: str, tail: str) -> list[tuple[int, str]]:
-        """``head`` is an answer that a ``;`` ended; empty if it belongs to no command."""
+        """Return the answer ``head``, which ended with ``;``; nothing if it belongs to no command."""
         self._text = tail
         wording = f"{head};"
         if (found := _NUMBERED.fullmatch(head.strip())) is None:
@@ -70,8 +69,8 @@ class Pairing:
             pass  # earlier ones will not be answered any more
         return [(self._keep(number, wording), found[1].strip())]
 
-    def _endless(self, head: str) -> list[tuple[int, str]] | None:
-        """An answer without a ``;`` so far; None if it isn't whole yet."""
+    def _ended_without_semicolon(self, head: str) -> list[tuple[int, str]] | None:
+        """Return an answer that ends without ``;``; None if it is incomplete."""
         answer, mark, rest = head.partition(f" seq {self._waiting[0]}")
         if mark:
             self._text, self.as_robots = rest, True

@@ -189,7 +189,7 @@ class LinkedRoom:
         self._writer.write(line(message))
 
     def forget(self, seat: LinkedSeat) -> None:
-        """A page has gone."""
+        """Remove the seat of a page that has gone."""
         if self._seats.pop(seat.number, None) is not None and self._writer is not None:
             self._writer.write(line(Left(seat.number)))
 

@@ -115,13 +115,13 @@ class Seated(Protocol):
         """Execute a page's request. Raises NotFound and Refused, or posts them."""
 
     def at(self, robot: str) -> None:
-        """The page works with this robot from now on."""
+        """Set the page's robot from now on."""
 
     def draw(self, picture: str) -> None:
         """Show teachers the robot's map, a PNG in base64."""
 
     def leave(self) -> None:
-        """The page goes, or goes elsewhere; what a pupil did stays."""
+        """Remove a page that goes, or goes elsewhere; the work of its pupil stays."""
 
 
 class Room(Protocol):
@@ -262,7 +262,7 @@ class Seat:
         self._pupil: Pupil | None = None
 
     def at(self, robot: str) -> None:
-        """The page works with this robot from now on."""
+        """Set the page's robot from now on."""
         self._robot = robot
         if self._pupil is not None and self._class is not None:
             self._pupil.robot = robot
@@ -353,7 +353,7 @@ class Seat:
         return self._class
 
     def leave(self) -> None:
-        """The page goes, or goes elsewhere; what a pupil did stays."""
+        """Remove a page that goes, or goes elsewhere; the work of its pupil stays."""
         if self._class is None:
             return
         if self._pupil is not None:

@@ -102,7 +102,7 @@ async def remove_drawing(robot: Robot, *, id: int) -> None:
 
 @VERBS.on("set_home", right=Right.EDIT, needs=(Docking, Localization))
 async def set_home(robot: Robot) -> None:
-    """Say that the dock is where the robot stands now."""
+    """Set the dock's pose to the robot's."""
     robot[Docking].set_home(robot[Localization].pose)
 
 

@@ -55,7 +55,7 @@ class Phone(service.GrpcAppServicer):
     async def sendMsg(  # noqa: N802 - the service's name
         self, request: pb.SendRequest, _context: grpc.aio.ServicerContext
     ) -> AsyncIterator[pb.RecResponse]:
-        """The robot pushes a report."""
+        """Receive a report that the robot pushes."""
         async with self._arrived:
             self._pushed[request.nameCode] = json.loads(request.params)
             self._arrived.notify_all()
@@ -70,7 +70,7 @@ class Phone(service.GrpcAppServicer):
             return [json.loads(answer.data or "{}") async for answer in self._robot.sendMsg(request)]
 
     async def next_push(self, code: int) -> Any:
-        """The next push of ``code``."""
+        """Return the next push of ``code``."""
         async with self._arrived, asyncio.timeout(PATIENCE):
             self._pushed.pop(code, None)
             await self._arrived.wait_for(lambda: code in self._pushed)

@@ -25,7 +25,7 @@ class SlamwareClient:
         await self._http.aclose()
 
     async def get(self, path: str) -> Any:
-        """The JSON at ``path``."""
+        """Return the JSON at ``path``."""
         return (await self._http.get(path)).raise_for_status().json()
 
     async def pose(self) -> tuple[float, float, float]:
@@ -45,7 +45,7 @@ class SlamwareClient:
                 await asyncio.sleep(0.2)
 
     async def map(self) -> bytes:
-        """The explored map as the robot sends it."""
+        """Return the explored map as the robot sends it."""
         return (await self._http.get(f"{SLAM}/maps/explore")).raise_for_status().content
 
     async def move_to(self, x: float, y: float, yaw: float) -> None:

@@ -95,7 +95,7 @@ class CyberDogDriver(Driver):
         self._base = CyberDogBase(self._client, robot.clock, self.link, reported)
         robot.add(Base, self._base)
         robot.add(Legs, CyberDogLegs(robot, self._client, self.supervisor, self._base))
-        robot.add(Odometry, ReportedOdometry(lambda: reported.reckon(robot.clock.time()), "cyberdog"))
+        robot.add(Odometry, ReportedOdometry(lambda: reported.advance_to(robot.clock.time()), "cyberdog"))
         robot.add(Battery, ReportedBattery(lambda: reported.battery))
         robot.add(DockContact, ReportedDockContact(lambda: reported.docked))
         robot.add(Localization, CyberDogLocalization(self._skills))
@@ -243,7 +243,7 @@ class CyberDogDriver(Driver):
     def _take_scan(self, value: values.Value) -> None:
         assert isinstance(value, values.LaserPoints)
         stamp = self.robot.clock.time()
-        pose = self._reported.reckon(stamp).pose
+        pose = self._reported.advance_to(stamp).pose
         self._reported.scan = scan = scan_of(value, pose, stamp)
         self.link.note_update("scan")
         if Lidar not in self.robot:

@@ -47,8 +47,8 @@ class ReportedState:
     grid: OccupancyGrid = field(default_factory=_nothing)
     revision: int = 0
 
-    def reckon(self, now: float) -> OdometryReading:
-        """Return the odometry at ``now``, dead-reckoned from the accepted servo frames; without frames it stands."""
+    def advance_to(self, now: float) -> OdometryReading:
+        """Dead-reckon until ``now`` (s) by the accepted servo frames; return the odometry; it stands without them."""
         left = min(max(now - self.stamp, 0.0), RECKONED_MAX)
         while left > 1e-9:
             step = min(left, STEP_MAX)
@@ -68,5 +68,5 @@ class ReportedState:
 
     def correct(self, pose: Pose, now: float) -> None:
         """Correct the pose by a report of the dog."""
-        self.reckon(now)
+        self.advance_to(now)
         self.pose, self.pose_at = pose, now

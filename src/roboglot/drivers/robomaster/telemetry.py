@@ -69,7 +69,7 @@ class TelemetryListener:
         self._forget = client.listen(self._on_push)
         self._pushed = False
         await self._ask_battery()
-        self._hear_attitude(await client.chassis.get_attitude())
+        self._on_attitude(await client.chassis.get_attitude())
         self._moved(await self._ask_heading())
         await self._ask_speed()
         await client.chassis.push(position=True, attitude=True, status=True, freq=PUSH_RATE)
@@ -141,7 +141,7 @@ class TelemetryListener:
                 yaw = wrap_angle(self._reported.imu.orientation.yaw + self._yaw)
                 self._moved(Pose(push.x, -push.y, yaw))
             case telemetry.ChassisAttitude():
-                self._hear_attitude(push)
+                self._on_attitude(push)
             case telemetry.ChassisStatus():
                 self._reported.flags = flags_of(push)
                 self._link.note_update("status")
@@ -160,7 +160,7 @@ class TelemetryListener:
         self._reported.odometry = OdometryReading(stamp, pose, self._reported.twist, before.distance + way)
         self._link.note_update("position")
 
-    def _hear_attitude(self, attitude: telemetry.ChassisAttitude) -> None:
+    def _on_attitude(self, attitude: telemetry.ChassisAttitude) -> None:
         """Derive rates from two pushes; the acceleration is gravity alone, as for a robot at rest."""
         before, stamp, now = self._reported.imu, self._robot.clock.time(), orientation_of(attitude)
         seconds = stamp - before.stamp

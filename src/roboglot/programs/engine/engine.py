@@ -132,7 +132,7 @@ class Engine:
         if len(modules) > MODULES_MAX:
             raise ValueError(f"more than {MODULES_MAX} modules")
         program = Program((source, *modules.values()), ("", *modules))
-        body = self._run_request(program, prelude, limits, watched=stops is not None, seed=seed)
+        body = _run_request(program, prelude, limits, policy=self._policy, watched=stops is not None, seed=seed)
         memory, page = _shared_memory(program.places.memory()), None
         try:
             page = Page(memory, program.places)
@@ -155,21 +155,6 @@ class Engine:
         worker.died.add_done_callback(lambda _: self._runs.discard(run))
         asyncio.get_running_loop().call_later(STEPS_BACK_AFTER, self._step_back, worker)
         return run
-
-    def _run_request(
-        self, program: Program, prelude: Prelude, limits: Limits, *, watched: bool, seed: int | None
-    ) -> bytes:
-        return _body(
-            {
-                "t": "run",
-                "units": [unit.encode("utf-8", "replace").decode() for unit in program.units],
-                "prelude": prelude.to_wire(),
-                "policy": self._policy,
-                "recursion": limits.recursion,
-                "watched": watched,
-                "seed": secrets.randbits(63) if seed is None else seed,
-            }
-        )
 
     async def check(
         self, source: str, prelude: Prelude = _EMPTY, *, functions: frozenset[str] = frozenset()
@@ -325,6 +310,22 @@ class Engine:
 
     def _release(self) -> None:
         self._busy -= 1
+
+
+def _run_request(
+    program: Program, prelude: Prelude, limits: Limits, *, policy: bool, watched: bool, seed: int | None
+) -> bytes:
+    return _body(
+        {
+            "t": "run",
+            "units": [unit.encode("utf-8", "replace").decode() for unit in program.units],
+            "prelude": prelude.to_wire(),
+            "policy": policy,
+            "recursion": limits.recursion,
+            "watched": watched,
+            "seed": secrets.randbits(63) if seed is None else seed,
+        }
+    )
 
 
 def _body(request: dict[str, Any]) -> bytes:

@@ -48,7 +48,7 @@ class Vector(list[object]):
         return not self
 
     def max_size(self) -> int:
-        """The largest size."""
+        """Return the largest size."""
         return 2**60 - 1
 
     def capacity(self) -> int:
@@ -70,7 +70,7 @@ class Dictionary(dict[object, object]):
         return not self
 
     def max_size(self) -> int:
-        """The largest size."""
+        """Return the largest size."""
         return 2**60 - 1
 
 

@@ -266,7 +266,7 @@ class AppLink:
 
 @lru_cache(64)
 def host_of(peer: str) -> str:
-    """The host in "ipv4:1.2.3.4:5" or "ipv6:%5B::1%5D:5" (its brackets kept); empty for any other kind."""
+    """Return the host in "ipv4:1.2.3.4:5" or "ipv6:%5B::1%5D:5" (its brackets kept); empty for any other kind."""
     kind, _, rest = unquote(peer).partition(":")
     return rest.rpartition(":")[0] if kind in ("ipv4", "ipv6") else ""
 

@@ -31,7 +31,7 @@ class Greeting:
         self.known = False  # True once the connection has proved to be a client's
 
     def check(self, data: bytes) -> bytes:
-        """The bytes that may be read as this port's own: none while the head could still be a stranger's.
+        """Return the bytes that may be read as this port's own: none while the head could still be a stranger's.
 
         Raises StrangerError, which names the protocol.
         """

@@ -18,7 +18,6 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
-from roboglot.operations import Operation
 from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.maps import Maps
@@ -57,7 +56,7 @@ class Context:
         self._trigger = asyncio.Event()
         self._tasks: set[asyncio.Future[None]] = set()
         self._route = Route(self)
-        self._performer = Performer(self)
+        self.performer = Performer(self)
         self._parts: dict[RobotAction, ActionState] = {}  # what the robot does for actions and can pause
 
     @property
@@ -147,15 +146,7 @@ class Context:
                 ErrorKind.INSTANT_ACTION, Level.WARNING, why, {"actionId": state.action.action_id}, order=False
             )
             return
-        await self.perform(state, operation, instant=True)
-
-    async def perform(self, state: ActionState, operation: Operation[str], *, instant: bool = False) -> None:
-        """Do one action and record its state."""
-        await self._performer.perform(state, operation, instant=instant)
-
-    def answer_retry(self, action_id: str, *, again: bool) -> None:
-        """Try an action in RETRIABLE again, or let it fail. Raises Rejected if none waits."""
-        self._performer.answer(action_id, again=again)
+        await self.performer.perform(state, operation, instant=True)
 
     def speed_ratio(self, edge: Edge | None) -> float:
         """Return the share of the robot's top speed that an edge allows."""
@@ -230,10 +221,6 @@ class Context:
         """Wait for the trigger and consume it."""
         self._trigger.clear()
         await self._trigger.wait()
-
-    def set_last_node(self, node_id: str) -> None:
-        """Note the node where people placed the robot."""
-        self.book.place_at(node_id, 0)
 
     async def close(self) -> None:
         """Stop everything that fleet control began."""

@@ -15,10 +15,10 @@ from roboglot.model.errors import RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
-from roboglot.operations import Operation
 from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected, kind_of
-from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, OrderBook
+from roboglot.protocols.vda5050.order_book import ActionStatus, OrderBook
+from roboglot.protocols.vda5050.performing import Performer
 from roboglot.protocols.vda5050.table import operation_of
 from roboglot.values import dataclass
 from roboglot.wire.vda5050.orders import Action, Edge, Node
@@ -59,6 +59,7 @@ class Driven(Protocol):
     book: OrderBook
     version: Version
     errors: ErrorBook
+    performer: Performer
     paused: bool
 
     def touch(self) -> None:
@@ -69,9 +70,6 @@ class Driven(Protocol):
 
     def speed_ratio(self, edge: Edge | None) -> float:
         """Return the share of the top speed to drive an edge with."""
-
-    async def perform(self, state: ActionState, operation: Operation[str]) -> None:
-        """Do an action of a node."""
 
 
 class Route:
@@ -223,7 +221,7 @@ class Route:
         if operation is None:
             self._context.errors.report(ErrorKind.ORDER_ACTION, Level.WARNING, f"there is no {action.action_type}")
             return
-        await self._context.perform(state, operation)
+        await self._context.performer.perform(state, operation)
 
 
 def _reached(action: RobotAction, count: int) -> int:

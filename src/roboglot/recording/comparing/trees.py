@@ -48,7 +48,7 @@ def leaves(value: Any, path: str = "$") -> Iterator[tuple[str, Any]]:
 
 
 def kind_of(value: object) -> str:
-    """The JSON type of a value."""
+    """Return the JSON type of a value."""
     if isinstance(value, bool):
         return "boolean"
     if isinstance(value, int | float):

@@ -66,11 +66,11 @@ class Stopwatch:
         self._began = self._used = 0
 
     def begin(self) -> None:
-        """Bytes were received."""
+        """Note that bytes were received."""
         self._began, self._used = time.perf_counter_ns(), time.thread_time_ns()
 
     def end(self) -> None:
-        """They were passed on."""
+        """Note that the bytes were passed on."""
         self.delays.append(time.perf_counter_ns() - self._began)
         self.computed.append(time.thread_time_ns() - self._used)
 

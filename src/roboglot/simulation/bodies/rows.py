@@ -28,7 +28,7 @@ class Kernels:
     see: Callable[..., int]
     measure: Callable[..., int]
     watch: Callable[..., int]
-    reckon: Callable[..., int]
+    dead_reckon: Callable[..., int]
     touch: Callable[..., int]
 
 
@@ -63,7 +63,7 @@ class Rows:
             together.see,
             together.measure,
             together.watch,
-            together.reckon,
+            together.dead_reckon,
             together.touch,
         )
 

@@ -234,7 +234,7 @@ def depth_camera_gone(target: Target) -> Undo:
 
 @_kind()
 def range_sensor_gone(target: Target, *, sensor: str | None = None) -> Undo:
-    """The named one, or the first."""
+    """Silence the named sensor, or the first."""
     part = target.part(RangeSensors, SimulatedRangeSensors)
     return _switch(part, "silent", frozenset({_one_of("sensor", sensor or part.names[0], part.names)}))
 

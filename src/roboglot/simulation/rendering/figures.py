@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.kernels.posing import SIDES, clothe
+from roboglot.kernels.posing import SIDES, draw_person
 from roboglot.model.perception import JOINTS
 from roboglot.simulation.bodies.body import HullSection
 from roboglot.simulation.rendering.shapes import (
@@ -96,7 +96,7 @@ def person(index: int, joints: Floats) -> Mesh:
 def posing(index: int, packed: bytes) -> Mesh:
     """Return the same by the bytes of the joints, cached: a standing person looks the same in the next picture."""
     joints, corners = np.frombuffer(packed).reshape(-1, 3), np.empty((QUADS, 4, 3))
-    clothe(joints.copy(), MIXING, OFFSETS, RADII, PROFILES, RINGS, corners)
+    draw_person(joints.copy(), MIXING, OFFSETS, RADII, PROFILES, RINGS, corners)
     return Mesh(corners, *_look(index))
 
 

@@ -187,7 +187,7 @@ def _drawers() -> Floats:
 
 
 def _window() -> Floats:
-    """A frame (mask 0) around two panes; the sky grows brighter upwards."""
+    """Return a frame (mask 0) around two panes; the sky grows brighter upwards."""
     rows, columns = _grid()
     frame = (np.abs(rows - 0.5) > 0.45) | (np.abs(columns - 0.5) > 0.46) | (np.abs(columns - 0.5) < 0.02)
     return np.where(frame, 0.0, 150 + 105 * rows)

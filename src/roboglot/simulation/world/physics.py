@@ -102,13 +102,13 @@ class Physics:
         self._meetings = Meetings(model, self._all_hulls, self.props, self._gliding)
         self._sleep = Sleep(model, self._data)
 
-    def step(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
+    def step(self, seconds: float, after_substep: Callable[[float], None] | None = None) -> None:
         """Let ``seconds`` pass with the present controls, and note what touches each hull.
 
-        ``meanwhile`` is called after every small step with its length (s), for objects too fast for a whole tick.
+        ``after_substep`` is called after every small step with its length (s), for objects too fast for a whole tick.
         """
         self._meetings.look(seconds, touched=self._pressed)
-        if meanwhile is None and self._meetings.off:
+        if after_substep is None and self._meetings.off:
             if self._sleep.lasts:
                 self.rays.outdate()
                 return
@@ -116,9 +116,9 @@ class Physics:
                 self.rays.outdate()
                 self._see()
                 return
-        self._plod(seconds, meanwhile)
+        self._step_mujoco(seconds, after_substep)
 
-    def _plod(self, seconds: float, meanwhile: Callable[[float], None] | None = None) -> None:
+    def _step_mujoco(self, seconds: float, after_substep: Callable[[float], None] | None = None) -> None:
         """Do MuJoCo's steps; touches last only if they are searched for."""
         if self._touched:
             self._meetings.switch(off=False)
@@ -126,12 +126,12 @@ class Physics:
             if hull.hand is not None:
                 hull.handle()
         steps = round(seconds / TIMESTEP)
-        if meanwhile is None:
+        if after_substep is None:
             mujoco.mj_step(self._model, self._data, nstep=steps)
         else:
             for _ in range(steps):
                 mujoco.mj_step(self._model, self._data)
-                meanwhile(TIMESTEP)
+                after_substep(TIMESTEP)
         self._see()
 
     @property
@@ -168,7 +168,7 @@ class Physics:
         """Do the rest of a tick's physics after the kernel has stopped at ``stage`` and returned ``count``."""
         if stage in (NEAR, STUCK):
             self._meetings.switch(off=stage == STUCK)
-            self._plod(seconds)
+            self._step_mujoco(seconds)
         elif stage == SETTLING:
             self._see()
         elif stage == SEEN:

@@ -123,8 +123,8 @@ class Ticking:
         self._settings = 0.0, *limits, *physical, *HABITS, *(number for leg in legs for number in leg.settings)
         self._steps = round(self._seconds / step)
 
-    def end(self, left: Left, stamp: float, meanwhile: Callable[[float], None] | None = None) -> None:
-        """Complete a tick (stamp, s); ``meanwhile``: see ``Physics.step``."""
+    def end(self, left: Left, stamp: float, after_substep: Callable[[float], None] | None = None) -> None:
+        """Complete a tick (stamp, s); ``after_substep``: see ``Physics.step``."""
         stage, count, seconds, physics = left.stage, left.count, self._seconds, self._physics
         if stage == DONE:
             return
@@ -132,7 +132,7 @@ class Ticking:
             physics.drive(seconds)
         if stage in (DRIVE, PEOPLE):
             self._crowd.walk(seconds, count if stage == PEOPLE else -1)
-            physics.step(seconds, meanwhile)
+            physics.step(seconds, after_substep)
         elif stage <= SEEN:
             physics.end(stage, count, seconds)
         for sense in self._rounds.senses:

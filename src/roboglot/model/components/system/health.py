@@ -62,9 +62,9 @@ class Health(Component):
         if fault is None:
             raise NotFound(f"there is no fault {id}")
         name = fault.name
-        self._dismissed[name] = self._clock.call_later(REMINDER, lambda: self._remind(name)).cancel
+        self._dismissed[name] = self._clock.call_later(REMINDER, lambda: self._raise_again(name)).cancel
         self._events.publish(FaultCleared(stamp=self._clock.time(), fault=fault))
 
-    def _remind(self, name: str) -> None:
+    def _raise_again(self, name: str) -> None:
         del self._dismissed[name]
         self._events.publish(FaultRaised(stamp=self._clock.time(), fault=self._faults[name]))

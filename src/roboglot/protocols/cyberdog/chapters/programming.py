@@ -16,7 +16,7 @@ unread.add(Code.PROGRAM_TO_ROBOT)
 
 
 def queue_to(app: AppLink, clock: Clock) -> FrameQueue:
-    """The app as a front end of programs, for as long as it is connected."""
+    """Return the queue of frames to the app, open while the app is connected."""
     queue = FrameQueue(lambda text: app.send(TO_APP.code, text), clock, PUSH_MAX)
     app.on_found.append(queue.open)
     app.on_lost.append(queue.shut)

@@ -89,7 +89,7 @@ async def initialize_position(
         raise Refused(f"order {context.book.order_id} is being driven in {context.map_id!r}")
     else:
         context.maps.use(await context.maps.kept(mapId, ""), Pose(x, y, theta))
-    context.set_last_node(lastNodeId)
+    context.book.place_at(lastNodeId, 0)
     return ""
 
 
@@ -110,12 +110,12 @@ async def stop_charging(context: Context) -> str:
 @TABLE.on("retry", right=Right.DRIVE)
 async def retry(context: Context, *, actionId: Id) -> str:  # noqa: N803
     """Retry a failed action that is RETRIABLE."""
-    context.answer_retry(actionId, again=True)
+    context.performer.answer(actionId, again=True)
     return ""
 
 
 @TABLE.on("skipRetry", right=Right.DRIVE)
 async def skip_retry(context: Context, *, actionId: Id) -> str:  # noqa: N803
     """Fail an action that is RETRIABLE."""
-    context.answer_retry(actionId, again=False)
+    context.performer.answer(actionId, again=False)
     return ""

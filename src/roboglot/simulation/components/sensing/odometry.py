@@ -161,7 +161,7 @@ def _together(rows: Rows, parts: Sequence[tuple[SimulatedOdometry, Sense]]) -> S
     noises = rows.table(NOISES, NOISE_WIDTH)
     return rows.sense(
         {odometry.index: sense for odometry, sense in parts},
-        lambda kernels, stamp, seconds: kernels.reckon(*tables, noises, stamp, seconds, rows.others),
+        lambda kernels, stamp, seconds: kernels.dead_reckon(*tables, noises, stamp, seconds, rows.others),
         Leg(RECKONED, (tables[-1], noises)),
     )
 

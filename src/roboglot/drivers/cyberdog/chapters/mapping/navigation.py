@@ -50,7 +50,7 @@ class CyberDogLocalization(Localization):
 
     @property
     def pose(self) -> Pose:
-        return self._skills.reported.reckon(self._skills.robot.clock.time()).pose
+        return self._skills.reported.advance_to(self._skills.robot.clock.time()).pose
 
     @property
     def quality(self) -> float:

@@ -50,7 +50,7 @@ class CyberDogBase(LinkedBase):
             target = Twist(cut.x, max(-SIDE_SPEED, min(SIDE_SPEED, cut.y)), cut.yaw)
         if target == self._reported.target:
             return
-        self._reported.reckon(self._clock.time())
+        self._reported.advance_to(self._clock.time())
         self._reported.target = target
         self._changed.set()
         if self._sending is None:
@@ -58,7 +58,7 @@ class CyberDogBase(LinkedBase):
 
     @property
     def velocity(self) -> Twist:
-        return self._reported.reckon(self._clock.time()).twist
+        return self._reported.advance_to(self._clock.time()).twist
 
     async def stop(self) -> None:
         """Stand still; return when the command was sent or has failed."""
@@ -82,7 +82,7 @@ class CyberDogBase(LinkedBase):
         while (target := self._reported.target) != STILL:
             self._changed.clear()
             await self._client.servo_frame(self.motion, target.x, target.y, target.yaw, lift=self.lift)
-            self._reported.reckon(self._clock.time())
+            self._reported.advance_to(self._clock.time())
             self._reported.frame_at = self._clock.time()
             await self._clock.sleep(FRAME_PERIOD / 4)  # upper bound of the rate
             with contextlib.suppress(TimeoutError):

@@ -44,7 +44,7 @@ class WireLabel(msgspec.Struct):
 async def newest_map(
     context: Context, wanted: str = "", *, number: int = 0, outdoor: bool | None = None
 ) -> StoredMap | None:
-    """The stored map: the one of that ``number``, else ``wanted``, else the one in use, else the newest.
+    """Return the stored map: the one of that ``number``, else ``wanted``, else the one in use, else the newest.
 
     Real robots keep one map and ignore ``wanted`` while they have another. In the manual an unknown name means no map.
     ``outdoor`` restricts the kind of map. None if there is none.

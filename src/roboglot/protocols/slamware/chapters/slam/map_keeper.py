@@ -222,7 +222,7 @@ class MapKeeper:
     def _basis(self) -> dict[str, Sequence[float]]:
         return dict(self._robot[Settings].get(BASIS, {}))
 
-    async def begin_anew(self, origin: Pose) -> None:
+    async def on_map_cleared(self, origin: Pose) -> None:
         """Handle the clearing of memory's grid: its origin is now at ``origin``, from which docks are given.
 
         Further drawings belong to no floor of the file: a restart restores the file's grid with the drawings that it

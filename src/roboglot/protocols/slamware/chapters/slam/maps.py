@@ -77,7 +77,7 @@ async def clear_map(context: Context) -> None:
     if Docking in context.robot and MapAnnotations in context.robot:
         _check_reach(dock.pose.relative_to(origin).point for dock in known_docks(context.robot))
     context.robot[Mapping].clear()
-    await context.maps.begin_anew(origin)
+    await context.maps.on_map_cleared(origin)
 
 
 @TABLE.on(f"PUT {API}/maps/origin", right=Right.EDIT, needs=(MapAnnotations, MapMemory, Mapping, Places, Settings))

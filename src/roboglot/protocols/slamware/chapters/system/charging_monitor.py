@@ -44,7 +44,7 @@ class ChargingWatch:
             self._timer = self._robot.clock.call_later(PATIENCE, self._check)
 
     def _check(self) -> None:
-        """The timer stays until the robot charges or leaves: once is enough."""
+        """Report once: the timer stays until the robot charges or leaves."""
         if self._starves():
             self._failed()
 
