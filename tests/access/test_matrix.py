@@ -166,7 +166,7 @@ async def test_fleet_control_does_what_its_right_allows(runtime: Runtime, reache
             await answer(door._context, name, b"{}")
         states = {key: ActionState(Action(key, key)) for key in keys - messages}
         for key, state in states.items():
-            await door._context._performer.perform(state, FLEET._operations[key], instant=True)
+            await door._context.performer.perform(state, FLEET._operations[key], instant=True)
         return {key for key, state in states.items() if "has no right to" in state.result}
 
     for caller in CALLERS:

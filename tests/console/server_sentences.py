@@ -32,22 +32,19 @@ HOLE = "{}"
 @cache
 def sentences(root: Path = ROOT) -> dict[str, str]:
     """Return each sentence, with ``{}`` for what is filled in, and the first place where it is said."""
-    trees = {path.relative_to(root): parsed(path) for path in sorted(root.rglob("*.py"))}
+    names = {path.relative_to(root).as_posix(): path for path in sorted(root.rglob("*.py"))}
+    trees = {name: parsed(path) for name, path in names.items() if name == TAILS or name.startswith(PLACES)}
     errors = _errors(trees)
     found: dict[str, str] = {}
-    for path, tree in trees.items():
-        said: Iterator[tuple[str, int]] = iter(())
-        if path.as_posix() == TAILS:
-            said = _returned(tree)
-        elif path.as_posix().startswith(PLACES):
-            said = _said(tree, errors, path.as_posix().startswith(OUTSIDE))
+    for name, tree in trees.items():
+        said = _returned(tree) if name == TAILS else _said(tree, errors, name.startswith(OUTSIDE))
         for text, line in said:
             if re.search("[a-z]{2}", text.replace(HOLE, "")):
-                found.setdefault(text.strip(), f"{path}:{line}")
+                found.setdefault(text.strip(), f"{name}:{line}")
     return found
 
 
-def _errors(trees: Mapping[Path, ast.Module]) -> set[str]:
+def _errors(trees: Mapping[str, ast.Module]) -> set[str]:
     """The names of the classes below ``KINDS``."""
     bases: dict[str, set[str]] = {}
     for tree in trees.values():
