@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 import os
 import sqlite3
@@ -20,6 +19,7 @@ import typer
 from roboglot.access.tunnel.connector import AnnouncedGateway, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.dialling import Dialling, Ended, OnePlace, Place, Places, Unusable
 from roboglot.config import ROBOTS_MAX, is_loopback
+from roboglot.drivers.supervisor import together
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import visible
 from roboglot.hosting.event_loop import run
@@ -95,18 +95,12 @@ def addresses(count: int, first: str, network: str) -> list[str]:
 async def _keep_all(places: AbstractContextManager[Places], robots: dict[str, str], token: str, *, once: bool) -> None:
     """Keep each robot's ports on its address."""
     with places as known:
-        tasks = [
-            asyncio.ensure_future(
+        await together(
+            *(
                 Dialling(known, name, token, address, partial(_ready, address), _print).keep(once=once)
+                for name, address in robots.items()
             )
-            for name, address in robots.items()
-        ]
-        try:
-            await asyncio.gather(*tasks)
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+        )
 
 
 def _ready(address: str, robot: str, ports: list[int], fingerprint: str, new: bool) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from uuid import NAMESPACE_OID, uuid5
 
-from roboglot.model.maps import PointOfInterest
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.simulation.world.world_files import read_ros_grid
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
@@ -62,18 +61,11 @@ def _floor_of(name: str, source: str, fetch: Callable[[str], bytes]) -> FloorMap
 
 
 def _with_own_ids(floor: FloorMap, name: str, ids: set[str]) -> FloorMap:
-    """Return the floor with new ids for docks and places whose ids are in ``ids``, and add all to these.
-
-    A robot has one id for the docks that it finds by itself.
-    """
-
-    def own(mark: PointOfInterest) -> PointOfInterest:
-        id = str(uuid.uuid5(uuid.NAMESPACE_OID, f"{mark.id} {name}")) if mark.id in ids else mark.id
-        ids.add(id)
-        return replace(mark, id=id)
-
-    docks = tuple(map(own, floor.annotations.docks))
-    return replace(floor, annotations=replace(floor.annotations, docks=docks), places=tuple(map(own, floor.places)))
+    """Return the floor with new ids for docks whose ids are in ``ids``: a robot has one for those that it finds."""
+    docks = floor.annotations.docks
+    own = tuple(replace(d, id=str(uuid5(NAMESPACE_OID, d.id + name))) if d.id in ids else d for d in docks)
+    ids.update(dock.id for dock in own)
+    return replace(floor, annotations=replace(floor.annotations, docks=own))
 
 
 def _labelled(layer: Layer, label: FloorName) -> Layer:

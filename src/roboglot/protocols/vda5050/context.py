@@ -11,7 +11,6 @@ import logging
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from roboglot.model.actions import Action as RobotAction
 from roboglot.model.admission import Forbidden, Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
@@ -23,7 +22,7 @@ from roboglot.protocols.vda5050.errors import Rejected
 from roboglot.protocols.vda5050.maps import Maps
 from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, OrderBook, forget_oldest
 from roboglot.protocols.vda5050.order_check import check_order
-from roboglot.protocols.vda5050.performing import DOING, Performer, ended
+from roboglot.protocols.vda5050.performing import Performer
 from roboglot.protocols.vda5050.route import Route
 from roboglot.protocols.vda5050.table import INSTANT, operation_of
 from roboglot.protocols.vda5050.vocabulary import DOOR
@@ -57,7 +56,6 @@ class Context:
         self._tasks: set[asyncio.Future[None]] = set()
         self._route = Route(self)
         self.performer = Performer(self)
-        self._parts: dict[RobotAction, ActionState] = {}  # what the robot does for actions and can pause
 
     @property
     def map_id(self) -> str:
@@ -165,25 +163,8 @@ class Context:
         """Pause or continue all motion."""
         self.paused = on
         self._route.pause(on)
-        for part, state in self._parts.items():
-            self._hold(part, state)
+        self.performer.pause(on)
         self.touch()
-
-    def _hold(self, part: RobotAction, state: ActionState) -> None:
-        state.status = ActionStatus.PAUSED if self.paused else ActionStatus.RUNNING
-        if self.paused:
-            part.pause()
-        else:
-            part.resume()
-
-    async def carry_out(self, part: RobotAction) -> None:
-        """Wait until the robot's part of an action has succeeded; it is paused with the order."""
-        self._parts[part] = DOING.get()
-        self._hold(part, DOING.get())
-        try:
-            await ended(part)
-        finally:
-            del self._parts[part]
 
     async def cancel_order(self, order_id: str) -> None:
         """Stop and drop the rest of the order; returns when the robot stands. Raises Rejected if nothing is left."""

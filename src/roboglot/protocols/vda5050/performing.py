@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from roboglot.wire.vda5050.versions import Version
 
 log = logging.getLogger(__name__)
-DOING: ContextVar[ActionState] = ContextVar("doing")  # the action of the present task
+_DOING: ContextVar[ActionState] = ContextVar("doing")  # the action of the present task
 
 
 class Performing(Protocol):
@@ -38,21 +38,38 @@ class Performing(Protocol):
         """Raise Rejected unless fleet control has the right."""
 
 
-async def ended(action: RobotAction) -> None:
-    """Wait until the robot's part of an action has succeeded; cancelling the wait cancels it and lets it end."""
-    try:
-        await action.succeeded()
-    finally:
-        action.cancel("fleet control cancelled it")
-        await action.done()
-
-
 class Performer:
     """Does one context's actions."""
 
     def __init__(self, context: Performing) -> None:
         self._context = context
         self._asked: dict[str, asyncio.Future[bool]] = {}  # actions in RETRIABLE: True to try again
+        self._parts: dict[RobotAction, ActionState] = {}  # what the robot does for actions and can pause
+        self._paused = False
+
+    def pause(self, on: bool) -> None:
+        """Pause or continue what the robot does."""
+        self._paused = on
+        for part, state in self._parts.items():
+            self._hold(part, state)
+
+    def _hold(self, part: RobotAction, state: ActionState) -> None:
+        state.status = ActionStatus.PAUSED if self._paused else ActionStatus.RUNNING
+        if self._paused:
+            part.pause()
+        else:
+            part.resume()
+
+    async def carry_out(self, part: RobotAction) -> None:
+        """Wait until the robot's part of an action has succeeded, paused with the order; cancelled if the wait is."""
+        state = self._parts[part] = _DOING.get()
+        self._hold(part, state)
+        try:
+            await part.succeeded()
+        finally:
+            del self._parts[part]
+            part.cancel("fleet control cancelled it")
+            await part.done()
 
     async def perform(self, state: ActionState, operation: Operation[str], *, instant: bool = False) -> None:
         """Perform ``state``'s action to its end; a retriable one waits for instructions after a failure."""
@@ -87,7 +104,7 @@ class Performer:
     async def _try(self, state: ActionState, operation: Operation[str], instant: bool) -> None:
         context, action = self._context, state.action
         state.status = ActionStatus.RUNNING
-        DOING.set(state)
+        _DOING.set(state)
         context.touch()
         try:
             context.check(operation.key, operation.right)

@@ -14,15 +14,13 @@ from roboglot.model.components.motion.navigation import Navigation, NavigationFe
 from roboglot.model.errors import RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Point
-from roboglot.model.robot import Robot
-from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected, kind_of
 from roboglot.protocols.vda5050.order_book import ActionStatus, OrderBook
-from roboglot.protocols.vda5050.performing import Performer
+from roboglot.protocols.vda5050.performing import Performer, Performing
 from roboglot.protocols.vda5050.table import operation_of
 from roboglot.values import dataclass
 from roboglot.wire.vda5050.orders import Action, Edge, Node
-from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
+from roboglot.wire.vda5050.versions import ErrorKind, Level
 
 log = logging.getLogger(__name__)
 TOLERANCE = 0.05  # m: tolerance where the order allows no deviation
@@ -52,21 +50,12 @@ class Leg:
         return [Point(node.node_position.x, node.node_position.y) for node in self.nodes if node.node_position]
 
 
-class Driven(Protocol):
+class Driven(Performing, Protocol):
     """The context that a route belongs to."""
 
-    robot: Robot
     book: OrderBook
-    version: Version
-    errors: ErrorBook
     performer: Performer
     paused: bool
-
-    def touch(self) -> None:
-        """Schedule a state message."""
-
-    def check(self, operation: str, right: Right | None) -> None:
-        """Raise Rejected unless fleet control has the right."""
 
     def speed_ratio(self, edge: Edge | None) -> float:
         """Return the share of the top speed to drive an edge with."""

@@ -140,13 +140,8 @@ class Vda5050Door:
                 await client.subscribe(self._topic(name), qos=1)
             await self._send_connection("ONLINE")
             await self._send_factsheet()
-            log.info(
-                "robot %s: connected to the broker %s:%d, VDA 5050 %s",
-                self._robot.id,
-                host,
-                port,
-                self._version.number,
-            )
+            robot, version = self._robot.id, self._version.number
+            log.info("robot %s: connected to the broker %s:%d, VDA 5050 %s", robot, host, port, version)
             self._sent = None
             self._rests = False
             await _until_one_ends(self._listen(Intake.of(client, self._turns.look)), self._report(), self._visualize())

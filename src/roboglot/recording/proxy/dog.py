@@ -7,7 +7,6 @@ passes unchanged, so calls, deadlines, refusals and pings are those of the two e
 from __future__ import annotations
 
 import logging
-import os
 import ssl
 import tempfile
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from google.protobuf.message import DecodeError, Message
 from grpc import StatusCode
 
 from roboglot.clients.cyberdog.link import Certificates
+from roboglot.hosting.error_text import in_words
 from roboglot.model.tap import Direction
 from roboglot.recording.lines import Target, status_of
 from roboglot.recording.proxy.calls import Call, both
@@ -76,8 +76,7 @@ class DogRelay:
             try:
                 await self._crossing.listen(host, port, came, context)
             except OSError as error:
-                why = os.strerror(error.errno) if error.errno else str(error)
-                raise OSError(f"cannot listen at {host}:{port}: {why}") from error
+                raise OSError(f"cannot listen at {host}:{port}: {in_words(error)}") from error
 
     async def close(self) -> None:
         """Hang up at both ends."""

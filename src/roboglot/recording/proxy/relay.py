@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from roboglot.hosting.error_text import in_words
 from roboglot.model.clock import RealClock
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.entries import Entry
@@ -108,8 +108,7 @@ class Relay:
             try:
                 await self._crossing.listen(self._address, port, partial(self._accept, port), None)
             except OSError as error:
-                why = os.strerror(error.errno) if error.errno else str(error)
-                raise OSError(f"cannot listen at {self._address}:{port}: {why}") from error
+                raise OSError(f"cannot listen at {self._address}:{port}: {in_words(error)}") from error
         if self._target.door == "robomaster":
             self._announcer = Announcer(self._target.host, self._address, partial(self._pushed, DISCOVERY))
             await self._announcer.open()

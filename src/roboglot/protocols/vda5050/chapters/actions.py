@@ -96,14 +96,14 @@ async def initialize_position(
 @TABLE.on("startCharging", right=Right.DRIVE, needs=(Docking,))
 async def start_charging(context: Context) -> str:
     """Drive to the dock and onto its contacts."""
-    await context.carry_out(context.robot[Docking].dock(source=SOURCE))
+    await context.performer.carry_out(context.robot[Docking].dock(source=SOURCE))
     return "charging"
 
 
 @TABLE.on("stopCharging", right=Right.DRIVE, needs=(Docking,))
 async def stop_charging(context: Context) -> str:
     """Leave the dock."""
-    await context.carry_out(context.robot[Docking].undock(source=SOURCE))
+    await context.performer.carry_out(context.robot[Docking].undock(source=SOURCE))
     return ""
 
 

@@ -33,13 +33,13 @@ async def pick(
         raise Refused("the robot carries a load already")
     if stationType == SHELF:
         start = robot[Localization].pose
-        await context.carry_out(
+        await context.performer.carry_out(
             robot[TagDocking].dock_at(MarkGoal(mark=Mark.SHELF, start=start, lift=True), source=SOURCE)
         )
     else:
-        await context.carry_out(jack.raise_platform(source=SOURCE))
+        await context.performer.carry_out(jack.raise_platform(source=SOURCE))
     if not jack.loaded:
-        await context.carry_out(jack.lower_platform(source=SOURCE))
+        await context.performer.carry_out(jack.lower_platform(source=SOURCE))
         raise NotFound("there is no load over the platform")
     context.load = {key: said for key, said in (("loadId", loadId), ("loadType", loadType)) if said}
     return "the load is on the jack"
@@ -65,12 +65,12 @@ async def drop(
         raise Refused("the robot carries no load")
     if loadId and loadId != context.load.get("loadId", loadId):
         raise Refused(f"the load on the jack is {context.load['loadId']}, not {loadId}")
-    await context.carry_out(jack.lower_platform(source=SOURCE))
+    await context.performer.carry_out(jack.lower_platform(source=SOURCE))
     if jack.loaded:
         raise Refused("the load is still on the platform")
     context.load = {}
     if stationType == SHELF:
-        await context.carry_out(robot[TagDocking].back_off(Mark.SHELF, source=SOURCE))
+        await context.performer.carry_out(robot[TagDocking].back_off(Mark.SHELF, source=SOURCE))
     return "the load stands on the floor"
 
 

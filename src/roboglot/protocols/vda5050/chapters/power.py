@@ -8,7 +8,6 @@ from roboglot.model.components.energy.power import Power
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.operations import Right
 from roboglot.protocols.vda5050.context import SOURCE, Context
-from roboglot.protocols.vda5050.performing import ended
 from roboglot.protocols.vda5050.table import TABLE
 
 SLEEP_MAX = 31 * 24 * 3600.0  # s
@@ -21,7 +20,7 @@ async def start_hibernation(context: Context, *, wakeUpTime: str = "") -> str:  
     if not context.book.idle:
         await context.clear_order()
     if Power in context.robot:
-        await ended(context.robot[Power].save(source=SOURCE))
+        await context.performer.carry_out(context.robot[Power].save(source=SOURCE))
     context.hibernating = True
     if seconds is not None:
         context.alarm = context.run_beside(_wake_in(context, seconds))
@@ -42,7 +41,7 @@ async def shut_down(context: Context) -> str:
     """Switch the robot off after disconnecting from the broker; it reconnects when switched on."""
     if not context.book.idle:
         raise Refused(f"order {context.book.order_id} is not finished")
-    await ended(context.robot[Power].shut_down(source=SOURCE))
+    await context.performer.carry_out(context.robot[Power].shut_down(source=SOURCE))
     context.leaving = True
     return ""
 
@@ -55,7 +54,7 @@ async def _wake_in(context: Context, seconds: float) -> None:
 
 async def _wake(context: Context) -> None:
     if Power in context.robot:
-        await ended(context.robot[Power].wake(source=SOURCE))
+        await context.performer.carry_out(context.robot[Power].wake(source=SOURCE))
     context.hibernating = False
     context.touch()
 

@@ -83,7 +83,7 @@ async def fine_positioning(
     robot = context.robot
     texts = frozenset({stationName}) if stationName and stationType is Mark.PRINTED else frozenset[str]()
     goal = MarkGoal(mark=stationType, start=robot[Localization].pose, texts=texts)
-    await context.carry_out(robot[TagDocking].dock_at(goal, source=SOURCE))
+    await context.performer.carry_out(robot[TagDocking].dock_at(goal, source=SOURCE))
     pose = robot[Localization].pose
     return f"at {pose.x:z.3f} {pose.y:z.3f} {pose.yaw:z.3f}"
 

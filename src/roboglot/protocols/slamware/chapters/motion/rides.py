@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.lift_client import LiftClient
@@ -40,7 +42,7 @@ from roboglot.wire.slamware.chapters.motion import (
 )
 from roboglot.wire.slamware.chapters.platform import ElevatorEvent
 
-ENTER_SECONDS = LEAVE_SECONDS = 120.0  # s, unless the client sets a limit
+CROSS_SECONDS = 120.0  # s, unless the client sets a limit
 
 
 def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action:
@@ -158,21 +160,27 @@ def enter_elevator(context: Context, options: EnterElevatorOptions) -> Action:
         await _cross(errand, elevator, how.elevator_door_flag)
         note(ElevatorEvent.WAIT_ELEVATOR)
         note(ElevatorEvent.ENTER_ELEVATOR)
-        into = navigate(errand.robot, [elevator.inside.point], MoveOptions(), source=PART)
-        try:
-            await errand.do(into, within=how.timeout_in_ms / 1000 or ENTER_SECONDS)
-        except RobotError as error:
-            if isinstance(error, Blocked):
-                note(ElevatorEvent.ENTER_ELEVATOR_OCCUPIED)
-                note(ElevatorEvent.TAKE_ELEVATOR_OCCUPIED)
-            note(ElevatorEvent.ENTER_ELEVATOR_FAILED)
-            raise
+        with _noting(note, ElevatorEvent.ENTER_ELEVATOR_OCCUPIED, ElevatorEvent.ENTER_ELEVATOR_FAILED):
+            into = navigate(errand.robot, [elevator.inside.point], MoveOptions(), source=PART)
+            await errand.do(into, within=how.timeout_in_ms / 1000 or CROSS_SECONDS)
         note(ElevatorEvent.IN_ELEVATOR)
         note(ElevatorEvent.TURNING_ROUND_IN_ELEVATOR)
         turn = wrap_angle(yaw - errand.robot[Localization].pose.yaw)
         await errand.do(errand.robot[Driving].move_by(Pose(yaw=turn), source=PART))
 
     return run_errand(context.robot, "enter elevator", work, options.elevator_id)
+
+
+@contextmanager
+def _noting(note: Callable[[ElevatorEvent], None], occupied: ElevatorEvent, failed: ElevatorEvent) -> Iterator[None]:
+    """Note why the door could not be crossed."""
+    try:
+        yield
+    except RobotError as error:
+        for event in (occupied, ElevatorEvent.TAKE_ELEVATOR_OCCUPIED) if isinstance(error, Blocked) else ():
+            note(event)
+        note(failed)
+        raise
 
 
 async def _cross(errand: Errand, elevator: Elevator, door: Door) -> None:
@@ -191,15 +199,9 @@ def leave_elevator(context: Context, options: LeaveElevatorOptions) -> Action:
 
     async def work(errand: Errand) -> None:
         note(ElevatorEvent.LEAVE_ELEVATOR)
-        out = navigate(errand.robot, [waiting.point], MoveOptions(), source=PART)
-        try:
-            await errand.do(out, within=how.timeout_in_ms / 1000 or LEAVE_SECONDS)
-        except RobotError as error:
-            if isinstance(error, Blocked):
-                note(ElevatorEvent.LEAVE_ELEVATOR_OCCUPIED)
-                note(ElevatorEvent.TAKE_ELEVATOR_OCCUPIED)
-            note(ElevatorEvent.LEAVE_ELEVATOR_FAILED)
-            raise
+        with _noting(note, ElevatorEvent.LEAVE_ELEVATOR_OCCUPIED, ElevatorEvent.LEAVE_ELEVATOR_FAILED):
+            out = navigate(errand.robot, [waiting.point], MoveOptions(), source=PART)
+            await errand.do(out, within=how.timeout_in_ms / 1000 or CROSS_SECONDS)
         note(ElevatorEvent.OUT_OF_ELEVATOR)
         if options.target is not None and how.if_need_reach_milestone:
             goal = Point(options.target.x, options.target.y)
