@@ -17,7 +17,6 @@ from google.protobuf.message import DecodeError, Message
 from grpc import StatusCode
 
 from roboglot.clients.cyberdog.link import Certificates
-from roboglot.hosting.error_text import in_words
 from roboglot.model.tap import Direction
 from roboglot.recording.lines import Target, status_of
 from roboglot.recording.proxy.calls import Call, both
@@ -73,10 +72,7 @@ class DogRelay:
             (self._address, self._target.port, self._app_came, self._as_robot),
             (where, self._app_port, self._robot_came, self._as_app),
         ):
-            try:
-                await self._crossing.listen(host, port, came, context)
-            except OSError as error:
-                raise OSError(f"cannot listen at {host}:{port}: {in_words(error)}") from error
+            await self._crossing.listen(host, port, came, context)
 
     async def close(self) -> None:
         """Hang up at both ends."""

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from roboglot.hosting.error_text import in_words
 from roboglot.model.clock import RealClock
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.entries import Entry
@@ -105,10 +104,7 @@ class Relay:
         """Listen. Raises OSError."""
         main = self._target.port
         for port in (main, *(p for p in SIDE_PORTS.get(self._target.door, ()) if p != main)):
-            try:
-                await self._crossing.listen(self._address, port, partial(self._accept, port), None)
-            except OSError as error:
-                raise OSError(f"cannot listen at {self._address}:{port}: {in_words(error)}") from error
+            await self._crossing.listen(self._address, port, partial(self._accept, port), None)
         if self._target.door == "robomaster":
             self._announcer = Announcer(self._target.host, self._address, partial(self._pushed, DISCOVERY))
             await self._announcer.open()
