@@ -21,11 +21,11 @@ from roboglot.model.perception import Gesture, Sport
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Finished
-from roboglot.programs.functions.examples import Example, examples
 from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
 from roboglot.simulation.world.world import World
 from roboglot.wire.contracts import contract
 from tests.programs.functions.effects import EFFECTS, Seen
+from tests.programs.functions.examples import Example, examples
 from tests.programs.staging import Act, Stage
 
 EXAMPLES = examples()

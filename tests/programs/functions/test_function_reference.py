@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from roboglot.programs.functions.reference import page
 from roboglot.wire.contracts import contract
+from tests.programs.functions.reference import page
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "programs.md"
 

@@ -10,7 +10,6 @@ import pytest
 
 from roboglot.programs.engine.journal import does_something
 from roboglot.programs.functions.enums import ENUMS
-from roboglot.programs.functions.examples import examples
 from roboglot.programs.functions.interrupted import CallInterrupted, call_cut_off
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.functions.results import StateCode
@@ -18,6 +17,7 @@ from roboglot.programs.functions.session import TaskEnded
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 from tests.programs.functions.calling import Caller, field
+from tests.programs.functions.examples import examples
 
 WORDS = "the server ended while {} was under way; it was not repeated"
 ACTING = sorted(operation.key for operation in ABILITIES if does_something(operation.key))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.resources
 import tomllib
 from collections.abc import Iterator
+from pathlib import Path
 
 from roboglot.programs.functions.moving.performing import RESULT_MOTIONS
 from roboglot.programs.functions.table import ABILITIES
@@ -45,7 +45,7 @@ class Example:
 
 def examples() -> dict[str, Example]:
     """Return the examples by the function's name."""
-    text = importlib.resources.files(__package__).joinpath("examples.toml").read_text("utf-8")
+    text = Path(__file__).with_suffix(".toml").read_text("utf-8")
     written = {
         name: Example(**fields | {"code": fields["code"].strip()}) for name, fields in tomllib.loads(text).items()
     }

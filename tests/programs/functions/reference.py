@@ -7,16 +7,16 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from roboglot.programs.functions.examples import Example, examples
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.functions.table import ABILITIES
+from tests.programs.functions.examples import Example, examples
 
 _HEAD = """# Functions of robot programs
 
 For authors of block programs who look up a function. After this page you know its parameters, and have an example
 that runs.
 
-Made from the declarations by `python -m roboglot.programs.functions.reference docs/reference/programs.md`.
+Made from the declarations by `.venv/bin/python -m tests.programs.functions.reference docs/reference/programs.md`.
 How the language looks is in [programs](../programs/programs.md), what the functions do with the robot in
 [visual programming](../protocols/visual.md).
 Names without parentheses are read, not called. Every example is played by the tests on a simulated dog.
