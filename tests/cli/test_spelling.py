@@ -1,10 +1,13 @@
 """Guesses for mistyped names: near ones, and none for words that resemble nothing."""
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from roboglot import cli
 from roboglot.cli import COMMANDS
 from roboglot.config import config_of
 from roboglot.simulation.faults.fault_kinds import KINDS
@@ -82,3 +85,22 @@ def test_command_line_guesses_well(line: str, said: str, unsaid: str) -> None:
 def test_mistyped_setting_is_named_with_the_right_one() -> None:
     with pytest.raises(ValueError, match=r"worldx is not a setting; did you mean 'world'\?$"):
         config_of({"worldx": "office"})
+
+
+def test_a_misspelt_variable_is_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("sys.argv", ["roboglot", "--version"])
+    for name in ("AXCESS", "DATA_BASE", "INSECURE", "CI", "ADDRESS_B", "TESTS_COLD", "KILLS", "URL", "ORDERS"):
+        monkeypatch.setenv(f"ROBOGLOT_{name}", "secret")
+    cli.main()
+    assert capsys.readouterr().err.splitlines() == [
+        "roboglot: ROBOGLOT_AXCESS has no effect; did you mean ROBOGLOT_ACCESS?",
+        "roboglot: ROBOGLOT_DATA_BASE has no effect; did you mean ROBOGLOT_DATABASE?",
+    ]
+
+
+def test_all_variables_that_are_read_are_known() -> None:
+    read: set[str] = set()
+    for path in Path(cli.__file__).parents[1].rglob("*.py"):
+        read.update(re.findall(r'"ROBOGLOT_([A-Z_]+)"', path.read_text()))
+    given = {"ADDRESS", "URL", "PROGRAMS", "CERTIFICATES", "APP_PORT"}  # to the commands of scenarios, which read them
+    assert read - given | {"PROGRAMS"} == set(cli.VARIABLES)

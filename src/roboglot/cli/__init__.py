@@ -50,6 +50,12 @@ COMMANDS = {
     "doctor": "show what is missing on this machine, and how to get it",
 }
 FLUSH_FAILED = 120  # Python's own exit status for it
+PREFIX = "ROBOGLOT_"
+# The environment variables that are read, without their prefix.
+VARIABLES = (
+    *("ACCESS", "CLOUD_DATABASE", "CONSOLE", "CYBERDOG", "DATA", "DATABASE", "FAILURES", "FLEET", "INSECURE"),
+    *("PROGRAMS", "RECORD", "REGISTRY", "RUN_AGAIN", "SEED", "SPEED", "TOKEN", "WARM", "WORLD"),
+)
 # Commands whose files have a folder of their own.
 FOLDERS = (
     dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings")
@@ -97,6 +103,7 @@ def run_to_end(work: Callable[[], None]) -> NoReturn:
 def main() -> None:
     """``roboglot COMMAND …``; the commands' own options come from Typer."""
     _tolerate_plain_terminals()
+    _warn_of_misspelt_variables()
     arguments = sys.argv[1:] or ["--help"]
     name = arguments[0]
     try:
@@ -148,6 +155,16 @@ def _tolerate_plain_terminals() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _warn_of_misspelt_variables() -> None:
+    """Typer ignores them. Scripts may have variables of their own, which resemble none."""
+    names = {name.removeprefix(PREFIX) for name in os.environ if name.startswith(PREFIX)}
+    for name in sorted(names.difference(VARIABLES)):
+        from roboglot.spelling import nearest
+
+        if near := nearest(name, VARIABLES):
+            print(f"roboglot: {PREFIX}{name} has no effect; did you mean {PREFIX}{near}?", file=sys.stderr)
 
 
 def _print_usage() -> None:
