@@ -7,6 +7,7 @@ import socket
 
 import pytest
 
+from roboglot.console.server import bound
 from roboglot.transport.listening import SILENT_PROBES, end_vanished, listen
 
 
@@ -29,6 +30,14 @@ async def test_silent_client_of_any_port_is_probed() -> None:
         writer.close()
         (await accepted).close()  # type: ignore[attr-defined] # a base transport has it
         server.close()
+
+
+def test_client_of_a_starting_console_is_probed() -> None:
+    with bound("127.0.0.1", 0) as listening, socket.create_connection(listening.getsockname()):
+        accepted, _ = listening.accept()
+        with accepted:
+            assert accepted.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 40_000
 
 
 def test_ports_open_where_the_kernel_lacks_these_options(monkeypatch: pytest.MonkeyPatch) -> None:

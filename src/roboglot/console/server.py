@@ -111,7 +111,6 @@ class Console:
         loop = asyncio.get_running_loop()
         asking = (robot.admission for robot in self._desk.robots.values() if robot.admission.enforced)
         self._gate = Gate(next(asking, Admission()), self._tls)
-        end_vanished(listening)
         gated = self._gate.before(lambda: BoundedConnection(config, state, {}, loop), "console pages")
         self._server = await loop.create_server(gated, sock=listening, backlog=BACKLOG)
         self._tasks.append(loop.create_task(self._beat(self._application), name="console beat"))
@@ -212,6 +211,7 @@ def bound(address: str, first: int) -> socket.socket:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((address, min(port, 65_535)))
+            end_vanished(listening)  # before the first client, who may come before the pages are served
             listening.listen(BACKLOG)
         except OSError as error:
             listening.close()

@@ -82,14 +82,12 @@ class Overview:
         from uvicorn.server import ServerState
 
         from roboglot.transport.http import BoundedConnection
-        from roboglot.transport.listening import end_vanished
 
         config = Config(
             self, ws="none", lifespan="off", interface="asgi3", log_config=None, access_log=False, proxy_headers=False
         )
         config.load()
         state, loop = ServerState(), asyncio.get_running_loop()
-        end_vanished(listening)
         self._connections = state.connections
         self._server = await loop.create_server(
             lambda: BoundedConnection(config, state, {}, loop), sock=listening, backlog=BACKLOG
