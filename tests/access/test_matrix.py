@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import functools
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from websockets.asyncio.client import connect
 
 from roboglot.console.verbs.robots import VERBS
 from roboglot.console.verbs.world import WORLD_VERBS
@@ -232,6 +234,17 @@ async def test_the_console_does_what_the_right_allows(runtime: Runtime, monkeypa
                     reply = await client.post(f"/{where}/{operation.key}", content=b'{"no": "such value"}')
                     refused = reply.status_code in REFUSED
                     assert refused == (operation.right not in caller.rights), (caller.name, operation.key, reply.text)
+
+
+async def test_page_learns_nothing_of_others_world(runtime: Runtime) -> None:
+    """The floor plans are the simulated world's truth, which needs the right to see all its robots."""
+    assert runtime.console is not None
+    await runtime.console.ready()
+    for name in ("see", "owner-of-b"):
+        address = next(caller.address for caller in CALLERS if caller.name == name)
+        async with connect(f"ws://127.0.0.1:{runtime.console.port}/live", local_addr=(address, 0)) as page:
+            hello = json.loads(await page.recv())
+        assert bool(hello["robots"]) == bool(hello["doors"]) == bool(hello["floors"]) == (name == "see")
 
 
 async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:

@@ -131,7 +131,7 @@ class Desk:
                 for name, listed in self.doors().items()
                 if name in visible
             },
-            "floors": drawings.plans_of(self.stage),
+            "floors": drawings.plans_of(self.stage) if len(visible) == len(self.views) else [],
             "fault_kinds": [
                 {"name": k.name, "of_robot": k.of_robot, "options": dict(k.options)} for k in self.stage.fault_kinds
             ],
