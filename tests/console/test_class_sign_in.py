@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
@@ -149,3 +149,30 @@ async def test_one_list_lets_people_into_all_worlds(tmp_path: Path, monkeypatch:
             one.runtime.guard.reload()
             assert (await signed(one, name="mx", password=PASSWORD))[0] == 401
     store.close()
+
+
+async def test_signing_out_ends_open_pages_and_sound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page in another tab drove on as the one who had signed out."""
+    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+    (tmp_path / "w").mkdir()
+    store = open_store(tmp_path / "w")
+    store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
+    access = AccessConfig(on=True, local=False)
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=access) as shown, asyncio.timeout(60):
+        (_, _, left), (_, _, kept) = [await signed(shown, name="mx", password=PASSWORD) for _ in range(2)]
+        live = shown.url.replace("http", "ws") + "/live"
+        other = connect(live, max_size=None, additional_headers={"Cookie": kept})
+        async with connect(live, max_size=None, additional_headers={"Cookie": left}) as page, other as stays:
+            listen = Request(f"{shown.url}/api/robots/a/sound.wav", headers={"Cookie": left})
+            with await asyncio.to_thread(urlopen, listen) as sound:
+                leave = Request(f"{shown.url}/api/sign_out", data=b"", headers={"Cookie": left})
+                (await asyncio.to_thread(urlopen, leave)).close()
+                with suppress(ConnectionClosed):
+                    while await page.recv():
+                        pass
+                assert page.close_code == 1008
+                await shown.clock.advance(1.0)
+                await asyncio.to_thread(sound.read)
+            await stays.send(json.dumps({"type": "ping", "at": 1.0}))
+            while "pong" not in str(await stays.recv()):
+                pass

@@ -14,14 +14,14 @@ from msgspec import MsgspecError
 from roboglot.console.api import Api
 from roboglot.console.assets import Assets
 from roboglot.console.desk import Desk
-from roboglot.console.http import Message, Problem, Receive, Scope, Send, answer, answer_json
+from roboglot.console.http import Message, Problem, Receive, Scope, Send, answer, answer_json, session_lasts
 from roboglot.console.live import Page
 from roboglot.console.people.classes import Classes
 from roboglot.console.people.entry import CHALLENGE, address_of, admission_of, enter
 from roboglot.console.people.sessions import Sessions
 from roboglot.console.people.signing import Signing
 from roboglot.console.program_runs import end_all
-from roboglot.console.settings import JOIN_BURST, JOIN_TRIES, MESSAGE_MAX, VIEWERS_MAX
+from roboglot.console.settings import JOIN_BURST, JOIN_TRIES, MESSAGE_MAX, REVOKED_SECONDS, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
 from roboglot.console.studio.channel import Session
 from roboglot.console.studio.class_link import Hello, LinkedRoom
@@ -221,6 +221,7 @@ class Application:
         sending = asyncio.get_running_loop().create_task(page.run(), name="console page")
         listening = asyncio.get_running_loop().create_task(_listen(page, longest, receive), name="console requests")
         self._listening[listening] = identity()
+        _end_with_session(listening)
         try:
             await listening
         except asyncio.CancelledError:
@@ -253,6 +254,14 @@ class Application:
 
 def _stops(path: str) -> bool:
     return path.startswith("/api/robots/") and path.endswith(STOPS)
+
+
+def _end_with_session(listening: asyncio.Task[None]) -> None:
+    """Cancel the task once the client has signed out, here or on another page; runs in the client's context."""
+    if not session_lasts.get()():
+        listening.cancel()
+    elif not listening.done():
+        asyncio.get_running_loop().call_later(REVOKED_SECONDS, _end_with_session, listening)
 
 
 async def _listen(page: Page | Session, longest: int, receive: Receive) -> None:

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import importlib
-import logging
 import struct
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from roboglot.console.http import Problem, Receive, Send, answer
+from roboglot.console.http import Problem, Receive, Send, answer, session_lasts
 from roboglot.console.settings import CALL_SECONDS, CALLS_MAX, JPEG_QUALITY, OFFER_MAX, REVOKED_SECONDS
 from roboglot.media.audio import AudioStream
 from roboglot.media.stills import jpeg
 from roboglot.media.video import VideoStream, beside
 from roboglot.model import background
 from roboglot.model.admission import Right
-from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.camera import Camera, Frame
 from roboglot.model.components.sensing.detector import Detector
 from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.components.sensing.vision import Vision
@@ -26,12 +25,12 @@ from roboglot.model.errors import Busy
 from roboglot.model.feed import Viewer
 from roboglot.model.perception import Box
 from roboglot.model.robot import Robot
-from roboglot.model.sound import SAMPLE_RATE
+from roboglot.model.sound import SAMPLE_RATE, SoundBlock
 
 if TYPE_CHECKING:
     from roboglot.media.webrtc import VideoCall
 
-log = logging.getLogger(__name__)
+T = TypeVar("T")
 BOUNDARY = b"roboglot-frame"
 SIZE_UNKNOWN = 0xFFFFFFFF  # length of an endless WAV file
 ENDLESS_WAV = struct.pack(  # one channel of 16 bits
@@ -50,40 +49,56 @@ async def send_photo(robot: Robot, send: Send) -> None:
 
 async def send_film(robot: Robot, receive: Receive, send: Send) -> None:
     """Send motion JPEG until the client disconnects; a slow reader misses pictures."""
-    camera = robot[Camera]
-    kind = b"multipart/x-mixed-replace; boundary=" + BOUNDARY
-    headers = [(b"content-type", kind), (b"cache-control", b"no-store")]
-    gone = asyncio.ensure_future(_left(receive))
-    await send({"type": "http.response.start", "status": 200, "headers": headers})
-    with camera.subscribe() as viewer:
-        gone.add_done_callback(lambda _: viewer.close())
-        try:
-            async for first in viewer:
-                if not robot.admission.may(Right.SEE):  # access may have been revoked meanwhile
-                    break
-                frame = (viewer.drain() or [first])[-1]
-                picture = await background.beside(partial(jpeg, frame, JPEG_QUALITY))
-                head = b"--%s\r\ncontent-type: image/jpeg\r\ncontent-length: %d\r\n\r\n" % (BOUNDARY, len(picture))
-                await send({"type": "http.response.body", "body": head + picture + b"\r\n", "more_body": True})
-        finally:
-            gone.cancel()
+    viewer = robot[Camera].subscribe()
+
+    async def encoded(first: Frame) -> bytes:
+        frame = (viewer.drain() or [first])[-1]
+        picture = await background.beside(partial(jpeg, frame, JPEG_QUALITY))
+        return b"--%s\r\ncontent-type: image/jpeg\r\ncontent-length: %d\r\n\r\n%s\r\n" % (
+            *(BOUNDARY, len(picture), picture),
+        )
+
+    await _stream(robot, viewer, encoded, b"multipart/x-mixed-replace; boundary=" + BOUNDARY, receive, send)
 
 
 async def send_sound(robot: Robot, receive: Receive, send: Send) -> None:
     """Send the microphone's sound as an endless WAV file, until the client disconnects."""
+
+    async def encoded(block: SoundBlock) -> bytes:
+        return block.samples.tobytes()
+
+    await _stream(robot, robot[Microphone].subscribe(), encoded, b"audio/wav", receive, send, ENDLESS_WAV)
+
+
+async def _stream(
+    robot: Robot,
+    viewer: Viewer[T],
+    encoded: Callable[[T], Awaitable[bytes]],
+    kind: bytes,
+    receive: Receive,
+    send: Send,
+    head: bytes = b"",
+) -> None:
+    """Send ``head`` and what the viewer gets, while the client is there and may see it."""
     gone = asyncio.ensure_future(_left(receive))
-    with robot[Microphone].subscribe() as viewer:
+    headers = [(b"content-type", kind), (b"cache-control", b"no-store")]
+    with viewer:
         gone.add_done_callback(lambda _: viewer.close())
-        headers = [(b"content-type", b"audio/wav"), (b"cache-control", b"no-store")]
         await send({"type": "http.response.start", "status": 200, "headers": headers})
-        await send({"type": "http.response.body", "body": ENDLESS_WAV, "more_body": True})
+        await send({"type": "http.response.body", "body": head, "more_body": True})
         try:
-            async for block in viewer:
-                if not robot.admission.may(Right.SEE):  # access may have been revoked meanwhile
+            async for item in viewer:
+                if not _may_watch(robot):
                     break
-                await send({"type": "http.response.body", "body": block.samples.tobytes(), "more_body": True})
+                await send({"type": "http.response.body", "body": await encoded(item), "more_body": True})
+            await send({"type": "http.response.body", "body": b""})
         finally:
             gone.cancel()
+
+
+def _may_watch(robot: Robot) -> bool:
+    """Return whether the client has still the right to see the robot, and has not signed out."""
+    return session_lasts.get()() and robot.admission.may(Right.SEE)
 
 
 async def _left(receive: Receive) -> None:
@@ -120,10 +135,10 @@ class Calls:
             raise Problem(400, f"the offer cannot be answered: {bad}") from None
 
     def _look_after(self, robot: Robot, call: VideoCall) -> None:
-        """Hang up when the caller loses the right to see the robot; runs in the caller's context."""
+        """Hang up when the caller may no longer see the robot; runs in the caller's context."""
         if call not in self._calls:
             return
-        if robot.admission.may(Right.SEE):
+        if _may_watch(robot):
             asyncio.get_running_loop().call_later(REVOKED_SECONDS, self._look_after, robot, call)
         else:
             self._end(call)

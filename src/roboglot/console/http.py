@@ -1,9 +1,10 @@
-"""The parts of ASGI that the console needs: a request's body, an answer, a problem."""
+"""The parts of ASGI that the console needs: a request's body, an answer, a problem, and the end of its session."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from contextvars import ContextVar
 from typing import Any, TypeVar
 
 import msgspec
@@ -18,6 +19,8 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[MutableMapping[str, object]], Awaitable[None]]
 Rows = list[tuple[bytes, bytes]]
 
+session_lasts: ContextVar[Callable[[], bool]] = ContextVar("session_lasts", default=lambda: True)
+"""Returns False once the current client has signed out."""
 SAFETY: Rows = [
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboglot.console.desk import CLIENT, Desk
-from roboglot.console.http import Scope
+from roboglot.console.http import Scope, session_lasts
 from roboglot.console.people.sessions import Sessions, cookie_name, read_cookie
 from roboglot.model.admission import NO_PROOF, Admission, LockedOut, Proof, ProofKind, Unknown
 from roboglot.model.client_context import set_client
@@ -35,6 +35,9 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
     address, who = address_of(scope), ""
     shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
     session = None if shown else sessions.find(cookie_of(scope))
+    if session is not None:
+        cookie = cookie_of(scope)
+        session_lasts.set(lambda: sessions.find(cookie) is not None)
     proof = Proof(ProofKind.HTTP, shown) if shown else session.proof if session is not None else NO_PROOF
     admission = admission_of(desk)
     if admission is not None:
