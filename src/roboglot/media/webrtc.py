@@ -7,7 +7,6 @@ come out. Packets are stamped with their time of display, in the network's time,
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Generic, TypeVar
@@ -38,7 +37,6 @@ from roboglot.model.sound import SAMPLE_RATE
 from roboglot.values import dataclass
 from roboglot.wire.ice import offer_loopback
 
-log = logging.getLogger(__name__)
 P = TypeVar("P", VideoPacket, AudioPacket)
 KEYFRAME_EVERY = 0.3  # s between two keyframes requested by one viewer
 GAP = SAMPLE_RATE // 5  # samples by which audio may be early or late without a gap

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 import os
 import resource
 import signal
@@ -29,7 +28,6 @@ from roboglot.shards.messages import Beat, News, Ready, Refusal, encode
 if TYPE_CHECKING:
     from roboglot.runtime import Runtime
 
-log = logging.getLogger(__name__)
 CLASS_SOCKET = "class"  # in the fleet's folder
 SETTINGS = "shard.json"  # in the shard's folder, as in a configuration file
 PERIOD = 1.0  # s between two heartbeats

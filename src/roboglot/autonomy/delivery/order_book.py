@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import uuid
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,7 +25,6 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import NotFound, Refused
 from roboglot.model.robot import Robot
 
-log = logging.getLogger(__name__)
 KIND, POLICY, HOLD = "order", "delivery.policy", "delivery.hold"
 OPEN_MAX, ENDED_MAX = 100, 100  # orders
 

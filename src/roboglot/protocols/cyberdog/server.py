@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -53,8 +52,6 @@ from roboglot.wire.cyberdog.channel import ROBOT_NAME, server_options
 from roboglot.wire.cyberdog.codes import MachineState
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.visual.relay import FrameRelay
-
-log = logging.getLogger(__name__)
 
 
 class CyberDogDoor:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-
 from roboglot.model.components.interaction.skin import ElectronicSkin, Shade, SkinPattern
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.operations import Right
@@ -12,7 +10,6 @@ from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code, SkinMode
 from roboglot.wire.cyberdog.text import Int32
 
-log = logging.getLogger(__name__)
 OVER_TIME = frozenset({SkinMode.REARWARD, SkinMode.FORWARD, SkinMode.FLASH, SkinMode.RANDOM})
 
 
