@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Self
 
 import pytest
 
@@ -31,6 +32,16 @@ class Simulation:
     def pose(self) -> Pose:
         return self.world.truth.pose_of("a")
 
+    @classmethod
+    def of(cls, description: WorldDescription, placements: list[RobotPlacement], seed: int) -> Self:
+        """Build a world with its robots; it is not started."""
+        clock = LockstepClock()
+        world = World(description, placements, clock=clock, seed=seed)
+        robots = {name: Robot(name, world.description_of(name), clock) for name in [p.name for p in placements]}
+        for robot in robots.values():
+            world.equip(robot)
+        return cls(world, clock, robots)
+
 
 Simulate = Callable[..., Simulation]
 
@@ -49,14 +60,10 @@ def simulate() -> Iterator[Simulate]:
         robots: tuple[str, ...] = ("a",),
         body: str = "universal",
     ) -> Simulation:
-        clock = LockstepClock()
         placements = [RobotPlacement(n, body, start=start if n == "a" else None, floor=floor) for n in robots]
-        world = World(load_world(name) if isinstance(name, str) else name, placements, clock=clock, seed=seed)
-        built = {n: Robot(n, world.description_of(n), clock) for n in robots}
-        for robot in built.values():
-            world.equip(robot)
-        opened.append(world)
-        return Simulation(world, clock, built)
+        built = Simulation.of(load_world(name) if isinstance(name, str) else name, placements, seed)
+        opened.append(built.world)
+        return built
 
     yield build
     for world in opened:

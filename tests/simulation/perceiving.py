@@ -5,35 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 
-from roboglot.model.clock import LockstepClock
 from roboglot.model.components.sensing.detector import Detector
 from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.geometry import Pose
-from roboglot.model.robot import Robot
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.description_checks import completed
-from roboglot.simulation.world.world import RobotPlacement, World
+from roboglot.simulation.world.world import RobotPlacement
+from tests.simulation.conftest import Simulation
 
 START = Pose(2, 5)
 EYE = (0.25, 0.37, 0.05, 1.2217, 16 / 9)  # the universal body's: ahead, above the floor, up, fov, aspect
 
 
-@dataclass
-class Lab:
-    """The world, its clock and robots."""
-
-    world: World
-    clock: LockstepClock
-    robots: dict[str, Robot]
-
-    @property
-    def robot(self) -> Robot:
-        return self.robots["a"]
+class Lab(Simulation):
+    """A simulation whose robots are asked what they perceive."""
 
     async def see(self, kind: str, seconds: float = 0.3, robot: str = "a") -> list[Any]:
         """Return a detector's last report after so long."""
@@ -51,15 +40,11 @@ def lab(
     """A square room; ``floor`` is the rest of the lowest floor's description."""
     storeys = [{"size": [size, size], **floor}, *({"size": [size, size]} for _ in range(floors - 1))]
     description = completed(msgspec.convert({"floors": storeys}, WorldDescription), "test")
-    clock = LockstepClock()
     placements = [RobotPlacement(n, body, start=start if n == "a" else None) for n in robots]
-    world = World(description, placements, clock=clock, seed=seed)
-    built = {n: Robot(n, world.description_of(n), clock) for n in robots}
-    for robot in built.values():
-        world.equip(robot)
-    world.start()
-    yield Lab(world, clock, built)
-    world.close()
+    room = Lab.of(description, placements, seed)
+    room.world.start()
+    yield room
+    room.world.close()
 
 
 def appears(x: float, y: float, z: float, robot: Pose = START) -> tuple[float, float]:

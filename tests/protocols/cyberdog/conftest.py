@@ -12,7 +12,9 @@ import pytest
 from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.driving import Driving
+from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
+from roboglot.model.stage import StagePerson
 from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
@@ -75,6 +77,18 @@ async def door(robot: Robot, data: Path, app: App) -> AsyncIterator[CyberDogDoor
 async def client(door: CyberDogDoor, pems: Pems, messages: Messages) -> AsyncIterator[Client]:
     async with pems.channel(door.port) as channel:
         yield Client(channel, messages)
+
+
+@pytest.fixture
+async def anna(
+    world: World, client: Client, app: App, passing: Callable[[Callable[[], object]], Awaitable[None]]
+) -> StagePerson:
+    """A person three metres ahead of the robot, whose app is connected."""
+    person = world.hands.person("anna")
+    world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
+    await client.ask(10001)
+    await passing(lambda: app.connected)
+    return person
 
 
 @pytest.fixture

@@ -11,16 +11,6 @@ from tests.protocols.cyberdog.phone import App, Client
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
 
-@pytest.fixture
-async def anna(world, robot, client, app, passing):
-    """A person three metres ahead of the robot, whose app is connected."""
-    person = world.hands.person("anna")
-    world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
-    await client.ask(10001)
-    await passing(lambda: app.connected)
-    return person
-
-
 async def test_a_face_is_entered_and_known_again(client: Client, app: App, robot, anna, passing, forward) -> None:
     assert await client.ask(7001, {"command": 0, "username": "anna", "ishost": True}) == {"result": 0}
     assert (await client.ask(1021, {"account": "anna"}))["accounts"][0]["face_state"] == 2

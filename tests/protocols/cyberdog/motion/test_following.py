@@ -12,16 +12,6 @@ from tests.protocols.cyberdog.phone import App, Client, Stream, state, until
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
 
-@pytest.fixture
-async def anna(world, robot, client, app, passing):
-    """A person three metres ahead of the robot, whose app is connected."""
-    person = world.hands.person("anna")
-    world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
-    await client.ask(10001)
-    await passing(lambda: app.connected)
-    return person
-
-
 async def test_the_person_chosen_is_followed(client: Client, app: App, robot, world, anna, passing, forward) -> None:
     nowhere = {"x_offset": 0, "y_offset": 0, "height": 10, "width": 10}
     assert await client.ask(6008, {"roi": nowhere}) == {"success": False}  # no task
