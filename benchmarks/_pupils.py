@@ -1,4 +1,4 @@
-"""Clients in a process of their own: one for each robot, with ten requests a second; and their observations.
+"""Clients in a separate process: one for each robot, with ten requests a second; and their observations.
 
 REST clients ask for the pose and have their robot turn, text clients turn theirs and take pushes at 10 Hz, gRPC
 clients send frames that let the dog turn, and take its heartbeats. Some text clients film: they take the video's bytes.
@@ -234,6 +234,6 @@ def attend(lesson: Lesson) -> tuple[dict[str, Seen], Burden]:
 
 
 def in_a_process(lesson: Lesson) -> tuple[dict[str, Seen], Burden]:
-    """Run the clients of a lesson in a process of their own."""
+    """Run the clients of a lesson in a separate process."""
     with get_context("spawn").Pool(1) as pool:
         return pool.apply(attend, (lesson,))

@@ -1,4 +1,4 @@
-"""Worlds full of robots that drive at the same time, each in a process of its own, forked from a warm one.
+"""Worlds full of robots that drive at the same time, each in a separate process, forked from a warm one.
 
 With ``turns``, so many of them at once advance by ``TURN`` of robot time while the others wait. Left to the system,
 more worlds than cores lose each other's caches at every switch of processes, a hundred times a second: 1.1 ms each.

@@ -1,7 +1,7 @@
 """Claims: with a client for each robot, text and REST answer in 30 ms and gRPC in 60 (p99), pushes at 9.9 of 10 Hz.
 
 25 robots of three bodies in one program, five of them filmed; 50 without films; 100 in two shards. Robot time goes on
-as real time does. The clients are a process of their own on the same machine (benchmarks/_pupils.py): what they wait
+as real time does. The clients are a separate process on the same machine (benchmarks/_pupils.py): what they wait
 for, and how late they themselves are, is in the figures.
 
     scripts/bench clients [--robots 25 --films 5 --shards 1] [--seconds 15]

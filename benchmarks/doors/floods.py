@@ -3,7 +3,7 @@
 Longer than while a process beside keeps a core as busy as the flood does. And memory is bounded.
 
 Slow loris, half-open connections, TLS handshakes, 10,000 log-in tries, HTTP/2 rapid reset and, with OpenSSL's client,
-TLS renegotiations and new keys, one after the other, from a process of its own; another asks for the battery over the
+TLS renegotiations and new keys, one after the other, from a separate process; another asks for the battery over the
 text protocol and for the pose over REST all the while.
 
     scripts/bench floods [--count 10000]

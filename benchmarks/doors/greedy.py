@@ -1,7 +1,7 @@
 """Claim: one client that asks as fast as it can costs the others <= 20 ms at the 99th percentile.
 
 Ten robots in one program, each asked for its pose over REST and its mode over text ten times a second; then clients in
-processes of their own send requests without a pause, each over another door: REST, text (a thousand at a time), block
+separate processes send requests without a pause, each over another door: REST, text (a thousand at a time), block
 programs, Foxglove, VDA 5050, and the console's interface.
 
     scripts/bench greedy [--robots 10] [--seconds 8]

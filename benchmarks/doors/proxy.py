@@ -3,7 +3,7 @@ relay that only passes bytes.
 
 Two figures: inside, from bytes received to bytes passed on, as the proxy itself measures it for every piece; and the
 client's view, where the relay shows how much of it is one more process on this machine. A CyberDog is asked over TLS,
-with certificates at both ends, and without. Robot, relays and client are processes of their own, as they are in use;
+with certificates at both ends, and without. Robot, relays and client are separate processes, as they are in use;
 the robot's time stands still, so that no simulated world is in the figures.
 scripts/bench proxy [requests]
 """

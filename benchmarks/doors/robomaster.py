@@ -1,6 +1,6 @@
 """Claims: >= 8000 round trips/s on one connection, >= 0.8 of what a bare asyncio.Protocol does per processor second.
 
-That one echoes on uvloop in a process of its own and is asked in turns with the robot; both share a core with the
+That one echoes on uvloop in a separate process and is asked in turns with the robot; both share a core with the
 client, where a bare echo costs least: on two cores, waking each other costs more than twice as much. 50 Hz pushes to
 five clients jitter by <= 5 ms (99th percentile).
 """

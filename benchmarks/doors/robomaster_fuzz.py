@@ -1,6 +1,6 @@
 """Claim: a million random and mutated lines on the control port: all answered, no exception, no growth, others served.
 
-``--lines`` and ``--seed`` choose others. The server is a real ``roboglot up`` in a process of its own.
+``--lines`` and ``--seed`` choose others. The server is a real ``roboglot up`` in a separate process.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Claim: 8000 poses/s and 2000 scans/s of one core, p99 <= 10 ms on 32 connections, 0.75 of what bare uvicorn does.
 
-The load comes from a process of its own. "Of one core" is what the server did per second of its own processor time,
+The load comes from a separate process. "Of one core" is what the server did per second of its own processor time,
 all its threads counted, less what its world takes without requests; bare uvicorn is asked in turns with it. p99 is
 under that same load.
 """
@@ -104,7 +104,7 @@ async def ask(address: str, port: int, path: str, seconds: float) -> Load:
 
 
 def load(*arguments: object) -> Load:
-    """``ask`` in a process of its own."""
+    """``ask`` in a separate process."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(_ask, arguments)
 

@@ -87,7 +87,7 @@ def back_after(folder: Path) -> float:
 
 
 def reference(folder: Path) -> None:
-    """One robot in a process of its own."""
+    """One robot in a separate process."""
     with served(folder / "alone", address="127.78.200.1", log=folder / "alone.log") as robot:
         print(f"reference: one `roboglot up` ready after {robot.ready_after:.2f} s, {memory(robot.process.pid):.0f} MB")
 

@@ -65,7 +65,7 @@ def children(pid: int) -> list[int]:
 
 
 class Place:
-    """Runtime folder of its own, so that no other parent of this installation interferes."""
+    """Separate runtime folder, so that no other parent of this installation interferes."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -1,6 +1,6 @@
 """Claim: who looks after 10,000 robots' heartbeats takes <= 10 % of a core; the registry's server beside it.
 
-100 programs of 100 simulated robots each, in processes of their own: they send the supervisor's heartbeats once a
+100 programs of 100 simulated robots each, in separate processes: they send the supervisor's heartbeats once a
 second, and renew their robots' homes on PostgreSQL twice a second, as shards do. This process is the coordinator: it
 hears them, and watches over the registry. With Ray installed, another part asks actors of Ray instead, 100 times a
 second, as `fleet up --on` does. Processor time counts, so that a busy machine changes little.

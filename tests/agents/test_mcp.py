@@ -101,7 +101,7 @@ async def test_over_streamable_http(shown: Shown) -> None:
         await serving
 
 
-@pytest.mark.slow  # a process of its own: the same server as above, the same process as test_over_standard_input
+@pytest.mark.slow  # a separate process: the same server as above, the same process as test_over_standard_input
 async def test_the_command_serves_streamable_http(shown: Shown) -> None:
     from mcp import Client
 

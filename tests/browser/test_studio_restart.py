@@ -42,7 +42,7 @@ Life = Callable[[], Awaitable[asyncio.subprocess.Process]]
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def server(tmp_path: Path) -> AsyncIterator[tuple[str, Life]]:
-    """Yield the address of a server of its own, and what starts it; the last life is ended with the test."""
+    """Yield the address of a separate server, and what starts it; the last life is ended with the test."""
     address, port, lives = free_addresses(1), free_port(), []
     settings = tmp_path / "settings.toml"
     settings.write_text(

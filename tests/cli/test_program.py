@@ -1,4 +1,4 @@
-"""``roboglot program`` as people call it: a process of its own, against a robot's WebSocket."""
+"""``roboglot program`` as people call it: a separate process, against a robot's WebSocket."""
 
 from __future__ import annotations
 

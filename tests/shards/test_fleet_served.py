@@ -39,7 +39,7 @@ POI = {"id": "desk", "pose": {"x": 1.0, "y": 2.0, "yaw": 0.5}, "metadata": {"dis
 
 
 class Fleet:
-    """``roboglot fleet up`` in a process of its own."""
+    """``roboglot fleet up`` in a separate process."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

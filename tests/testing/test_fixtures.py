@@ -1,4 +1,4 @@
-"""The test kit works with nothing but the package: the start page's own example, in a folder of its own."""
+"""The test kit works with nothing but the package: the start page's own example, in a separate folder."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "up": "start the robots with all their doors",
-    "fleet": "run many worlds, each in a process of its own",
+    "fleet": "run many worlds, each in a separate process",
     "demo": "let four vendors' clients drive one robot, and draw a picture of it",
     "coverage": "show how much of each protocol is implemented",
     "capabilities": "show what each protocol can do on each kind of robot",
@@ -56,7 +56,7 @@ VARIABLES = (
     *("ACCESS", "CLOUD_DATABASE", "CONSOLE", "CYBERDOG", "DATA", "DATABASE", "FAILURES", "FLEET", "INSECURE"),
     *("PROGRAMS", "RECORD", "REGISTRY", "RUN_AGAIN", "SEED", "SPEED", "TOKEN", "WARM", "WORLD"),
 )
-# Commands whose files have a folder of their own.
+# Commands whose files have a separate folder.
 FOLDERS = (
     dict.fromkeys(("compare", "export", "fidelity", "record", "replay", "rerun"), "recordings")
     | dict.fromkeys(("lease", "stop", "reset"), "control")

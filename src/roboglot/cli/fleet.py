@@ -1,4 +1,4 @@
-"""``roboglot fleet``: run many worlds, each in a process of its own, and restart failed ones."""
+"""``roboglot fleet``: run many worlds, each in a separate process, and restart failed ones."""
 
 from __future__ import annotations
 

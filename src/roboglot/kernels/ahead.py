@@ -45,7 +45,7 @@ def missing(modules: Sequence[str] = MODULES) -> list[str]:
 
 
 def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda _name, _done, _total: None) -> None:
-    """Compile those of ``modules`` that are missing, in processes of their own; return when all are ready.
+    """Compile those of ``modules`` that are missing, in separate processes; return when all are ready.
 
     Waits for another process that compiles already. Raises KernelsUnavailable.
     """
@@ -77,7 +77,7 @@ async def compile_beside(modules: Sequence[str] = MODULES, report: Report = lamb
 
 
 async def _compile_apart(modules: Sequence[str], report: Report) -> None:
-    """Compile in a process of its own; it and its compilers are killed when this is cancelled."""
+    """Compile in a separate process; it and its compilers are killed when this is cancelled."""
     pipe = asyncio.subprocess.PIPE
     command = (sys.executable, "-m", "roboglot.kernels", *modules)
     process = await asyncio.create_subprocess_exec(*command, stdout=pipe, stderr=pipe, start_new_session=True)

@@ -23,7 +23,7 @@ async def beside(job: Callable[[], R]) -> R:
 
 
 async def load(job: Callable[[], R]) -> R:
-    """Return the result of ``job``, which imports modules, in a thread of its own.
+    """Return the result of ``job``, which imports modules, in a separate thread.
 
     Unlike an executor's threads, this one is not joined when the loop or the interpreter ends: importing and compiling
     with Numba takes seconds, and nothing is lost if the process ends meanwhile.

@@ -58,7 +58,7 @@ class _Lines(logging.Handler):
 class ShardActor:
     """Serves one shard from its beginning to ``stop``.
 
-    ``of_node``: nodes share no folders, so each uses a subfolder of its own.
+    ``of_node``: nodes share no folders, so each uses a separate subfolder.
     """
 
     def __init__(self, settings: dict[str, object], folder: str, *, of_node: bool) -> None:

@@ -80,7 +80,7 @@ def warm() -> None:
 
 
 def _compile() -> None:
-    """Compile missing kernels in a process of its own: here, a compiler would leave 400 MB to every fork."""
+    """Compile missing kernels in a separate process: here, a compiler would leave 400 MB to every fork."""
     from roboglot.kernels.ahead import missing
 
     if missing():

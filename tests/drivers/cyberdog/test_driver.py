@@ -1,6 +1,6 @@
 """A simulated dog behind its gRPC door, a driver connected to it, and the text protocol in front.
 
-gRPC has threads of its own, which no virtual clock waits for: robot time passes a little faster than outside.
+gRPC has its own threads, which no virtual clock waits for: robot time passes a little faster than outside.
 """
 
 import asyncio

@@ -28,7 +28,7 @@ PATIENCE = 60.0  # real seconds; reached only on a busy machine
 
 
 class Messages:
-    """The classes of the service's messages, made from the .proto in a pool of their own."""
+    """The classes of the service's messages, made from the .proto in a separate pool."""
 
     def __init__(self, folder: Path) -> None:
         source = Path(proto.__file__).parent

@@ -1,4 +1,4 @@
-"""Runs users' programs, each in a process of its own that can only compute and send calls.
+"""Runs users' programs, each in a separate process that can only compute and send calls.
 
 A clean zygote is started once and forked for every program; the fork is locked down (system call filter, no files, no
 network, limits) before it sees the program's text. Parsing happens in there too. Where the

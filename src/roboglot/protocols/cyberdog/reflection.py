@@ -91,7 +91,7 @@ def _ours(symbol: str, service: str) -> bool:
 
 
 def _kinds(package: str) -> dict[str, Any]:
-    """Return the classes of MESSAGES, in a pool of their own."""
+    """Return the classes of MESSAGES, in a separate pool."""
     file = descriptor_pb2.FileDescriptorProto(name=f"{package}.proto", package=package, syntax="proto3")
     for name, fields in MESSAGES.items():
         message = file.message_type.add(name=name)

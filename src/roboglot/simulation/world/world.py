@@ -212,7 +212,7 @@ class World:
             await self._loading
 
     async def _load_kernels(self) -> None:
-        """Switch the sensors to the compiled kernels; missing ones are compiled first, in a process of their own."""
+        """Switch the sensors to the compiled kernels; missing ones are compiled first, in a separate process."""
         with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors continue without it
             await compile_beside(WORLD)
             await load(self._environment.sight.load_kernel)

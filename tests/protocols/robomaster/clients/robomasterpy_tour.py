@@ -1,4 +1,4 @@
-"""Run by test_robomasterpy.py in a process of its own: PyPI's robomasterpy, unmodified, against a robot on argv[1]."""
+"""Run by test_robomasterpy.py in a separate process: PyPI's robomasterpy, unmodified, against a robot on argv[1]."""
 
 import dataclasses
 import json

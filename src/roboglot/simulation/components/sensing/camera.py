@@ -147,7 +147,7 @@ class SimulatedCamera(Camera):
             log.exception("the camera cannot draw")
 
     async def capture(self) -> Frame:
-        # In a task of its own: a drawing thread cannot be cancelled, and its renderer stays in use until it ends.
+        # In a separate task: a drawing thread cannot be cancelled, and its renderer stays in use until it ends.
         return await asyncio.shield(asyncio.get_running_loop().create_task(self._capture()))
 
     async def _capture(self) -> Frame:

@@ -1,6 +1,6 @@
 """Photos and recordings on the robot, kept until an app has fetched them. Knows no message.
 
-Files are named by robot time, as on cameras; each robot has a folder of its own.
+Files are named by robot time, as on cameras; each robot has a separate folder.
 """
 
 from __future__ import annotations
