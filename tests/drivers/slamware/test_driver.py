@@ -45,7 +45,7 @@ from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.chapters.motion import AngleOptions
-from tests.drivers.chain import Open, OpenRest, Script
+from tests.drivers.chain import Open, OpenRest, Script, Until
 from tests.narrowing import of_kind
 
 
@@ -276,3 +276,15 @@ async def test_robot_without_lidar_and_map_has_none_here(driven: Robot, rest: Op
     assert not {Localization, Navigation, Docking, Lidar, Mapping} & set(driven.interfaces)
     assert (await dashboard.get_odo_pose()).x == pytest.approx(0.0, abs=0.01)
     assert (await dashboard.get_power_status()).battery_percentage > 50
+
+
+async def test_command_while_braking_ends_at_its_time(
+    driven: Robot, robot: Robot, forward: Forward, until: Until
+) -> None:
+    first = driven[Driving].drive(Twist(yaw=0.5), lifetime=0.3, source="test")
+    await forward(seconds=0.4)
+    assert not first.status.ended
+    second = driven[Driving].drive(Twist(yaw=0.5), lifetime=0.3, source="test")
+    await until(lambda: second.status.ended)
+    await forward(seconds=1)
+    assert abs(robot[Base].velocity.yaw) < 0.02

@@ -69,10 +69,14 @@ class SlamwareDriving(Driving):
         wanted = self._command = _Command(command, until)
 
         async def keep(_: Action) -> None:
-            while (left := wanted.until - self._robot.clock.time()) > 1e-9:
-                self._base.set_velocity(wanted.velocity)
-                await self._robot.clock.sleep(min(PERIOD, left))
-                self._check()
+            try:
+                while (left := wanted.until - self._robot.clock.time()) > 1e-9:
+                    self._base.set_velocity(wanted.velocity)
+                    await self._robot.clock.sleep(min(PERIOD, left))
+                    self._check()
+            finally:
+                if self._command is wanted:
+                    self._action = None  # it brakes: later commands start afresh
 
         self._action = self._start("drive", keep, goal=command, source=source)
         return self._action
