@@ -329,6 +329,28 @@ async def test_a_lost_connection_is_said_and_bridged(served: Served, open_consol
     await page.wait_for_selector(".link.good")
 
 
+async def test_failing_drive_is_said_where_it_began(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    await page.wait_for_selector("text=Scan fits map")
+    served.robot[EmergencyStop].engage()
+    await page.wait_for_selector("text=Release")
+    box = await page.locator("canvas").bounding_box()
+    await page.mouse.click(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2)
+    await page.wait_for_selector(".notice >> text=On the way.")
+    await served.clock.advance(1.0)
+    await page.wait_for_selector(".notice.bad >> text=the emergency stop is engaged")
+    served.robot[EmergencyStop].release()
+
+
+async def test_robot_shown_again_keeps_its_map(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    await shows(page, "import('/link.js').then((link) => Boolean(link.grid.value))", True)
+    await page.click("nav a[href='#/robots']")
+    await page.get_by_role("button", name="Show", exact=True).click()
+    await page.wait_for_selector("text=Scan fits map")
+    assert await page.evaluate("import('/link.js').then((link) => Boolean(link.grid.value))")
+
+
 @pytest.mark.slow  # a view of its own; tests/console has the maps
 async def test_saved_map_is_seen_in_the_grid(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="world")

@@ -96,7 +96,7 @@ function App() {
   useEffect(() => want({ wire: view.value === "wire" }), [view.value]);
   const [, Shown] = VIEWS[view.value];
   if (status.value === "out") return html`<${Header} /><main class="lone"><${SignIn} /></main><${Notice} />`;
-  return html`<${Header} /><${Nav} /><main>${view.value !== "robots" && html`<h1 class="unseen">${t(`view.${view.value}`)} · ${t("robot.named", { name: current.value })}</h1>`}<${Banner} />${hello.value && !hello.value.robots.length ? html`<p class="empty">${t("robots.hidden")}</p>` : hello.value ? html`<${Shown} />` : html`<p class="empty">${t(`link.${status.value}`)}</p>`}</main><${Notice} />`;
+  return html`<${Header} /><${Nav} /><main>${view.value !== "robots" && html`<h1 class="unseen">${t(`view.${view.value}`)} · ${t("robot.named", { name: current.value })}</h1>`}<${Banner} />${hello.value?.robots.length ? html`<${Shown} />` : html`<p class="empty">${t(hello.value ? "robots.hidden" : `link.${status.value}`)}</p>`}</main><${Notice} />`;
 }
 
 await loadWords();

@@ -1,4 +1,4 @@
-// The socket to the robot runtime: keeps what is known of every robot, carries commands, measures its own age.
+// The socket to the runtime: the state of every robot, commands, its own age.
 import { signal, computed, batch, effect } from "@preact/signals";
 import { lacks, notice, person, rights, say, t, kept } from "./base.js";
 
@@ -90,6 +90,7 @@ export function watch() {
 
 /** Show another robot. @param {string} name */
 export function choose(name) {
+  if (name === current.value) return;
   batch(() => { chosen.value = name; scan.value = null; grid.value = null; path.value = new Float32Array(); exchanges.value = []; seen.value = []; });
   watch();
 }
@@ -128,7 +129,7 @@ export const changeWorld = (verb, values) => command(verb, values, "");
 /** Drive by hand: shares of the top speeds. The server brakes when this falls silent.
  * @param {number} x @param {number} y @param {number} yaw */
 export function drive(x, y, yaw) {
-  if (status.value !== "open") { // a held pad asks ten times a second: what the page says of the reason stays
+  if (status.value !== "open") { // a held pad asks ten times a second: the reason stays
     if ((x || y || yaw) && !notice.value.bad) say(t("refused", { why: t("link.lost") }), true);
     return;
   }
@@ -154,9 +155,12 @@ function receive(message) {
     case "moment":
       batch(() => { clock.value = message.time; poses.value = Object.fromEntries(Object.entries(message.poses).filter(([, p]) => p[0] !== null)); recording.value = message.recording; if (message.truth) truth.value = message.truth; steer(message.pace); });
       break;
-    case "state":
-      states.value = { ...states.value, [message.robot]: { ...states.value[message.robot], ...message.state } };
+    case "state": {
+      const known = states.value[message.robot], [last] = message.state.history ?? [];
+      states.value = { ...states.value, [message.robot]: { ...known, ...message.state } };
+      if (known && last?.status === "ABORTED" && last.client === you.value) say(last.reason, true);
       break;
+    }
     case "seen":
       if (message.robot === current.value) seen.value = message.boxes;
       break;
