@@ -300,3 +300,11 @@ async def test_any_json_body_is_answered(bare_client: httpx.AsyncClient, key: st
 @given(data=st.binary(min_size=1, max_size=200))
 async def test_any_bytes_as_a_body_are_answered(bare_client: httpx.AsyncClient, data: bytes) -> None:
     assert (await bare_client.post(POIS, content=data)).status_code in (200, 400)
+
+
+@pytest.mark.parametrize(
+    "body", [pytest.param(body, marks=pytest.mark.world("empty", body=body)) for body in ("robomaster_ep", "hermes")]
+)
+async def test_start_screens_line_works_on_each_body(body: str, door: SlamwareDoor) -> None:
+    async with httpx.AsyncClient() as client:
+        assert (await client.get(door.endpoints[0].try_line.removeprefix("curl "))).status_code == 200, body

@@ -187,6 +187,6 @@ class SlamwareDoor:
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
-        """The address, with a line that requests the pose."""
+        """The address, with a request that every body answers."""
         address = f"{self._scheme}://{self._address}:{self.port}"
-        return [Endpoint("Slamware REST", address, f"curl {address}/api/core/slam/v1/localization/pose")]
+        return [Endpoint("Slamware REST", address, f"curl {address}/api/core/system/v1/power/status")]
