@@ -164,3 +164,9 @@ def test_a_dogs_several_answers_stay_with_their_request(door: str) -> None:
     answers = [Exchange(at, *rest, Direction.REPLY, "1004", b"{}", "ok", "", at - 2.0) for at in (3.0, 4.0)]
     older, newer = pair([*asked, *answers])[0]
     assert (older.replies, newer.replies) == ([], answers)
+
+
+def test_differences_are_shown_in_one_line() -> None:
+    (row,) = compare([session()[0]], [], Mask()).rows
+    assert row.differences
+    assert not any("\n" in part for found in row.differences for part in (found.one, found.other))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ def mend(source: Path, target: Path) -> int:
     schemas: dict[int, int] = {0: 0}
     channels: dict[int, int] = {}
     with target.open("xb") as file:
+        os.fchmod(file.fileno(), 0o600)
         writer: Any = Writer(file, compression=CompressionType.ZSTD)
         writer.start(library=LIBRARY)
         for record, channel, schema in records(source):

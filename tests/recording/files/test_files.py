@@ -337,6 +337,7 @@ def test_a_mended_file_keeps_them_too(tmp_path: Path) -> None:
     part.close()
     mend(tmp_path / "cut.mcap", tmp_path / "whole.mcap")
     assert Doctor((tmp_path / "whole.mcap").read_bytes()).examine() == []
+    assert (tmp_path / "whole.mcap").stat().st_mode == (tmp_path / "x.mcap").stat().st_mode  # for its owner only
 
 
 @given(

@@ -199,4 +199,5 @@ def _first_places(exchanges: Sequence[Exchange]) -> dict[tuple[str, str, str], i
 
 def _short(value: object) -> str:
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    text = " ".join(filter(None, text.splitlines()))
     return text if len(text) <= VALUE_MAX else text[: VALUE_MAX - 1] + "…"
