@@ -100,7 +100,7 @@ async def unbind_scene(context: Context, body: Unbinding | None = None) -> None:
         await context.maps.delete()
 
 
-@TABLE.on(f"GET {MAP}/floors", right=Right.SEE)
+@TABLE.on(f"GET {MAP}/floors", right=Right.SEE, needs=(Settings,))
 def get_floors(context: Context) -> list[FloorInfo]:
     """Return the floors of the loaded map; none before the first load."""
     start, names = context.maps.start_floor, [floor.name for floor in context.maps.floors]
