@@ -9,7 +9,7 @@ import logging
 import os
 import ssl
 from collections.abc import Awaitable, Coroutine, Sequence
-from datetime import tzinfo
+from datetime import UTC, datetime, tzinfo
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -277,9 +277,15 @@ class Runtime:
             names = {robot.address for robot in self.config.robots} | {self.config.console.address}
             pair = ensure_site(self.config.data / FOLDER, names | own_names())
         try:
-            return Tls(server_context(*pair), settings.plain)
+            context = server_context(*pair)
         except ssl.SSLError as error:
             raise ValueError(f"[access.tls] {pair[0]}: {error}") from None
+        if settings.certificate:
+            from roboglot.protocols.cyberdog.signing import valid_until
+
+            if (until := valid_until(pair[0])) < datetime.now(UTC):
+                log.warning("[access.tls] %s expired on %s: clients refuse it", pair[0], until.date())
+        return Tls(context, settings.plain)
 
     def build_desk(self) -> Desk:
         """Return the desk of a console."""

@@ -6,7 +6,10 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -15,10 +18,11 @@ from roboglot.access.trail import Entry, open_trail
 from roboglot.cli.checks.security import DAY, UNUSED_DAYS, examine_security
 from roboglot.config import AccessConfig, Config, RobotConfig, TlsConfig
 from roboglot.operations import Right
-from roboglot.protocols.cyberdog.certificates import ensure_certificates
+from roboglot.protocols.cyberdog.certificates import ensure_certificates, ensure_site
 from roboglot.protocols.foxglove.config import FoxgloveConfig
 from roboglot.protocols.ros2.config import Ros2Config
 from roboglot.protocols.slamware.config import SlamwareConfig
+from roboglot.runtime import Runtime
 
 DRIVE, ADMIN = frozenset({Right.DRIVE}), frozenset({Right.ADMIN})
 OUTSIDE = (RobotConfig("a", "universal", "192.0.2.5"),)
@@ -84,6 +88,28 @@ def test_rights_that_are_weak_or_unused_are_named(data: Path) -> None:
         "unused: past",
         "unused: 192.0.2.9",
     }
+
+
+def test_certificate_that_expires_is_weak(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Clients refuse it, and the robot's log only says that they hung up."""
+    monkeypatch.setattr("roboglot.protocols.cyberdog.signing.VALID_FOR", timedelta(days=29))
+    certificate, key = ensure_site(data / "cyberdog", {"127.0.0.1"})
+    tls = TlsConfig(on=True, certificate=str(certificate), key=str(key))
+    found = weak(Config(robots=OUTSIDE, data=data, access=AccessConfig(on=True, tls=tls)))
+    assert {"gateway certificate", "web certificate"} <= found.keys()
+    assert str(certificate) in found["web certificate"]
+
+
+def test_expired_certificate_is_named_at_the_start(
+    data: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    ensure_certificates(data / "cyberdog")
+    monkeypatch.setattr("roboglot.protocols.cyberdog.signing.VALID_FOR", timedelta(hours=-1))
+    certificate, key = ensure_site(data / "cyberdog", {"127.0.0.1"})
+    tls = TlsConfig(on=True, certificate=str(certificate), key=str(key))
+    asked: Any = SimpleNamespace(config=Config(data=data, access=AccessConfig(on=True, tls=tls)))
+    assert Runtime._build_tls(asked) is not None
+    assert f"{certificate} expired on" in caplog.text
 
 
 def test_the_command_prints_fingerprints(data: Path) -> None:

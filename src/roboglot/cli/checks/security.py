@@ -108,10 +108,13 @@ def _fingerprints(config: Config) -> Iterator[Finding]:
     own = Path(config.access.tls.certificate) if config.access.tls.certificate else folder / "site" / "site-cert.pem"
     for label, path in (("gateway certificate", folder / "tls" / SERVER_CERT), ("web certificate", own)):
         if path.exists():
-            from roboglot.protocols.cyberdog.signing import fingerprint
+            from roboglot.protocols.cyberdog.signing import fingerprint, valid_until
 
             try:
-                yield Finding(label, True, f"SHA-256 {fingerprint(path)}")
+                until = valid_until(path)
+                lasts = until.timestamp() > time.time() + 30 * DAY
+                seen = f"SHA-256 {fingerprint(path)}" + ("" if lasts else f", valid until {until:%Y-%m-%d}")
+                yield Finding(label, lasts, seen, "" if lasts else f"replace {path}, or remove one that roboglot made")
             except (OSError, ValueError) as error:
                 yield Finding(label, False, in_words(error), f"remove {path.parent} to have new ones")
 

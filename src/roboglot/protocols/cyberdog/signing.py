@@ -84,6 +84,11 @@ def fingerprint(certificate: Path) -> str:
     return x509.load_pem_x509_certificate(certificate.read_bytes()).fingerprint(hashes.SHA256()).hex()
 
 
+def valid_until(certificate: Path) -> datetime:
+    """Return the end of a PEM certificate's time. Raises OSError, ValueError."""
+    return x509.load_pem_x509_certificate(certificate.read_bytes()).not_valid_after_utc
+
+
 def serves(path: Path, names: Collection[str]) -> bool:
     """Return whether a certificate of ours is for all these names and still good for a month."""
     try:
