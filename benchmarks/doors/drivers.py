@@ -101,7 +101,7 @@ async def rest_latency(relay: Relay, host: str, port: int) -> float:
     for number in range(ROUNDS):
         direction = f'"direction":{number % 2}'.encode()
         body = b'{"action_name":"slamtec.agent.actions.MoveByAction","options":{%s,"duration":300}}' % direction
-        head = b"POST /api/core/motion/v1/actions HTTP/1.1\r\nhost: x\r\ncontent-length: %d\r\n\r\n" % len(body)
+        head = b"POST /api/core/motion/v1/actions HTTP/1.1\r\nhost: localhost\r\ncontent-length: %d\r\n\r\n" % len(body)
         taken.append(await relay.until((b"/actions ", direction), partial(writer.write, head + body)))
         answer = await reader.readuntil(b"\r\n\r\n")
         length = int(answer.lower().partition(b"content-length: ")[2].split(b"\r")[0])
