@@ -19,7 +19,7 @@ SURPRISE_MAX = 400.0  # squared ratio: more is a collision or a hand, not noise
 LEARNT_MIN = 0.2  # share of a correction that must come from the scan for it to count
 
 BIAS_GAIN = 0.02  # weight of a correction, at least
-TURN_UNKNOWN, SCALE_UNKNOWN = 0.01, 0.05  # rad/s, share of the distance: standard deviations before anything is learnt
+TURN_UNKNOWN, SCALE_UNKNOWN = 0.01, 0.12  # rad/s, share of the distance: standard deviations before anything is learnt
 TURN_BIAS_MAX, SCALE_BIAS_MAX = 0.05, 0.25  # rad/s; share of the distance
 LEARNT_TURN_MAX, LEARNT_WAY_MAX = math.radians(1.0), 0.05  # rad, m: larger corrections have other reasons
 LEARNT_WAY_MIN = 0.03  # m driven from which a correction indicates the wheels' scale
