@@ -19,10 +19,9 @@ import typer
 from roboglot.access.tunnel.connector import AnnouncedGateway, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.dialling import Dialling, Ended, OnePlace, Place, Places, Unusable
 from roboglot.config import ROBOTS_MAX, is_loopback
-from roboglot.drivers.supervisor import together
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import visible
-from roboglot.hosting.event_loop import run
+from roboglot.hosting.event_loop import run, together
 from roboglot.hosting.logs import set_up_logging
 
 if TYPE_CHECKING:

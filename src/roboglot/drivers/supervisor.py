@@ -22,17 +22,6 @@ SENDING_MAX = 32  # pending commands sent without waiting
 PARTING_SECONDS = 1.0  # real seconds for the last command: time-outs on a stopped virtual clock never expire
 
 
-async def together(*parts: Awaitable[None]) -> None:
-    """Run all until one fails, then cancel the others."""
-    tasks = [asyncio.ensure_future(part) for part in parts]
-    try:
-        await asyncio.gather(*tasks)
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-
 class Supervisor:
     """Runs ``begin`` (connect and probe the robot) and ``serve``, which ends by raising ClientError or OSError."""
 

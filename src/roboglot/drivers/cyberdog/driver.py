@@ -31,7 +31,7 @@ from roboglot.drivers.entry_sync import EntrySync
 from roboglot.drivers.local_entries import LocalPlaces
 from roboglot.drivers.map_change import continues
 from roboglot.drivers.reported import ReportedBattery, ReportedDockContact, ReportedLidar, ReportedOdometry
-from roboglot.drivers.supervisor import together
+from roboglot.hosting.event_loop import together
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping

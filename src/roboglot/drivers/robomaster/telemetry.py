@@ -20,7 +20,7 @@ from roboglot.drivers.robomaster.vocabulary import (
     twist_of,
     wheels_of,
 )
-from roboglot.drivers.supervisor import together
+from roboglot.hosting.event_loop import together
 from roboglot.model.components.system.link import Link
 from roboglot.model.events import ArmorHit, BatteryChanged
 from roboglot.model.geometry import ORIGIN, Orientation, Pose, Vector3, wrap_angle

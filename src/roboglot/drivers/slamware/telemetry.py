@@ -12,8 +12,8 @@ from roboglot.drivers.linked_base import LATENCY_SMOOTHING
 from roboglot.drivers.map_change import continues
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import battery_of, grid_of, imu_of, pose_of, scan_of
-from roboglot.drivers.supervisor import together
 from roboglot.extras import in_words, is_there, lazy
+from roboglot.hosting.event_loop import together
 from roboglot.model.clock import Clock
 from roboglot.model.components.system.link import Link
 from roboglot.model.events import BatteryChanged, DockContactChanged, MapReplaced, PoseJumped, ScanTaken
