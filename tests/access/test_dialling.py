@@ -19,11 +19,15 @@ def dial(port: int, folder: Path, said: list[str]) -> Dialling:
 
 async def test_gateways_that_do_not_answer_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connector, "CALL_SECONDS_MAX", 0.05)
-    server = await asyncio.start_server(lambda _reader, _writer: None, "127.0.0.1", 0)
+    writers = list[asyncio.StreamWriter]()
+    server = await asyncio.start_server(lambda _reader, writer: writers.append(writer), "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
     with pytest.raises(Ended, match=f"robot a: 127.0.0.1:{port}: no answer"):
         await dial(port, tmp_path, []).keep(once=True)
     server.close()
+    for writer in writers:
+        writer.close()
+        await writer.wait_closed()
 
 
 async def test_a_failure_that_repeats_is_reported_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
