@@ -117,6 +117,14 @@ async def test_a_head_without_end_is_not_kept(port: int) -> None:
     writer.close()
 
 
+async def test_a_large_head_in_one_piece_is_refused(port: int) -> None:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(REQUEST.replace(b"Host", b"X: " + b"x" * HEAD_MAX + b"\r\nHost"))
+    answered = await asyncio.wait_for(reader.read(), PATIENCE)
+    assert not answered or answered.startswith(b"HTTP/1.1 400 ")  # not, if it came in several pieces after all
+    writer.close()
+
+
 async def test_large_requests_one_behind_other_are_no_head(port: int) -> None:
     body = b" " * (2 * HEAD_MAX)
     request = REQUEST.replace(b"th: 2", b"th: %d" % len(body)).removesuffix(b"{}") + body

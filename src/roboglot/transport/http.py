@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 from typing import cast
 
+from httptools import HttpParserError
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 REQUEST_SECONDS_MAX = 30.0
@@ -47,6 +48,8 @@ class BoundedConnection(HttpToolsProtocol):
 
     def on_headers_complete(self) -> None:
         self._wait_no_more()
+        if len(self.url) + sum(len(name) + len(value) for name, value in self.headers) > HEAD_MAX:  # in one piece
+            raise HttpParserError("the request's head is too large")  # answered with 400
         super().on_headers_complete()
 
     def _wait(self) -> None:
