@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+from typing import Any
+
 import pytest
 
 from tests.browser.served import shows, until
@@ -59,6 +62,27 @@ async def test_blocks_are_found_and_joined_by_keyboard(studio: Open) -> None:
     await take_found(page, "print")
     await until(page, f"{STACKS} === 1 && studio.editor.code.value.split('print(').length === 3")
     assert page.errors == []
+
+
+async def test_late_words_leave_the_keyboard_in_place(studio: Open) -> None:
+    page, may_come = await studio(), asyncio.Event()
+
+    async def late(route: Any) -> None:
+        await may_come.wait()
+        await route.continue_()
+
+    await page.route("**/studio/words/zh.json", late)
+    await page.focus("input[type=search]")
+    await page.keyboard.type("print")
+    await page.keyboard.press("Enter")
+    await until(page, "document.activeElement.closest('.blocklyFlyout')")
+    await page.evaluate("() => { window.first = document.activeElement; }")
+    may_come.set()
+    await until(page, "!first.isConnected")
+    assert await page.evaluate("Boolean(document.activeElement.closest('.blocklyFlyout'))")
+    await page.keyboard.press("Enter")
+    await until(page, MOVING)
+    await put_down(page)
 
 
 ZERO = '[aria-label$="number: 0"]'

@@ -204,7 +204,11 @@ export function search(text) {
   wanted.text = text;
   const box = workspace.getToolbox(), item = box?.getToolboxItemById("found");
   if (!item) return 0;
-  if (text) readyToSearch(() => { if (wanted.text) box.refreshSelection(); });
+  if (text) readyToSearch(() => {
+    const inside = document.activeElement?.closest(".blocklyFlyout");
+    if (wanted.text) box.refreshSelection();
+    if (wanted.text && inside) toToolbox(true);
+  });
   if (text) { item.show?.(); box.setSelectedItem(item); box.refreshSelection(); } else { box.clearSelection(); item.hide?.(); }
   return text ? sought().count : 0;
 }
