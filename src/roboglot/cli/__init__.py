@@ -158,7 +158,7 @@ def _tolerate_plain_terminals() -> None:
 
 
 def _warn_of_misspelt_variables() -> None:
-    """Typer ignores them. Scripts may have variables of their own, which resemble none."""
+    """Print a warning for each variable that resembles a known one: Typer ignores it. Scripts may set others."""
     names = {name.removeprefix(PREFIX) for name in os.environ if name.startswith(PREFIX)}
     for name in sorted(names.difference(VARIABLES)):
         from roboglot.spelling import nearest

@@ -8,9 +8,9 @@ PING_PERIOD = 0.1  # s
 IDLE_PERIOD = 0.05  # s between two checks while no one drives
 QUICK_PERIOD = 0.0125  # s between heartbeats while the client drives: later ones reveal a packet that TCP lost
 QUICK_SECONDS = 0.5  # for which an end keeps this up after the other has stopped
-QUIET_AFTER = 0.3  # s of silence after which the client counts as gone: whatever it drives by hand stops
+QUIET_AFTER = 0.3  # s of silence after which the client counts as gone: all that it drives by hand stops
 QUIET_ALONE_AFTER = 1.0  # s of silence of the tunnel itself that its separate heartbeats excuse: data is late
-QUIET_LOOKS = 3  # in a row: the loop has read its sockets between them, in whatever order
+QUIET_LOOKS = 3  # in a row: the loop has read its sockets between them, in any order
 HELD_UP = 0.1  # s between two checks: this end was held up, and the other may have been too, so it may speak first
 LOST_AFTER = 5.0  # s of silence that the tunnel and its connections survive: lossy lines recover
 

@@ -253,7 +253,7 @@ class Classroom:
 
 
 class Seat:
-    """One page's place: nobody's, a teacher's or a pupil's."""
+    """One page's place: free, a teacher's or a pupil's."""
 
     def __init__(self, room: Classroom, post: Tell, world: str) -> None:
         self._room, self.post, self._world = room, post, world

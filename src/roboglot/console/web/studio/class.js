@@ -74,7 +74,7 @@ effect(() => {
 });
 
 let timer = 0;
-/** Soon, whatever comes until then: blocks that change quickly must not put it off again and again. */
+/** Report the work soon; changes until then do not delay it. */
 function report() { timer ||= window.setTimeout(() => { timer = 0; if (group.value) wish({ do: "doing", doing: doing(), style: JSON.stringify(whole()) }); }, EVERY); }
 effect(() => { void phase.value; void lit.value; void line.value; void failure.value; void program.value; if (group.value) report(); });
 
