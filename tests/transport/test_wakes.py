@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 import threading
+from typing import Any
 
 import grpc
 import pytest
@@ -14,15 +16,30 @@ from roboglot.transport import wakes
 from roboglot.transport.wakes import prompt_wakes
 
 ADDRESS = free_addresses(1)
+PATIENCE = 60.0  # real s
+
+
+def read_one(reads: socket.socket) -> None:
+    """Stand in for gRPC, which reads one byte and takes all events."""
+    assert reads.recv(1)
+
+
+def held(reads: socket.socket) -> int:
+    """Return the number of bytes in the socket."""
+    try:
+        return len(reads.recv(1000, socket.MSG_PEEK))
+    except BlockingIOError:
+        return 0
 
 
 async def test_all_bytes_are_read_in_one_turn() -> None:
-    loop, left, woken = asyncio.get_running_loop(), list[int](), asyncio.Event()
+    loop, turns, woken = asyncio.get_running_loop(), list[int](), asyncio.Event()
     reads, writes = socket.socketpair()
     reads.setblocking(False)
 
     def wake() -> None:
-        left.append(len(reads.recv(1000)))
+        read_one(reads)
+        turns.append(1)
         woken.set()
 
     with reads, writes:
@@ -32,18 +49,19 @@ async def test_all_bytes_are_read_in_one_turn() -> None:
         await woken.wait()
         await asyncio.sleep(0)
         loop.remove_reader(reads)
-    assert left == [1]  # and gRPC reads one byte a turn
+        assert held(reads) == 0
+    assert turns == [1]
 
 
 async def test_server_made_within_wakes_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    loop, takes, read_ahead = asyncio.get_running_loop(), list[socket.socket](), wakes._read_ahead
+    loop, takes, count = asyncio.get_running_loop(), list[socket.socket](), wakes._count
     own = loop.add_reader
 
-    def noted(reads: socket.socket) -> None:
+    def noted(reads: socket.socket) -> int:
         takes.append(reads)
-        read_ahead(reads)
+        return count(reads)
 
-    monkeypatch.setattr(wakes, "_read_ahead", noted)
+    monkeypatch.setattr(wakes, "_count", noted)
     with prompt_wakes():
         server = grpc.aio.server()
     assert loop.add_reader == own
@@ -58,33 +76,90 @@ async def test_server_made_within_wakes_so(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_loops_of_two_threads_take_turns() -> None:
     reads, writes = socket.socketpair()
-    left, others = list[int](), list[int]()
+    turns = list[str]()
 
     def wake() -> None:
-        other = threading.Thread(target=wakes._taker(reads, lambda: others.append(len(reads.recv(1)))))
+        other = threading.Thread(target=wakes._taker(reads, lambda: turns.append("other")))
         other.start()
         other.join()
-        left.append(len(reads.recv(1)))
+        turns.append("own")
+        read_one(reads)
 
     with reads, writes:
         reads.setblocking(False)
         writes.send(bytes(5))
         wakes._taker(reads, wake)()
-        assert (left, others) == ([1], [])
+        assert turns == ["own"]
+        assert held(reads) == 0
         writes.send(bytes(1))
-        wakes._taker(reads, lambda: left.append(len(reads.recv(1))))()
-    assert left == [1, 1]
+        wakes._taker(reads, lambda: read_one(reads))()
+        assert held(reads) == 0
 
 
 def test_bytes_left_are_read_within_a_few_turns() -> None:
     reads, writes = socket.socketpair()
-    left = list[int]()
     with reads, writes:
         reads.setblocking(False)
-        take = wakes._taker(reads, lambda: left.append(len(reads.recv(1))))
+        take = wakes._taker(reads, lambda: read_one(reads))
         for _ in range(3 * wakes.LOOKED_FOR):
             writes.send(bytes(5))
             take()
-        assert len(reads.recv(1000)) < 5 * wakes.LOOKED_FOR
+        assert held(reads) < 5 * wakes.LOOKED_FOR
+        reads.recv(1000)
         take()  # another loop has read all: no error, and no event to take
-    assert left == [1] * 3 * wakes.LOOKED_FOR
+
+
+def test_events_behind_a_closed_loops_are_taken() -> None:
+    """gRPC raises at it, and reads no further."""
+    reads, writes = socket.socketpair()
+    gone, events = asyncio.new_event_loop(), ["gone", "own", "gone", "own"]
+    gone.close()
+    taken = list[str]()
+
+    def wake() -> None:
+        read_one(reads)
+        while events:
+            if (event := events.pop(0)) == "gone":
+                gone.call_soon_threadsafe(taken.append, event)
+            taken.append(event)
+
+    with reads, writes:
+        reads.setblocking(False)
+        writes.send(bytes(len(events)))
+        take = wakes._taker(reads, wake)
+        while held(reads):
+            take()
+        assert taken == ["own", "own"]
+        with pytest.raises(RuntimeError, match="of ours"):
+            wakes._taker(reads, lambda: _fail("of ours"))()
+
+
+def _fail(words: str) -> None:
+    raise RuntimeError(words)
+
+
+def test_calls_of_a_closed_loop_disturb_no_other(caplog: pytest.LogCaptureFixture) -> None:
+    """A call ends when its loop is gone: the next loop takes gRPC's event."""
+    with socket.create_server((ADDRESS, 0)) as silent:
+        where = f"{ADDRESS}:{silent.getsockname()[1]}"
+        gone = asyncio.new_event_loop()
+        left = gone.run_until_complete(_begin_call(where))
+        gone.close()
+
+        async def end() -> grpc.StatusCode:
+            own = await _begin_call(where)
+            silent.close()
+            async with asyncio.timeout(PATIENCE):
+                return await own.code()
+
+        assert asyncio.run(end()) is grpc.StatusCode.UNAVAILABLE
+    assert left
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
+
+
+async def _begin_call(where: str) -> Any:
+    with prompt_wakes():
+        channel = grpc.aio.insecure_channel(where, options=(("grpc.use_local_subchannel_pool", 1),))
+    call = channel.unary_unary("/nothing/there")(b"")
+    await asyncio.sleep(0)  # it begins
+    return call

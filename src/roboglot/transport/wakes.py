@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 INT = 4  # bytes of the kernel's count
+CLOSED = "Event loop is closed"  # asyncio's words, and uvloop's
 LOOKED_FOR = 8  # turns of the loop between two looks for more bytes, each of which costs as much as taking an event
 _reading = threading.Lock()  # the loops of all threads read one socket
 
@@ -41,9 +42,12 @@ def prompt_wakes() -> Iterator[None]:
 def _taker(wakes: socket.socket, wake: Callable[[], object]) -> Callable[[], None]:
     """Return a function that lets gRPC take all events, also those of other loops.
 
-    Now and then it reads all bytes but the one that gRPC reads itself. One thread at a time: two could together read
-    that last byte, too, and neither would take the events. A loop that finds the lock taken is called again while there
-    are bytes.
+    Now and then it reads all bytes whose events gRPC took then, beyond the one that gRPC reads itself. One thread at a
+    time: two could together read all bytes, and one's events would stay. A loop that finds the lock taken is called
+    again while there are bytes.
+
+    gRPC raises at an event of a loop that was closed before its calls had ended, and leaves those behind it: their
+    bytes are left, too, so that it is called again.
     """
     left = 1  # turns until the next look
 
@@ -53,20 +57,24 @@ def _taker(wakes: socket.socket, wake: Callable[[], object]) -> Callable[[], Non
             return
         try:
             left -= 1
+            surplus = 0
             if not left:
                 left = LOOKED_FOR
-                _read_ahead(wakes)
+                surplus = _count(wakes) - 1
             wake()
+            if surplus > 0:
+                wakes.recv(surplus)
         except BlockingIOError:  # another loop read the byte, and took the events
             pass
+        except RuntimeError as error:
+            if str(error) != CLOSED:
+                raise
         finally:
             _reading.release()
 
     return take
 
 
-def _read_ahead(wakes: socket.socket) -> None:
-    """Read all bytes but one."""
-    count = int.from_bytes(fcntl.ioctl(wakes, termios.FIONREAD, bytes(INT)), sys.byteorder)
-    if count > 1:
-        wakes.recv(count - 1)
+def _count(wakes: socket.socket) -> int:
+    """Return the number of bytes to read."""
+    return int.from_bytes(fcntl.ioctl(wakes, termios.FIONREAD, bytes(INT)), sys.byteorder)
