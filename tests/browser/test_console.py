@@ -99,12 +99,16 @@ async def test_escape_stops_and_letting_go_does(served: Served, open_console: Op
     await served.clock.advance(0.5)
     assert speed_of(served) < 0.02
     await page.keyboard.down("w")
-    await until(lambda: bool(served.robot.actions.running()))
+    await until(lambda: is_driven(served.robot))
     await page.keyboard.press("Escape")
-    await until(lambda: not is_driven(served.robot))
-    await page.keyboard.up("w")
+    await page.wait_for_selector(".warned >> text=let go")  # what the held key goes on to ask for is refused
     await served.clock.advance(1.0)
     assert served.robot.actions.running() == []
+    await page.keyboard.up("w")
+    await page.wait_for_selector(".warned", state="detached")
+    await page.keyboard.down("w")
+    await until(lambda: is_driven(served.robot))
+    await page.keyboard.up("w")
 
 
 @pytest.mark.slow  # in short: test_the_robot_stands_when_the_pad_falls_silent
