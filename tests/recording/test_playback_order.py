@@ -55,13 +55,14 @@ async def test_answers_and_pushes_keep_times_and_clients_ids() -> None:
     assert pushed[1:] == [(104.1, b"chassis push position 2 0 0;")]
 
 
-async def test_unrecorded_requests_are_refused_and_noted() -> None:
+async def test_unrecorded_requests_are_refused_and_noted(caplog: pytest.LogCaptureFixture) -> None:
     playback = Playback(pushing_session(), LockstepClock(), 0.0)
     with pytest.raises(NotFound, match="no such request"):
         await ask(playback, b"chassis fly z 3")
     with pytest.raises(NotFound):
         await ask(playback, b"chassis move x 9")
     assert playback.missing == [("robomaster", "chassis fly"), ("robomaster", "chassis move")]
+    assert caplog.messages == [f"robomaster: not in the recording: chassis {rest}" for rest in ("fly z 3", "move x 9")]
 
 
 TIMES = st.lists(st.floats(0.01, 5.0), min_size=1, max_size=12)

@@ -34,7 +34,7 @@ console = Console(highlight=False)
 
 def command(
     what: Annotated[str, typer.Argument(help=" · ".join(NAMES))],
-    words: Annotated[list[str] | None, typer.Argument(help="Arguments of the command; see below.")] = None,
+    words: Annotated[list[str] | None, typer.Argument(help="Arguments of the command; see above.")] = None,
     robot: Annotated[str, typer.Option(envvar="ROBOGLOT_CYBERDOG", help="The dog's address.")] = "127.0.0.1",
     certs: Annotated[Path | None, typer.Option(help="Folder with the client's certificates.")] = None,
     data: Annotated[

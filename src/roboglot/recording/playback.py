@@ -183,7 +183,9 @@ class Playback(StandIn):
     def _note_missing(self, door: str, operation: str, live: Normal) -> None:
         if len(self.missing) < MISSING_MAX:
             self.missing.append((door, operation or live.text[:80]))
-            log.warning("%s: not in the recording: %s %s", door, operation, live.text[:200])
+            text = live.text[:200]
+            request = text if operation in text else f"{operation} {text}"
+            log.warning("%s: not in the recording: %s", door, request.strip())
 
     # -- pushes --
 

@@ -128,3 +128,12 @@ async def test_start_of_suspended_task_names_the_way_out(connect: Connect, robot
     (answer,) = await app.ask("run", "t")
     assert answer["state"] == 27
     assert "Recover it to go on, or shut it down first." in answer["describe"]
+
+
+async def test_save_of_waiting_task_names_the_way_out(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    assert (await app.save("t", "print(1)\n", mode="cycle", condition="30 21 * * *"))["state"] == 0
+    await app.ask("run", "t")
+    answer = await app.save("t", "print(2)\n")
+    assert answer["state"] == 27
+    assert answer["describe"].endswith("t is in run_wait. It waits for its time: shut it down first.")

@@ -296,6 +296,10 @@ class ProgramService:
             words = f"The current operation({operation}) is illegal: {id} is in {state}."
             if state is TaskState.SUSPEND:
                 words += " Recover it to go on, or shut it down first."
+            elif state is TaskState.RUN_WAIT:
+                words += " It waits for its time: shut it down first."
+            elif state is TaskState.RUN:
+                words += " It is running: shut it down first."
             raise NotAllowed(words)
         return state
 
