@@ -10,7 +10,16 @@ import pytest
 
 from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.autonomy.slam.odometry.memory import KEY
-from roboglot.autonomy.slam.odometry.noise import FACTOR_MAX, SCALE_BIAS_MAX, Doubt, LearntBias, LearntNoise
+from roboglot.autonomy.slam.odometry.noise import (
+    FACTOR_MAX,
+    SCALE_BIAS_MAX,
+    SCALE_KEPT,
+    SCALE_UNKNOWN,
+    TURN_UNKNOWN,
+    Doubt,
+    LearntBias,
+    LearntNoise,
+)
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
@@ -52,6 +61,7 @@ async def test_learnt_odometry_survives_a_restart(tmp_path: Path) -> None:
     assert new["scale_x"] == 0.0
     assert driven != new
     assert restarted == driven
+    assert driven["scale_x_doubt"] < 0.5 * new["scale_x_doubt"]
 
 
 def test_nonsense_in_the_settings_is_left_out() -> None:
@@ -78,6 +88,22 @@ def test_gyro_drift_and_wrong_wheels_are_learnt_fast() -> None:
     known = bias.turn
     bias.learn(moved, 0.1, Pose(yaw=0.002), (1.0, 1.0), doubt)
     assert abs(bias.turn - known) < 0.002
+
+
+def test_restored_doubt_allows_for_other_wheels() -> None:
+    learnt, restarted, doubtful = LearntBias(), LearntBias(), LearntBias()
+    for _ in range(50):
+        learnt.learn(Pose(0.05), 0.1, Pose(), (1.0, 1.0), Doubt(way=1e-6, yaw=1e-7))
+    restarted.restore(learnt.kept)
+    assert learnt.kept["scale_x_doubt"] == SCALE_KEPT
+    assert restarted.kept == learnt.kept
+    ahead, aside = (restarted.spread(np.zeros((3, 3)), moved, 0.0)[0, 0] for moved in (Pose(0.05), Pose(0.0, 0.05)))
+    assert ahead == pytest.approx((0.05 * SCALE_KEPT) ** 2)
+    assert aside == pytest.approx((0.05 * SCALE_UNKNOWN) ** 2)  # it never moved sideways
+    assert restarted.spread(np.zeros((3, 3)), Pose(), 1.0)[2, 2] == pytest.approx(TURN_UNKNOWN**2)
+    doubtful.restore({"scale_x_doubt": 0.0, "scale_y_doubt": 9.0})
+    assert doubtful.kept["scale_x_doubt"] == SCALE_KEPT
+    assert doubtful.kept["scale_y_doubt"] == pytest.approx(SCALE_UNKNOWN)
 
 
 def test_doubt_is_wide_before_learning() -> None:

@@ -20,8 +20,10 @@ LEARNT_MIN = 0.2  # share of a correction that must come from the scan for it to
 
 BIAS_GAIN = 0.02  # weight of a correction, at least
 TURN_UNKNOWN, SCALE_UNKNOWN = 0.01, 0.12  # rad/s, share of the distance: standard deviations before anything is learnt
+SCALE_KEPT = 0.02  # … of a scale that was learnt before a restart, at least: wheels may have been changed meanwhile
 TURN_BIAS_MAX, SCALE_BIAS_MAX = 0.05, 0.25  # rad/s; share of the distance
 LEARNT_TURN_MAX, LEARNT_WAY_MAX = math.radians(1.0), 0.05  # rad, m: larger corrections have other reasons
+SCALES = ("scale_x", "scale_y")
 LEARNT_WAY_MIN = 0.03  # m driven from which a correction indicates the wheels' scale
 
 Rows = list[list[float]]  # of a covariance
@@ -133,8 +135,9 @@ class LearntBias:
 
     @property
     def kept(self) -> dict[str, float]:
-        """Values to store for the next start."""
-        return {"turn": self.turn, "scale_x": self.scale_x, "scale_y": self.scale_y}
+        """Values to store for the next start; not the doubt of ``turn``: gyros drift anew each time."""
+        doubts = {f"{name}_doubt": max(math.sqrt(self._unknown[name]), SCALE_KEPT) for name in SCALES}
+        return {"turn": self.turn, "scale_x": self.scale_x, "scale_y": self.scale_y} | doubts
 
     @property
     def scale_doubt(self) -> float:
@@ -143,9 +146,12 @@ class LearntBias:
 
     def restore(self, kept: Mapping[str, object]) -> None:
         """Continue from ``kept`` values; others than finite numbers are ignored."""
-        for name in self.kept:
+        for name in ("turn", *SCALES):
             if (value := _number(kept.get(name))) is not None:
                 setattr(self, name, _bounded(value, TURN_BIAS_MAX if name == "turn" else SCALE_BIAS_MAX))
+        for name in SCALES:
+            if (doubt := _number(kept.get(f"{name}_doubt"))) is not None:
+                self._unknown[name] = min(max(doubt, SCALE_KEPT), SCALE_UNKNOWN) ** 2
 
     def spread(self, covariance: NDArray[np.float64], moved: Pose, seconds: float) -> NDArray[np.float64]:
         """Return ``covariance`` (x, y, yaw) widened by the bias not learnt yet, after ``moved`` in ``seconds``."""
