@@ -119,6 +119,7 @@ class SlamwareDoor:
 
     def _fall_silent(self) -> None:
         """Stop listening, and disconnect clients once they have their answers, as the robot switches off."""
+        self._context.maps.place.keep_soon()
         if self._server is not None:
             self._server.close()
             self._server = None
@@ -155,6 +156,7 @@ class SlamwareDoor:
         if Storeys in self._robot:
             self._robot[Storeys].maps = None
         self._close_parts()
+        await self._context.maps.place.close()
         await self._context.totals.close()
         if self._connections is not None:
             await self._cut_off(self._connections)

@@ -16,7 +16,6 @@ from dataclasses import replace
 import msgspec
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import Drawings, MapMemory, Replacement
@@ -33,6 +32,7 @@ from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
 from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, before, home_dock, known_docks, settle_home
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
+from roboglot.protocols.slamware.chapters.slam.last_place import PlaceMemory, is_docked, last_place
 from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 from roboglot.wire.slamware.chapters.slam.stcm import Layer, decode_stcm, encode_stcm
@@ -60,6 +60,7 @@ class MapKeeper:
         self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
         self._loaded = ""  # the digest of that file
         self.current = FloorName()
+        self.place = PlaceMemory(robot, lambda: _frame_on_disk(robot))
 
     @property
     def start_floor(self) -> FloorMap | None:
@@ -71,15 +72,16 @@ class MapKeeper:
         return max(floors, key=lambda f: (bound in {dock.id for dock in f.annotations.docks}, f.name.default))
 
     async def start(self) -> None:
-        """Load the map on disk, if there is one and the robot can map."""
+        """Load the map on disk, if there is one and the robot can map, and begin to store its place on it."""
         if Mapping not in self._robot or FileStore not in self._robot:
             return
         try:
-            await self.reload(newer_drawings=True)
+            await self.reload(restarting=True)
         except NotFound:
-            return
+            pass
         except RobotError as error:
             log.warning("cannot load the saved map of robot %s: %s", self._robot.id, error)
+        self.place.start()
 
     @property
     def ready(self) -> bool:
@@ -130,6 +132,7 @@ class MapKeeper:
                 return Replacement(_with_docks(now, docks), settings, {FILE: data, DRAWN: None})
 
             await self._robot[MapMemory].replace(edit)
+            self.place.known = True
 
     async def _count_saved_floors(self) -> int:
         try:
@@ -144,11 +147,11 @@ class MapKeeper:
         self.floors, self._loaded = tuple(await self._parse(data)), _digest(data)
         self.status = MapLoadStatus.LOADED
 
-    async def reload(self, pose: Pose | None = None, *, newer_drawings: bool = False) -> None:
+    async def reload(self, pose: Pose | None = None, *, restarting: bool = False) -> None:
         """Load the map from disk, after replacing it by the cloud's, if there is one. Raises NotFound without a map.
 
-        Without ``pose`` the robot is taken to stand on its dock or in front of it. ``newer_drawings``: keep drawings
-        made on that same map since it was saved.
+        Without ``pose`` the robot is taken to stand on its dock or in front of it. ``restarting``: keep drawings made
+        on that same map since it was saved, and continue at the last place on it.
         """
         async with self._turn:
             before, self.status = self.status, MapLoadStatus.LOADING
@@ -157,7 +160,9 @@ class MapKeeper:
                 data = await self._robot[FileStore].read(FILE)
                 floors, digest = await self._parse(data), _digest(data)
                 floor = self._start_of(floors)
-                keep = newer_drawings and digest in self._basis
+                if restarting:
+                    floor, pose = _resumed(self._robot, floors, digest) or (floor, None)
+                keep = restarting and digest in _basis(self._robot)
                 draw = self._turn_over(floor, digest) if keep else self._put_drawings(floor, {digest: NOT_MOVED})
                 await self._use(floor, pose, draw)
             except NotFound:
@@ -211,16 +216,12 @@ class MapKeeper:
         finally:
             draw.close()
             self._loading = False
+        self.place.known = True
         if Docking in self._robot:
             settle_home(self._robot)
         self._layers, self.current = floor.layers, floor.name
         if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
-            docked = DockContact in self._robot and self._robot[DockContact].docked
-            self._robot[Localization].set_pose(dock.pose if docked else before(dock))
-
-    @property
-    def _basis(self) -> dict[str, Sequence[float]]:
-        return dict(self._robot[Settings].get(BASIS, {}))
+            self._robot[Localization].set_pose(dock.pose if is_docked(self._robot) else before(dock))
 
     async def on_map_cleared(self, origin: Pose) -> None:
         """Handle the clearing of memory's grid: its origin is now at ``origin``, from which docks are given.
@@ -229,7 +230,7 @@ class MapKeeper:
         has now.
         """
         async with self._turn:
-            others, basis = await self._others(), self._basis
+            others, basis = await self._others(), _basis(self._robot)
 
             def edit(now: Drawings) -> Replacement:
                 for shift in basis.values():
@@ -243,18 +244,18 @@ class MapKeeper:
     async def move_origin(self, origin: Point) -> None:
         """Move the drawings in memory to the new origin; the grid's origin has been moved already."""
         async with self._turn:
-            basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in self._basis.items()}
+            basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in _basis(self._robot).items()}
             await self._robot[MapMemory].replace(
                 lambda now: Replacement(seen_from(origin, now), settings={BASIS: basis})
             )
-            self._layers = ()
+            self._layers, self.place.known = (), True
 
     async def _turn_over(self, floor: FloorMap, digest: str) -> None:
         """Switch from the floor in memory to ``floor`` of the map with ``digest``, each with its drawings."""
-        if digest not in self._basis:  # memory holds another map
+        if digest not in _basis(self._robot):  # memory holds another map
             await self._put_drawings(floor, {digest: NOT_MOVED})
             return
-        others, shift = await self._others(), self._basis[digest]
+        others, shift = await self._others(), _basis(self._robot)[digest]
 
         def turn(now: Drawings) -> Replacement:
             self._put_aside(now, shift, others)
@@ -277,6 +278,31 @@ class MapKeeper:
     async def _put_drawings(self, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
         """Replace memory's drawings by those of the file: all or nothing."""
         await self._robot[MapMemory].replace(lambda _: _replacement(floor, basis, {}))
+
+
+def _basis(robot: Robot) -> dict[str, Sequence[float]]:
+    return dict(robot[Settings].get(BASIS, {}))
+
+
+def _frame_on_disk(robot: Robot) -> tuple[str, str, Sequence[float]] | None:
+    """Return the digest, the floor and the origin's shift of the map in memory; None if it is not the one on disk."""
+    floor, basis = robot[Settings].get(FLOOR, NO_FLOOR), _basis(robot)
+    if floor == NO_FLOOR or not basis:
+        return None
+    digest = next(iter(basis))
+    return digest, floor, basis[digest]
+
+
+def _resumed(robot: Robot, floors: Sequence[FloorMap], digest: str) -> tuple[FloorMap, Pose | None] | None:
+    """Return the last floor and pose, or None for the pose of its dock; None if they are unknown.
+
+    A robot that has come onto its dock while it was off, or has left it, was moved.
+    """
+    last = last_place(robot)
+    floor = next((floor for floor in floors if last and (digest, floor.name.map_id) == (last.digest, last.floor)), None)
+    if last is None or floor is None or last.docked < is_docked(robot):
+        return None
+    return floor, last.pose if last.docked == is_docked(robot) else None
 
 
 def _replacement(floor: FloorMap, basis: dict[str, Sequence[float]], drawn: dict[str, Drawings]) -> Replacement:
