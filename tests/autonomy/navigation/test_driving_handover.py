@@ -101,3 +101,20 @@ async def test_a_velocity_after_renewed_moves_is_kept(robot: Robot, forward: For
     await forward(seconds=1)
     assert robot[Base].velocity.x == pytest.approx(0.2, abs=0.03)
     assert isinstance(robot[Driving], OdometryDriving)
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_a_velocity_while_it_brakes_at_a_wall_ends_in_time(robot: Robot, world: World, forward: Forward) -> None:
+    world.hands.place("a", Pose(8.2, 6.0))
+    await forward(seconds=1)
+    drive, ahead = robot[Driving].drive, Twist(x=0.5, yaw=-0.2)
+    first = drive(ahead, source="one")
+    while robot[Base].hindrance(ahead) is None:
+        await forward(seconds=0.02)
+    await forward(seconds=0.04)
+    assert first.status is ActionStatus.EXECUTING  # the emergency brake has stopped it, and it turns for a moment
+    second = drive(Twist(yaw=0.8), lifetime=0.3, source="one")
+    await forward(seconds=2)
+    assert first.status.ended
+    assert second.status is ActionStatus.SUCCEEDED
+    assert robot[Base].velocity == Twist()

@@ -182,13 +182,15 @@ class OdometryDriving(Driving):
                 raise hindrance
             return min(PERIOD, left)
 
-        while (left := command.until - clock.time()) > 1e-9:
-            if action.paused:
-                await self._hold_at_most(action, left)
-            else:
-                await clock.keep_calling(step)
-        if self._command is command:
-            self._action = None  # the robot brakes from now on: later commands start afresh
+        try:
+            while (left := command.until - clock.time()) > 1e-9:
+                if action.paused:
+                    await self._hold_at_most(action, left)
+                else:
+                    await clock.keep_calling(step)
+        finally:
+            if self._command is command:
+                self._action = None  # the robot brakes from now on: later commands start afresh
 
     async def _hold_at_most(self, action: Action, seconds: float) -> None:
         """Pause for at most ``seconds``, the rest of the command's lifetime."""
