@@ -225,6 +225,19 @@ async def test_only_standing_leads_out_of_emergency_stop(client, robot, world, f
     assert robot[Legs].posture is Posture.STANDING
 
 
+@pytest.mark.parametrize("motion", [{"motion_id": 111}, {"motion_id": 308, "vel_des": [0.5, 0, 0], "duration": 900}])
+async def test_emergency_stop_ends_a_motion_that_waits(client, robot, world, forward, motion) -> None:
+    for _ in range(5):
+        await client.ask(1002, WALK)
+        await forward(seconds=0.1)
+    waiting = asyncio.ensure_future(client.ask(1004, motion))  # for the brakes after the servo's frames
+    await until(lambda: robot.actions.running(BASE)[0].status.name == "CANCELING")
+    assert (await client.ask(1004, {"motion_id": 0}))["code"] == 0
+    await forward(seconds=5)
+    assert (await waiting)["code"] == 3040
+    assert robot[Legs].posture is Posture.LIMP
+
+
 async def test_motion_longer_than_20_s_is_a_timeout(client, robot, world, forward) -> None:
     long = asyncio.ensure_future(client.ask(1004, {"motion_id": 303, "vel_des": [0, 0, 0.5], "duration": 30_000}))
     await until(lambda: robot.actions.running())

@@ -62,6 +62,7 @@ class Gaits:
         self._rising: Action | None = None  # the action that gets up for a servo frame
         self._performing: Action | None = None
         self._low = 0.0  # m: the belly's height, and the time, when it began to get up
+        self._stops = 0  # emergency stops so far
         self._sequences: set[asyncio.Task[MotionCode]] = set()
 
     @property
@@ -192,11 +193,16 @@ class Gaits:
             sequence.cancel()
 
     async def _go_through(self, motion: int, request: MotionRequest) -> MotionCode:
-        if motion != Motion.EMERGENCY_STOP:
+        stops, limp = self._stops, self.posture is Posture.LIMP
+        if motion == Motion.EMERGENCY_STOP:
+            self._stops = stops = stops + 1
+        else:
             await self._leave_servo()
         before = [(number, NOTHING_SPECIAL) for number in self._leading_to(motion)]
         code = MotionCode.DONE
         for number, wanted in [*before, (motion, request)]:
+            if self._stops != stops or (self.posture is Posture.LIMP and not limp):
+                return MotionCode.EMERGENCY_STOPPED  # in the meantime: it must not get up again
             try:
                 action = self._begin(number, wanted)
             except RobotError as error:
