@@ -64,6 +64,23 @@ async def test_going_home_without_docking_ends_at_landing_point(
     assert (await client.get(f"{ACTIONS}/:current")).status_code == 404
 
 
+async def test_current_action_is_the_new_one_while_the_last_brakes(
+    client: httpx.AsyncClient, world: World, forward: Forward
+) -> None:
+    world.hands.place("a", Pose(5.0, 5.0))
+    await client.put("/api/core/slam/v1/localization/pose", json={"x": 5.0 - 0.375, "y": 0})
+    await forward(seconds=1)
+    home = await start(client, "GoHomeAction")
+    await forward(seconds=2)
+    away = await start(client, "MoveToAction", target={"x": 6.0, "y": 1.0})
+    assert (await state(client, home))["status"] == 1
+    assert (await client.get(f"{ACTIONS}/:current")).json()["action_id"] == away
+    await client.delete(f"{ACTIONS}/:current")
+    await forward(seconds=2)
+    assert (await client.get(f"{ACTIONS}/:current")).status_code == 404
+    assert [(await state(client, id))["result"] for id in (home, away)] == [-2, -2]
+
+
 async def test_docked_robot_stays_if_it_need_not_dock(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:

@@ -6,11 +6,12 @@ what the robot is doing.
 
 from __future__ import annotations
 
-from roboglot.model.actions import HISTORY_MAX, Action
+from roboglot.model.actions import HISTORY_MAX, Action, ActionStatus
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.system.lease import ERRAND
 from roboglot.model.errors import NotFound
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.motion.errands import PART
 from roboglot.protocols.slamware.vocabulary import action_word, stage_of, state_of
 from roboglot.wire.slamware.chapters.motion import ActionGravestone, ActionInfo
 
@@ -43,9 +44,12 @@ class ActionBook:
 
     @property
     def current(self) -> Action | None:
-        """Return the errand under way, or else the latest action that holds the base."""
-        running = self._robot.actions.running(ERRAND) or self._robot.actions.running(BASE)
-        return running[-1] if running else None
+        """Return the errand under way, or else the latest action that holds the base; last, an errand that ends."""
+        errands = self._robot.actions.running(ERRAND)
+        going = [errand for errand in errands if errand.status is not ActionStatus.CANCELING]
+        driving = [action for action in self._robot.actions.running(BASE) if action.source != PART]
+        found = going or driving or errands
+        return found[-1] if found else None
 
     def current_info(self) -> ActionInfo:
         """Return the current action. Raises NotFound."""
