@@ -64,7 +64,7 @@ async def test_going_home_without_docking_ends_at_landing_point(
     assert (await client.get(f"{ACTIONS}/:current")).status_code == 404
 
 
-async def test_current_action_is_the_new_one_while_the_last_brakes(
+async def test_current_action_is_new_while_old_one_brakes(
     client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     world.hands.place("a", Pose(5.0, 5.0))
