@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import pytest
 
-from roboglot.validation import PYTHON, read_answer, why_invalid
+from roboglot.validation import CHOICES_MAX, PYTHON, read_answer, why_invalid
 
 
 class Side(StrEnum):
@@ -92,6 +92,54 @@ def test_sentence_that_names_its_field_has_no_prefix(kind: type, sent: object, w
     with pytest.raises(msgspec.ValidationError) as raised:
         msgspec.convert(sent, kind)
     assert why_invalid(raised.value) == words
+
+
+class Speed(StrEnum):
+    SLOW = "slow"
+    FAST = "fast"
+
+
+class Walk(msgspec.Struct, tag="walk", tag_field="do", forbid_unknown_fields=True, rename="camel"):
+    top_speed: Speed = Speed.SLOW
+    later: tuple[int, Speed] = (0, Speed.SLOW)
+    gear: Literal[1, 2] = 1
+
+
+class Sit(msgspec.Struct, tag="sit", tag_field="do", forbid_unknown_fields=True):
+    sides: dict[Side, int] = {}
+
+
+class Plan(msgspec.Struct, forbid_unknown_fields=True):
+    steps: list[Walk | Sit] = []
+    named: dict[str, Speed | None] = {}
+
+
+@pytest.mark.parametrize(
+    ("sent", "words"),
+    [
+        ({"steps": [{"do": "walk", "topSpeed": "x"}]}, "steps[0].topSpeed cannot be 'x'; use one of slow, fast"),
+        ({"steps": [{"do": "walk", "later": [0, "x"]}]}, "steps[0].later[1] cannot be 'x'; use one of slow, fast"),
+        ({"steps": [{"do": "walk", "gear": 3}]}, "steps[0].gear cannot be 3; use one of 1, 2"),
+        ({"steps": [{"do": "fly"}]}, "steps[0].do cannot be 'fly'; use one of walk, sit"),
+        ({"steps": [{"do": "sit", "sides": {"x": 1}}]}, "a key of steps[0].sides cannot be 'x'; use left"),
+        ({"named": {"a": "x"}}, "named[...] cannot be 'x'; use one of slow, fast"),
+        ({"steps": [{"do": "sit", "zzz": 1}]}, "steps[0].zzz is unknown; there are topSpeed, later, gear, sides"),
+        ({"steps": [{"do": "walk", "topSped": 1}]}, "steps[0].topSped is unknown; did you mean 'topSpeed'?"),
+        ({"zzz": 1}, "zzz is unknown; there are steps, named"),
+        ({"named": 1}, "named must be an object, not a whole number"),
+    ],
+)
+def test_allowed_words_are_named(sent: object, words: str) -> None:
+    with pytest.raises(msgspec.ValidationError) as raised:
+        msgspec.convert(sent, Plan)
+    assert why_invalid(raised.value, wanted=Plan) == words
+
+
+def test_long_lists_of_words_are_left_out() -> None:
+    number = StrEnum("number", [f"n{i}" for i in range(CHOICES_MAX + 1)])  # type: ignore[misc]
+    with pytest.raises(msgspec.ValidationError) as raised:
+        msgspec.convert("x", number)
+    assert why_invalid(raised.value, wanted=number) == "the value cannot be 'x'"
 
 
 def test_any_other_error_keeps_its_words() -> None:

@@ -292,7 +292,7 @@ def config_of(
     try:
         config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
     except msgspec.ValidationError as error:
-        raise ValueError(f"{origin}: {why_invalid(error)}") from None
+        raise ValueError(f"{origin}: {why_invalid(error, wanted=Config)}") from None
     sections = {name: _section(name, doors[name], section, origin) for name, section in given.items()}
     return dataclasses.replace(config, robots=with_addresses(config.robots), doors=sections)
 
@@ -309,7 +309,7 @@ def _section(name: str, kind: type, values: object, origin: str) -> object:
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
-        raise ValueError(f"{origin}: {why_invalid(error, field=name)}") from None
+        raise ValueError(f"{origin}: {why_invalid(error, field=name, wanted=kind)}") from None
 
 
 def zone_of(name: str) -> tzinfo:

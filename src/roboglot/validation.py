@@ -7,13 +7,15 @@ and in readers of files. Knows no protocol and no robot.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeVar
 
 import msgspec
+from msgspec import inspect
 
 from roboglot.spelling import meant
 
+CHOICES_MAX = 30  # words or fields named in a sentence
 T = TypeVar("T")
 
 KINDS = {
@@ -58,11 +60,94 @@ def why_invalid(
     """Return in plain words why a value is invalid; the text of another error unchanged.
 
     ``field``: the field with the value, if it is not the whole; ``whole``: its name if no field is wrong.
-    ``kinds``: the words for types. ``wanted``: the type that the value should have, for a guess at an unknown field.
+    ``kinds``: the words for types. ``wanted``: the type that the value should have; with it, the sentence names the
+    words and fields that are allowed, or guesses the one that was meant.
     """
     message = _plain(error, whole, field, kinds)
-    unknown = re.search(r"unknown field `([^`]+)`", str(error)) if wanted else None
-    return message + meant(unknown[1], _fields_of(wanted)) if unknown else message
+    if wanted is None or not isinstance(error, msgspec.ValidationError):
+        return message
+    return message + _remedy(str(error), wanted)
+
+
+def _remedy(error: str, wanted: object) -> str:
+    """Return what would be valid instead, as the end of a sentence; empty if that is not a matter of words."""
+    found = _PLACE.fullmatch(error)
+    _, key, path = found.groups() if found else ("", None, None)
+    if unknown := re.search(r"unknown field `([^`]+)`", error):
+        if near := meant(unknown[1], _fields_of(wanted)):
+            return near
+        fields = {name: None for kind in _at(wanted, path) for name in _names(kind)}
+        return f"; there are {', '.join(fields)}" if 0 < len(fields) <= CHOICES_MAX else ""
+    if not re.match(r"Invalid (enum )?value ", error):
+        return ""
+    kinds = _at(wanted, path)
+    words = {str(word): None for kind in (map(_key, kinds) if key else kinds) for word in _words(kind)}
+    if not 0 < len(words) <= CHOICES_MAX:
+        return ""
+    return f"; use {'one of ' if len(words) > 1 else ''}{', '.join(words)}"
+
+
+def _at(wanted: object, path: str | None) -> list[inspect.Type]:
+    """Return the types that a value may have at a path of msgspec's (``a.b[0].c``) inside of a value of a type."""
+    reached = list(_choices(inspect.type_info(wanted)))
+    for name, entry in re.findall(r"([^.\[\]]+)|(\[[^\]]*\])", path or ""):
+        inside = [_entry(kind, entry) if entry else _field(kind, name) for kind in reached]
+        reached = [kind for found in inside for each in found for kind in _choices(each)]
+    return reached
+
+
+def _choices(kind: inspect.Type) -> Iterator[inspect.Type]:
+    """Yield the types of a union, or the only one."""
+    match kind:
+        case inspect.UnionType(types=types):
+            for each in types:
+                yield from _choices(each)
+        case inspect.Metadata(type=within):
+            yield from _choices(within)
+        case _:
+            yield kind
+
+
+def _field(kind: inspect.Type, name: str) -> Iterator[inspect.Type]:
+    """Yield the type of a field, of a tag too."""
+    match kind:
+        case inspect.StructType(tag_field=tag_field, tag=tag) if tag is not None and tag_field == name:
+            yield inspect.LiteralType((tag,))
+        case (
+            inspect.StructType(fields=fields)
+            | inspect.DataclassType(fields=fields)
+            | inspect.TypedDictType(fields=fields)
+        ):
+            yield from (field.type for field in fields if field.encode_name == name)
+
+
+def _entry(kind: inspect.Type, entry: str) -> Iterator[inspect.Type]:
+    """Yield the type of an entry of a list or an object: ``[3]`` or ``[...]``."""
+    match kind:
+        case inspect.DictType(value_type=value):
+            yield value
+        case inspect.TupleType(item_types=items):
+            yield from [items[int(entry[1:-1])]] if entry[1:-1].isdecimal() else items
+        case inspect.CollectionType(item_type=item):
+            yield item
+
+
+def _key(kind: inspect.Type) -> inspect.Type:
+    return kind.key_type if isinstance(kind, inspect.DictType) else kind
+
+
+def _names(kind: inspect.Type) -> Iterable[str]:
+    return [field.encode_name for field in kind.fields] if isinstance(kind, inspect.StructType) else ()
+
+
+def _words(kind: inspect.Type) -> Iterable[object]:
+    """Return the values that an enumeration or a literal allows."""
+    match kind:
+        case inspect.EnumType(cls=members):
+            return [member.value for member in members]
+        case inspect.LiteralType(values=values):
+            return values
+    return ()
 
 
 def _fields_of(kind: object) -> set[str]:

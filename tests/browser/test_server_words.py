@@ -68,6 +68,14 @@ async def test_every_sentence_is_shown_in_chinese(open_console: OpenConsole) -> 
     twice = "The current operation(run) is illegal: 7 is in 8. Recover it to go on, or shut it down first."
     nested = "not stopped: the robot is off"
     long = "x" * 200_000 + " is not a name"
+    allowed = ["sound cannot be 'x'; use one of claps, tone", "yaw is unknown; there are x, y"]
+    allowed += ["degree is unknown; did you mean 'degrees'?", "there is no verb 'stpo'; did you mean 'stop'?"]
+    assert await page.evaluate(TRANSLATED, allowed) == [
+        "sound 不能是 'x'；请用 claps, tone 之一",
+        "没有 yaw 这一项；有 x, y",
+        "没有 degree 这一项；是不是 'degrees'？",
+        "没有指令 'stpo'；是不是 'stop'？",
+    ]
     assert await page.evaluate(TRANSLATED, [twice, nested, "a line without its Chinese", long]) == [
         "现在不能进行操作（run）：7 处于 8。先恢复它再继续，或先结束它。",
         "没有停下：机器人已关机",

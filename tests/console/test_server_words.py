@@ -25,6 +25,8 @@ WORDS = {
     "the value",
     "configuration: {}",
     REMEDY,
+    "; use {}",
+    "; use one of {}",
     EDGE,
     GAP,
     ROBOT,

@@ -24,6 +24,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.door import Endpoint
+from roboglot.spelling import meant
 from roboglot.values import dataclass
 
 if TYPE_CHECKING:
@@ -148,18 +149,26 @@ class Desk:
     def _rights(robot: Robot) -> list[str]:
         return [right for right in Right if robot.admission.may(right)]
 
-    async def command(self, name: str, verb: str, values: Mapping[str, object], client: str) -> Any:
-        """Call a robot's verb and return its result. Raises NotFound, BadParameters and the robot's errors."""
+    def admitted(self, name: str, verb: str) -> Robot:
+        """Return the robot if the current client may call the verb now. Raises NotFound, Forbidden."""
         robot = self.view(name, verb).robot
         if verb == TAKE:
             self.check(robot, verb, Right.DRIVE)
+        elif (operation := VERBS.get(verb)) is None:
+            raise NotFound(f"there is no verb {verb!r}{meant(verb, {TAKE, *(each.key for each in VERBS)})}")
+        else:
+            self.check(robot, verb, operation.right)
+        return robot
+
+    async def command(self, name: str, verb: str, values: Mapping[str, object], client: str) -> Any:
+        """Call a robot's verb and return its result. Raises NotFound, BadParameters and the robot's errors."""
+        robot = self.admitted(name, verb)
+        if verb == TAKE:
             if values:
                 raise BadParameters(f"{next(iter(values))} is unknown")
             with robot.admission.noting(CLIENT, verb), self._input(robot, verb, values, client):
                 return await robot[Lease].take(client)
-        if (operation := VERBS.get(verb)) is None:
-            raise NotFound(f"there is no verb {verb!r}")
-        self.check(robot, verb, operation.right)
+        operation = VERBS[verb]
         if operation.right is Right.SEE:
             return await operation.call(robot, values)
         with robot.admission.noting(CLIENT, verb), self._input(robot, verb, values, client):
@@ -181,17 +190,26 @@ class Desk:
 
     def world_file(self) -> str:
         """Return the current state of the simulated world as a world file. Raises Forbidden."""
-        for robot in self.robots.values():
-            robot.admission.check(CLIENT, "save the world", Right.SEE)
+        self.check_all("save the world", Right.SEE)
         return self.stage.world_file()
+
+    def world_operation(self, verb: str) -> Operation[str]:
+        """Return a verb of the world that the current client may call now. Raises NotFound, Forbidden."""
+        operation = WORLD_VERBS.get(verb) or CLOCK_VERBS.get(verb)
+        if operation is None:
+            verbs = {each.key for each in (*WORLD_VERBS, *CLOCK_VERBS)}
+            raise NotFound(f"there is no verb {verb!r} for the world{meant(verb, verbs)}")
+        self.check_all(verb, operation.right)
+        return operation
+
+    def check_all(self, verb: str, right: Right | None) -> None:
+        """Raise Forbidden unless the current client has the right on every robot: everyone in a world shares it."""
+        for robot in self.robots.values():
+            robot.admission.check(CLIENT, verb, right)
 
     async def change_world(self, verb: str, values: Mapping[str, object]) -> object:
         """Change the simulated world. Raises NotFound, BadParameters, ValueError in plain words."""
-        operation = WORLD_VERBS.get(verb) or CLOCK_VERBS.get(verb)
-        if operation is None:
-            raise NotFound(f"there is no verb {verb!r} for the world")
-        for robot in self.robots.values():  # everyone in a world shares it
-            robot.admission.check(CLIENT, verb, operation.right)
+        operation = self.world_operation(verb)
         with self.noting(verb):
             return await self._change_world(operation, values)
 

@@ -97,7 +97,7 @@ export function translated(text) {
     const found = gaps(pieces, text);
     if (found) return zh.replace(/\{(\d)\}/g, (_, i) => robotWord(found[i]));
   }
-  const parts = text.split(/(?<=[.!?;]) (?=\w)/);
+  const parts = text.split(/(?<=[.!?;]) (?!(?:did you mean|there are|use) )(?=\w)|(?=; (?:did you mean|there are|use) )/);
   return parts.length > 1 ? parts.map(translated).join("") : text;
 }
 

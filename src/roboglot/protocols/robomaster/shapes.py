@@ -44,7 +44,7 @@ class Shape:
         try:
             checked = msgspec.convert(values, self.struct, strict=False)
         except msgspec.ValidationError as error:
-            raise BadParameters(why_invalid(error)) from None
+            raise BadParameters(why_invalid(error, wanted=self.struct)) from None
         return {name: getattr(checked, name) for name in self.kinds}
 
 

@@ -47,7 +47,7 @@ class Parameters:
             try:
                 values["body"] = msgspec.convert(whole_numbers(msgspec.json.decode(body)), kind)
             except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-                why = why_invalid(error, "the body") if body else "a JSON body is needed"
+                why = why_invalid(error, "the body", wanted=kind) if body else "a JSON body is needed"
                 raise bad_request(operation.key, why) from None
         return values
 

@@ -115,7 +115,7 @@ def _read(path: Path) -> RosMap:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise BadFile(f"{path}: not YAML: {error}") from None
     except msgspec.ValidationError as error:
-        raise BadFile(f"{path}: not a ROS map: {why_invalid(error)}") from None
+        raise BadFile(f"{path}: not a ROS map: {why_invalid(error, wanted=RosMap)}") from None
     if ros_map.origin[2]:
         raise BadFile(f"{path}: origin has a yaw of {ros_map.origin[2]}; only maps with yaw 0 can be imported")
     if ros_map.free_thresh >= ros_map.occupied_thresh:

@@ -88,7 +88,7 @@ def _misfit(name: str, value: object, kind: object) -> str:
         # Some languages write whole numbers in JSON with a decimal point: 303.0 counts as 303.
         msgspec.convert(value, kind, strict=not isinstance(value, float))
     except msgspec.ValidationError as error:
-        return why_invalid(error, field=name)
+        return why_invalid(error, field=name, wanted=kind)
     return ""
 
 

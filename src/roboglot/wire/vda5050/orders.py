@@ -166,7 +166,7 @@ def read(data: bytes, kind: type[M]) -> M:
     try:
         message = msgspec.json.decode(data, type=kind)
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
-        raise Malformed(why_invalid(error, "the message")) from None
+        raise Malformed(why_invalid(error, "the message", wanted=kind)) from None
     if isinstance(message, OrderMessage):
         _check_graph(message)
     _check_ids(message)

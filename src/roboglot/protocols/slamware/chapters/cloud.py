@@ -63,7 +63,7 @@ class CloudFolder:
         try:
             return msgspec.json.decode(data, type=list[VoicePackage]) if data else []
         except msgspec.DecodeError as error:
-            raise InvalidGoal(f"voice.json: {why_invalid(error, 'the list')}") from None
+            raise InvalidGoal(f"voice.json: {why_invalid(error, 'the list', wanted=list[VoicePackage])}") from None
 
     def start(self) -> None:
         """Start polling for tasks."""
@@ -111,8 +111,9 @@ class CloudFolder:
                 await delivery.accept(request)
             _mark(path)
         except (RobotError, msgspec.DecodeError, RecursionError) as error:
-            log.warning("the cloud's task %s is refused: %s", path.name, why_invalid(error))
-            _mark(path, refused=why_invalid(error))
+            why = why_invalid(error, wanted=CloudTask)
+            log.warning("the cloud's task %s is refused: %s", path.name, why)
+            _mark(path, refused=why)
 
 
 def _mark(path: Path, refused: str = "") -> None:

@@ -115,7 +115,7 @@ async def set_labels(
     try:
         labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
     except msgspec.ValidationError as error:
-        raise BadParameters(why_invalid(error, field="locationLabelInfo")) from None
+        raise BadParameters(why_invalid(error, field="locationLabelInfo", wanted=list[WireLabel])) from None
     names = [label.labelName for label in labels]
     try:
         stored = await library.get(mapName or await _numbered(library, map_id))

@@ -138,7 +138,7 @@ async def choose_target(call: Call, *, roi: object) -> dict[str, bool]:
     try:
         region = msgspec.convert(roi, Region)
     except msgspec.ValidationError as error:
-        raise BadParameters(why_invalid(error, field="roi")) from None
+        raise BadParameters(why_invalid(error, field="roi", wanted=Region)) from None
     pursuit = call.context.pursuit
     chosen = pursuit is not None and pursuit.choose(region.x_offset, region.y_offset, region.width, region.height)
     return {"success": chosen}

@@ -82,7 +82,7 @@ async def connect(call: Call, *, selected_device: object = None) -> dict[str, in
     try:
         device = msgspec.convert(selected_device, WireDevice)
     except msgspec.ValidationError as error:
-        raise BadParameters(why_invalid(error, field="selected_device")) from None
+        raise BadParameters(why_invalid(error, field="selected_device", wanted=WireDevice)) from None
     connecting = radio.connect(device.mac, source=SOURCE)
     try:
         status = await robot.clock.wait_for(connecting.done(), CONNECT_MAX)

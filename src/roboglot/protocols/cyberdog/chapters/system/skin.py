@@ -25,7 +25,7 @@ async def set_skin(call: Call, *, mode: Int32, wave_cycle_time: Int32) -> dict[s
     """Set the mode, 0 to 6; the time, in ms, applies to 2 to 5, and selects the shade of standing legs for 6."""
     skin = call.context.robot[ElectronicSkin]
     if mode not in tuple(SkinMode):
-        return call.refused({"success": False}, f"there is no mode {mode}")
+        return call.refused({"success": False}, f"there is no mode {mode}; use one of 0 to {max(SkinMode)}")
     pattern = SkinPattern[SkinMode(mode).name]
     try:
         if mode in OVER_TIME:

@@ -187,7 +187,7 @@ def package_of(modules: object) -> tuple[FirmwarePackage, frozenset[str]]:
     try:
         wanted = msgspec.convert(modules if isinstance(modules, list) else [modules], list[WireModule])
     except msgspec.ValidationError as error:
-        raise BadParameters(why_invalid(error, "the modules")) from None
+        raise BadParameters(why_invalid(error, "the modules", wanted=list[WireModule])) from None
     files = [file for module in wanted for file in module.latest.packages]
     if not files or len(wanted) > MODULES_MAX or any(file.fileSize < 0 for file in files):
         raise InvalidGoal(f"an update needs files with their sizes and has at most {MODULES_MAX} modules")

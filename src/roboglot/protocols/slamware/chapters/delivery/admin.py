@@ -133,9 +133,9 @@ async def set_move_options(context: Context, body: dict[str, object] | None = No
     try:
         how = _effective(msgspec.convert(words, MoveOptions))
     except msgspec.ValidationError as error:
-        raise InvalidGoal(why_invalid(error)) from None
+        raise InvalidGoal(why_invalid(error, wanted=MoveOptions)) from None
     if how.mode not in range(len(TRACKS)):
-        raise InvalidGoal(f"there is no move mode {how.mode}")
+        raise InvalidGoal(f"there is no move mode {how.mode}; use one of 0 to {len(TRACKS) - 1}")
     new = replace(
         policy,
         words=words,

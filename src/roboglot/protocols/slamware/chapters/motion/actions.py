@@ -28,7 +28,8 @@ from roboglot.protocols.slamware.chapters.motion.errands import part_of
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.protocols.slamware.vocabulary import action_word
+from roboglot.protocols.slamware.vocabulary import PREFIXES, action_word
+from roboglot.spelling import meant
 from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 from roboglot.wire.slamware.chapters import motion as wire
@@ -159,19 +160,26 @@ async def search_path(context: Context, body: PathQuery) -> PathPoints:
 def create(context: Context, request: ActionRequest) -> Action:
     """Start an action in place of the current one. Raises HttpError 400 for a refusal."""
     before = context.robot.actions.running(ERRAND)
+    factory = FACTORIES.get(action_word(request.action_name) or "")
     try:
-        factory = FACTORIES.get(action_word(request.action_name) or "")
         if factory is None:
-            raise InvalidGoal(f"this robot does not know {request.action_name}")
+            raise InvalidGoal(f"this robot does not know {request.action_name}{_meant(request.action_name)}")
         options = msgspec.convert(request.options or {}, factory.options)
         action = factory.start(context, options)
     except (RobotError, msgspec.ValidationError) as error:
         raise HttpError(
-            400, BAD_REQUESTS["POST /api/core/motion/v1/actions"], why_invalid(error, field="options")
+            400,
+            BAD_REQUESTS["POST /api/core/motion/v1/actions"],
+            why_invalid(error, field="options", wanted=factory and factory.options),
         ) from None
     for errand in before:
         errand.cancel(f"{action.name} took over")
     return action
+
+
+def _meant(name: str) -> str:
+    """Return the action that a client may mean by an unknown name, as the end of a sentence."""
+    return meant(name, {prefix + word for prefix in PREFIXES for word in FACTORIES})
 
 
 def _navigation(context: Context) -> NavigationFeedback | None:

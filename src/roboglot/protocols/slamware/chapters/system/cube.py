@@ -45,7 +45,9 @@ async def set_cube_config(context: Context, body: bytes) -> None:
     try:
         config = msgspec.json.decode(body, type=CubeConfig)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InvalidGoal(f"this robot cannot read the configuration: {why_invalid(error)}") from None
+        raise InvalidGoal(
+            f"this robot cannot read the configuration: {why_invalid(error, wanted=CubeConfig)}"
+        ) from None
     robot = context.robot
     if config.disabled_sensors:
         known = {sensor.id for sensor in robot[SensorMasks].sensors}

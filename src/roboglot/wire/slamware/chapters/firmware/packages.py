@@ -40,7 +40,7 @@ def read_firmware(file: BinaryIO) -> FirmwareDescription:
     try:
         return msgspec.json.decode(entry_of(file, DESCRIPTION), type=FirmwareDescription)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadPackage(f"{DESCRIPTION}: {why_invalid(error)}") from None
+        raise BadPackage(f"{DESCRIPTION}: {why_invalid(error, wanted=FirmwareDescription)}") from None
 
 
 def entry_of(file: BinaryIO, name: str) -> bytes:
