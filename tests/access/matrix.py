@@ -77,12 +77,14 @@ class TextCaller:
         self._writer.close()
 
 
-async def dog_answers(folder: Path, name: str, codes: list[int]) -> dict[int, list[dict[str, object]]]:
+async def dog_answers(
+    folder: Path, name: str, codes: list[int], params: str = "{}"
+) -> dict[int, list[dict[str, object]]]:
     """Return the answers to the codes for the app with the certificate of ``name``."""
     answers: dict[int, list[dict[str, object]]] = {}
     async with app_of(folder, name) as stub:
         for code in codes:
-            stream = stub.sendMsg(pb.SendRequest(nameCode=code, params="{}"), timeout=60.0)
+            stream = stub.sendMsg(pb.SendRequest(nameCode=code, params=params), timeout=60.0)
             answers[code] = [json.loads(message.data) async for message in stream if message.data.startswith("{")]
     return answers
 

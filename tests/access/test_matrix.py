@@ -14,6 +14,7 @@ import httpx
 import pytest
 from websockets.asyncio.client import connect
 
+from roboglot.console.verbs.clock import CLOCK_VERBS
 from roboglot.console.verbs.robots import VERBS
 from roboglot.console.verbs.world import WORLD_VERBS
 from roboglot.console.wire_log import rows
@@ -71,6 +72,13 @@ TABLES: tuple[tuple[str, OperationTable[Any], Callable[[str], object]], ...] = (
     ("slamware", REST, str),
     ("robomaster", TEXT, str),
     ("cyberdog", DOG, int),
+)
+CONSOLE_POSTS = (
+    {f"robots/a/{operation.key}": operation.right for operation in VERBS}
+    | {f"world/{operation.key}": operation.right for operation in (*WORLD_VERBS, *CLOCK_VERBS)}
+    | {"class": Right.ADMIN, "recording": Right.ADMIN, "robots/a/wire/1/resend": Right.ADMIN}
+    | {"robots/a/rehearse": Right.DRIVE, "robots/a/take_control": Right.DRIVE}
+    | {"robots/a/program": Right.PROGRAM, "robots/a/camera/call": Right.SEE}
 )
 TARGETS = {"debug": "debug"}  # by the frame's fields; all others are free
 
@@ -140,6 +148,13 @@ async def test_cyberdog_does_what_the_right_allows(runtime: Runtime, reached: se
             assert all(answer.get("error_code", 1) for answer in answers[code]), (caller.name, code)
         if Right.SEE in caller.rights:
             assert {10001, 1001} <= reached
+
+
+async def test_cyberdog_checks_the_right_before_the_parameters(runtime: Runtime, data: Path) -> None:
+    (caller,) = (caller for caller in CALLERS if caller.name == "see")
+    codes = [int(operation.key) for operation in DOG if operation.right is not Right.SEE]
+    forbidden = await dog_answers(data / "cyberdog", caller.name, codes)
+    assert await dog_answers(data / "cyberdog", caller.name, codes, params="{no JSON") == forbidden
 
 
 async def test_viewers_do_what_the_right_allows(runtime: Runtime, reached: set[object]) -> None:
@@ -229,11 +244,11 @@ async def test_the_console_does_what_the_right_allows(runtime: Runtime, monkeypa
         transport = httpx.AsyncHTTPTransport(local_address=caller.address)
         url = f"http://127.0.0.1:{runtime.console.port}/api"
         async with httpx.AsyncClient(base_url=url, transport=transport) as client:
-            for table, where in ((VERBS, "robots/a"), (WORLD_VERBS, "world")):
-                for operation in table:
-                    reply = await client.post(f"/{where}/{operation.key}", content=b'{"no": "such value"}')
+            for path, right in CONSOLE_POSTS.items():
+                for body in (b'{"no": "such value"}', b"{no JSON"):  # the right is checked before the body is read
+                    reply = await client.post(f"/{path}", content=body)
                     refused = reply.status_code in REFUSED
-                    assert refused == (operation.right not in caller.rights), (caller.name, operation.key, reply.text)
+                    assert refused == (right not in caller.rights), (caller.name, path, reply.text)
 
 
 async def test_page_learns_nothing_of_others_world(runtime: Runtime) -> None:

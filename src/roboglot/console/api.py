@@ -16,8 +16,7 @@ from roboglot.console.people.classes import Classes, ClassRequest
 from roboglot.console.recordings import RecordingRequest
 from roboglot.console.resend import resend
 from roboglot.console.state import link_of
-from roboglot.console.studio import blocks, lessons
-from roboglot.console.studio.plans import Plan, rehearse
+from roboglot.console.studio import blocks, lessons, plans
 from roboglot.console.thumbnails import thumbnail
 from roboglot.console.verbs.maps import map_archive
 from roboglot.console.wire_log import readable
@@ -65,7 +64,10 @@ class _Call(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Api:
-    """Serves paths below ``/api/``."""
+    """Serves paths below ``/api/``.
+
+    A client's right is checked before its body is read: without it, a body takes no room and teaches nothing.
+    """
 
     def __init__(self, desk: Desk, classes: Classes) -> None:
         self._desk, self._classes = desk, classes
@@ -95,6 +97,7 @@ class Api:
             case "GET", ["class"]:
                 await answer_json(send, self._classes.look())
             case "POST", ["class"]:
+                self._classes.check_teacher()
                 await answer_json(send, await self._classes.do(await read_as(receive, ClassRequest)))
             case "GET" | "POST", ["recording"]:
                 await answer_json(send, await self._serve_recording(method, receive))
@@ -120,8 +123,8 @@ class Api:
             case "POST", ["robots", name, "wire", number, "resend"]:
                 await answer_json(send, {"answers": await self._sent_again(name, number)})
             case "POST", ["robots", name, "camera", "call"]:
-                offer = (await read_as(receive, _Call)).offer
-                answered = await self.calls.answer(self._desk.view(name).robot, offer)
+                robot = self._desk.view(name).robot
+                answered = await self.calls.answer(robot, (await read_as(receive, _Call)).offer)
                 await answer_json(send, {"answer": answered})
             case ("GET", ["robots", name, "program" as what]) | (
                 "POST",
@@ -129,6 +132,7 @@ class Api:
             ):
                 await self._serve_program(method, name, what, receive, send)
             case "POST", ["robots", name, verb]:
+                self._desk.admitted(name, verb)
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.command(name, verb, values, client)})
             case _:
@@ -141,9 +145,8 @@ class Api:
             self._desk.view(name, "look at the recording")
         if method == "GET":
             return recordings.look()
+        self._desk.check_all("record", Right.ADMIN)
         request = await read_as(receive, RecordingRequest)
-        for robot in self._desk.robots.values():
-            robot.admission.check(CLIENT, "record", Right.ADMIN)
         with self._desk.noting(f"record {request.do}"):
             return await recordings.do(request)
 
@@ -154,8 +157,10 @@ class Api:
         if method == "GET":
             raise _nothing_here()
         if what == "rehearse":
-            await answer_json(send, await rehearse(self._desk, name, await read_as(receive, Plan)))
+            plans.admitted(self._desk, name)
+            await answer_json(send, await plans.rehearse(self._desk, name, await read_as(receive, plans.Plan)))
         else:
+            program_runs.programs_of(self._desk, name, Right.PROGRAM)
             source = (await read_as(receive, _Program)).source
             await answer_json(send, await program_runs.start(self._desk, name, source))
 
@@ -188,6 +193,7 @@ class Api:
                 kept = (b"content-disposition", b'attachment; filename="world.toml"')
                 await answer(send, 200, b"application/toml", self._desk.world_file().encode(), [kept])
             case "POST", ["world", verb]:
+                self._desk.world_operation(verb)
                 values = await read_json(receive)
                 await answer_json(send, {"result": await self._desk.change_world(verb, values)})
             case _:

@@ -19,7 +19,7 @@ LINES_MAX = 200  # newest log lines in an answer
 
 async def start(desk: Desk, name: str, source: str) -> dict[str, object]:
     """Save ``source`` and run it now; the former run must have ended. Raises NotFound, Forbidden, ProgramError."""
-    programs = _programs(desk, name, Right.PROGRAM)
+    programs = programs_of(desk, name, Right.PROGRAM)
     if not 0 < len(source) <= SOURCE_MAX:
         raise ValueError(f"a program has 1 to {SOURCE_MAX} characters")
     robot = desk.robots[name]
@@ -48,7 +48,7 @@ async def debug(programs: Programs, text: str) -> str:
 
 async def program(desk: Desk, name: str) -> dict[str, object]:
     """Return the program's state and the end of its log. Raises NotFound, Forbidden."""
-    service = _programs(desk, name, Right.SEE).service
+    service = programs_of(desk, name, Right.SEE).service
     tasks = await service.tasks([TASK])
     log = await service.log(TASK) if tasks else []
     return {
@@ -57,7 +57,8 @@ async def program(desk: Desk, name: str) -> dict[str, object]:
     }
 
 
-def _programs(desk: Desk, name: str, right: Right) -> Programs:
+def programs_of(desk: Desk, name: str, right: Right) -> Programs:
+    """Return the robot's programs if the current client has the right on it. Raises NotFound, Forbidden."""
     robot = desk.view(name, "program").robot
     robot.admission.check(CLIENT, "program", right)
     if name not in desk.studio.programs:

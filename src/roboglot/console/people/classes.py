@@ -191,7 +191,7 @@ class Classes:
 
     def look(self) -> dict[str, object]:
         """Return the class for its teacher; empty if none is open. Raises Forbidden."""
-        self._check_teacher()
+        self.check_teacher()
         lesson = self._lesson
         if lesson is None:
             return {}
@@ -215,7 +215,7 @@ class Classes:
             return await self._do(request)
 
     async def _do(self, request: ClassRequest) -> dict[str, object]:
-        self._check_teacher()
+        self.check_teacher()
         if request.do == "open":
             await self._open(request)
             return self.look()
@@ -274,7 +274,8 @@ class Classes:
         await self._put_out(seat.identity)
         await self._save(lesson)  # last: a slow disk must not leave the pupil a right
 
-    def _check_teacher(self) -> None:
+    def check_teacher(self) -> None:
+        """Raise Forbidden unless the current client may lead a class."""
         if not self._desk.may_teach:
             raise Forbidden("opening and leading a class needs the right admin on all robots")
 

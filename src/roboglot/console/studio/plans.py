@@ -12,6 +12,7 @@ from roboglot.model.admission import Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.errors import Busy, NotFound
 from roboglot.model.geometry import Point, Pose, Twist
+from roboglot.model.robot import Robot
 from roboglot.programs.rehearsing import Step, Tried
 
 STEPS_MAX = 20
@@ -40,10 +41,16 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True):
     steps: Annotated[list[GoTo | Drive], msgspec.Meta(min_length=1, max_length=STEPS_MAX)]
 
 
-async def rehearse(desk: Desk, name: str, plan: Plan) -> dict[str, object]:
-    """Try a plan from where the robot is now; it does not move. Raises NotFound, Forbidden, Busy, ValueError."""
+def admitted(desk: Desk, name: str) -> Robot:
+    """Return the robot if the current client may try plans for it now. Raises NotFound, Forbidden."""
     robot = desk.view(name, "rehearse").robot
     robot.admission.check(CLIENT, "rehearse", Right.DRIVE)
+    return robot
+
+
+async def rehearse(desk: Desk, name: str, plan: Plan) -> dict[str, object]:
+    """Try a plan from where the robot is now; it does not move. Raises NotFound, Forbidden, Busy, ValueError."""
+    robot = admitted(desk, name)
     studio = desk.studio
     if studio.rehearse is None or studio.scene_of is None:
         raise NotFound("there is no simulation here to try it in")

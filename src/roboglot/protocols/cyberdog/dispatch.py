@@ -104,15 +104,15 @@ async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
 
 
 async def _answered(call: Call) -> object | None:
-    values = {} if call.code in unread else read_params(call.text)
-    operation = TABLE.get(call.code)
-    if operation is None:
-        call.why = "no robot of this program does that"
-        return _not_there(call.code)
+    operation, admission = TABLE.get(call.code), call.context.robot.admission
     wrong: list[str] = []
     try:
-        if call.context.robot.admission.enforced:
-            call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right)
+        if operation is not None and admission.enforced:
+            admission.check(DOOR, str(int(call.code)), operation.right)
+        values = {} if call.code in unread else read_params(call.text)
+        if operation is None:
+            call.why = "no robot of this program does that"
+            return _not_there(call.code)
         if values and operation.names:
             taken = fitting(values, operation.parameters)
             if len(taken) < len(values):

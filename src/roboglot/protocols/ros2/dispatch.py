@@ -38,11 +38,11 @@ async def _do(context: Context, key: str, data: bytes | None, read: Read) -> tup
     if data is None:
         return logging.ERROR, f"a message has at most {MESSAGE_MAX} bytes"
     try:
-        message = read(data, TYPES[key])
-    except ValueError as error:
-        return logging.ERROR, f"the message cannot be read: {error}"
-    try:
         context.robot.admission.check(DOOR, key, operation.right or Right.ADMIN)
+        try:
+            message = read(data, TYPES[key])
+        except ValueError as error:
+            return logging.ERROR, f"the message cannot be read: {error}"
         await operation.handler(context, message=message)
     except RobotError as error:
         return level_of(error), str(error)
