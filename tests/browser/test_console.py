@@ -31,6 +31,11 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 # Its timers end, and the answer to this question says that all it sent before has come.
 FREEZE = """for (let i = 0; i < 1e4; i++) clearInterval(i);
     import('/link.js').then((link) => link.ask('a', 'no such verb')).catch(() => undefined)"""
+# The texts on each canvas since it was last cleared.
+WRITTEN = """window.written = [];
+    const kind = CanvasRenderingContext2D.prototype, { clearRect, fillText } = kind;
+    kind.clearRect = function (...all) { window.written.push(this.texts = []); clearRect.apply(this, all); };
+    kind.fillText = function (text, ...all) { this.texts?.push(text); fillText.call(this, text, ...all); };"""
 LABELS = "found => found.map((one) => one.getAttribute('aria-label') ?? one.innerText)"
 
 
@@ -192,6 +197,21 @@ async def test_plots_show_the_robots_speed_and_battery(served: Served, open_cons
             while not re.search(r": [\d.]+ ", await said.get_attribute("aria-label")):
                 await served.clock.advance(0.1)
                 await asyncio.sleep(0.05)
+
+
+async def test_each_label_of_a_new_plots_axis_is_another(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    await page.add_init_script(WRITTEN)
+    await page.reload()
+    await page.click("#tab-plots")
+    await page.locator("[data-plot=speed] canvas").wait_for()
+    for _ in range(3):  # with one value, two, three
+        await page.evaluate("window.written.length = 0")
+        await served.clock.advance(0.3)
+        await until_page(page, "window.written.some((texts) => texts.includes('0 s'))")
+        for texts in await page.evaluate("window.written"):
+            labels = [text for text in texts if text.endswith(" s")]
+            assert len(labels) == len(set(labels)), labels
 
 
 async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_console: OpenConsole) -> None:

@@ -8,6 +8,8 @@ import { age, clock, current, poses, stale, state } from "../link.js";
 const PERIOD = 500; // ms
 const NOTED_MAX = 1200; // a robot
 const HEIGHT = 130; // px
+const SHORTEST = 10; // s that the axis shows at least
+const STEPS = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600]; // s between two labels, which name whole seconds
 
 /** What is noted of a robot; each chart shows one or two of them. @type {Record<string, () => number | null>} */
 const SOURCES = {
@@ -57,8 +59,8 @@ function made(uPlot, place, name, range) {
   const ago = (plot, values) => values.map((v) => `${Math.round(v - (plot.data[0].at(-1) ?? 0))} s`);
   return new uPlot({
     width: place.clientWidth, height: HEIGHT, legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0],
-    scales: { x: { time: false }, y: { range: range ?? ((_, low, high) => [Math.min(low, 0), Math.max(high, 1)]) } },
-    axes: [{ ...axis, values: ago, space: 60, size: 26 }, { ...axis, size: 46 }],
+    scales: { x: { time: false, range: (_, from, to) => to === null ? [0, SHORTEST] : [Math.min(from, to - SHORTEST), to] }, y: { range: range ?? ((_, low, high) => [Math.min(low, 0), Math.max(high, 1)]) } },
+    axes: [{ ...axis, values: ago, incrs: STEPS, space: 60, size: 26 }, { ...axis, size: 46 }],
     series: [{}, { stroke: c.path, width: 2, points: { show: false } }],
   }, columns(name), place);
 }
