@@ -82,6 +82,18 @@ async def test_closing_the_server_ends_the_programs(app: FrontEnd) -> None:
     await app.service.close()
     assert not alive(pid)
     assert await app.state("t") == "shutdown"
+    assert (await app.service.log("t"))[
+        -1
+    ].text == "the server shut down while the task was under way; the task was ended"
+
+
+async def test_closing_the_server_ends_suspended_programs(app: FrontEnd) -> None:
+    await app.start("t", FOREVER)
+    await app.ask("suspend", "t")
+    await app.service.close()
+    assert (await app.service.log("t"))[
+        -1
+    ].text == "the server shut down while the task was suspended; the task was ended"
 
 
 async def test_a_killed_worker_is_reported_not_left_running(app: FrontEnd) -> None:

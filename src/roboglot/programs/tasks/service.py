@@ -28,6 +28,7 @@ from roboglot.programs.tasks.reports import RunFigures, TaskReport, Whereabouts,
 from roboglot.programs.tasks.robot_modes import check_mode
 from roboglot.programs.tasks.runner import Background, Runner, RunTerms
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, next_state, state_after
+from roboglot.programs.tasks.task_run import TaskRun
 from roboglot.programs.tasks.timetable import Timetable
 from roboglot.programs.tasks.turns import Turns
 
@@ -93,7 +94,7 @@ class ProgramService:
         async with self._lock:
             for run in self._runs.values():
                 run.call_off()
-            await asyncio.gather(*(self._runner.end(id, "the server was stopped") for id in tuple(self._runs)))
+            await asyncio.gather(*(self._runner.end(id, _shut_down(run)) for id, run in tuple(self._runs.items())))
         await self._fires.done()
         await self._runner.done()
         self._timetable.clear()
@@ -337,3 +338,9 @@ class ProgramService:
                 note = LogEntry(self.robot.clock.epoch(), "error", f"not started at its time: {refusal}")
                 await self._store.set_state(id, state, [note])
                 self.reports.publish(TaskReport(id, TaskOperation.START, str(refusal), refusal))
+
+
+def _shut_down(run: TaskRun) -> str:
+    """Return the note in the log of a task that an orderly end of the server ends."""
+    doing = "suspended" if run.state is TaskState.SUSPEND else "under way"
+    return f"the server shut down while the task was {doing}; the task was ended"
