@@ -171,6 +171,8 @@ async def test_unrecorded_requests_get_each_protocols_own_error(tmp_path: Path) 
     async def ask_others(address: str) -> Any:
         client = SlamwareClient(address)
         answer = await client._http.get("/api/core/system/v1/robot/health")
+        missing = "the recording has no such request: GET /api/core/system/v1/robot/health"
+        assert answer.text == f"Not Implemented: {missing}"  # named once
         await client.close()
         reader, writer = await asyncio.open_connection(address, 40923)
         writer.write(b"command;")

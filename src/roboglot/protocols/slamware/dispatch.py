@@ -323,9 +323,9 @@ class Application:
                 status = int(reply.status)
                 kind = PLAIN if status >= 400 else _kind_of(reply.payload, scope)
                 return status, [kind] if reply.payload else [], reply.payload
-        except NotFound as unknown:
-            raise HttpError(501, str(unknown), row.key) from None
-        raise HttpError(501, f"the recording ends before {row.name} was answered", row.key)
+        except NotFound as unknown:  # it names the request
+            raise HttpError(501, "Not Implemented", str(unknown)) from None
+        raise HttpError(501, "Not Implemented", f"the recording ends before {row.key} was answered")
 
     def _note_request(self, scope: Scope) -> None:
         scope["began"] = self._tap.request("slamware", scope["operation"], _wire_form(scope))
