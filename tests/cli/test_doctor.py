@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.cli.checks.listeners import holder_of
+from roboglot.cli.checks.listeners import Holder, holder_of
 from roboglot.cli.doctor import examine_ports
 from roboglot.config import Config, RobotConfig
 from roboglot.protocols.slamware.config import SlamwareConfig
@@ -38,6 +38,15 @@ def test_the_holder_of_a_port_is_named(listener: int) -> None:
     assert holder is not None
     assert holder.pid == os.getpid()
     assert f"process {os.getpid()}" in str(holder)
+
+
+def test_long_command_lines_are_cut_between_words() -> None:
+    command = "/opt/robots/bin/python /opt/robots/bin/roboglot up --config /etc/roboglot/robots.toml --speed 2"
+    shown = str(Holder(7, command))
+    assert shown == "/opt/robots/bin/python /opt/robots/bin/roboglot up --config … (process 7)"
+    path = "/" + "x" * 200
+    assert str(Holder(7, path)) == f"{path[:78]} … (process 7)"
+    assert str(Holder(7, command[:80])) == f"{command[:80]} (process 7)"
 
 
 def test_every_tcp_port_is_examined(listener: int) -> None:

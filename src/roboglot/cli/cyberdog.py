@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from roboglot.cli.screen import shortened
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, Heartbeat
 from roboglot.clients.cyberdog.values import Grid
 from roboglot.clients.errors import ClientError
@@ -104,7 +105,7 @@ def _table(heartbeat: Heartbeat, connected: bool) -> Table:
         ("motion", str(heartbeat.motion_id)),
         ("task", f"{heartbeat.task_status}, feedback {heartbeat.task_sub_status}"),
         ("state", str(heartbeat.state)),
-        ("self-check", f"{heartbeat.self_check} {heartbeat.self_check_description[:80]}"),
+        ("self-check", f"{heartbeat.self_check} {shortened(heartbeat.self_check_description, 80)}"),
     ):
         table.add_row(name, value)
     return table

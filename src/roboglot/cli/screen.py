@@ -68,6 +68,15 @@ def as_typed(line: str) -> str:
     return f"{os.path.relpath(path) if path.is_relative_to(Path.cwd()) else path}{space}{arguments}"
 
 
+def shortened(text: str, most: int) -> str:
+    """Return the text in at most so many characters, cut between words where that keeps half of them."""
+    if len(text) <= most:
+        return text
+    kept = text[: most - 1]  # the space before the ellipsis included
+    words = kept[: kept.rfind(" ")].rstrip() if kept.rfind(" ") >= most // 2 else kept[: most - 2]
+    return f"{words} …"
+
+
 def _bold(text: str) -> str:
     return typer.style(text, bold=True)
 

@@ -8,10 +8,12 @@ import socket
 import struct
 from pathlib import Path
 
+from roboglot.cli.screen import shortened
 from roboglot.values import dataclass
 
 LISTENING = "0A"  # of /proc/net/tcp
 ANY = "0.0.0.0"
+COMMAND_MAX = 80  # characters shown of a command line
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,9 @@ class Holder:
         return "roboglot" in self.command
 
     def __str__(self) -> str:
-        return f"{self.command[:80]} (process {self.pid})" if self.pid else "a process of another user"
+        return (
+            f"{shortened(self.command, COMMAND_MAX)} (process {self.pid})" if self.pid else "a process of another user"
+        )
 
 
 def holder_of(address: str, port: int) -> Holder | None:

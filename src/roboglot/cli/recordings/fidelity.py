@@ -18,6 +18,7 @@ import msgspec
 import typer
 
 from roboglot.cli.recordings.read_only import askable
+from roboglot.cli.screen import shortened
 from roboglot.config import load_config
 from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.model.tap import Exchange
@@ -37,6 +38,7 @@ FIRST_ADDRESS = "127.0.211.1"  # others follow
 BODY = {"robomaster": "robomaster_ep", "cyberdog": "cyberdog2", "slamware": "universal", "visual": "universal"}
 SEEDS = 1, 2
 WIDTH = 110
+SHOWN_MAX = 60  # characters of a request or an answer
 
 
 class Asked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -110,7 +112,7 @@ async def _judge(session: Session, served: _Served) -> Verdict:
             for good, what in _facts(asked, await line.request(operation, payload, [b"{}"])):
                 facts += 1
                 if not good:
-                    wrong.append(f"`{asked.request[:60]}`: {what}")
+                    wrong.append(f"`{shortened(asked.request, SHOWN_MAX)}`: {what}")
         await line.close()
     finally:
         passing.cancel()
@@ -140,7 +142,7 @@ def _facts(asked: Asked, answers: Sequence[tuple[bytes, str]]) -> list[tuple[boo
     if asked.status:
         found.append((status == asked.status, f"status {status}"))
     if asked.pattern:
-        found.append((re.fullmatch(asked.pattern, text) is not None, f"`{text[:60]}`"))
+        found.append((re.fullmatch(asked.pattern, text) is not None, f"`{shortened(text, SHOWN_MAX)}`"))
     values: dict[str, object] = dict(leaves(tree(payload)))
     for path, kind in asked.fields.items():
         inner = any(name.startswith((f"{path}.", f"{path}[")) for name in values)
