@@ -53,6 +53,9 @@ function plotting() {
   return library;
 }
 
+/** Where the labels stand: at the newest value, and in whole steps before it. */
+const backwards = (_plot, _axis, from, to, step) => Array.from({ length: Math.floor((to - from) / step) + 1 }, (_, i) => to - i * step).reverse();
+
 /** @param {any} uPlot @param {HTMLElement} place @param {string} name @param {number[] | null} range */
 function made(uPlot, place, name, range) {
   const c = /** @type {any} */ (palette()), axis = { stroke: c.ink, grid: { stroke: c.grid, width: 1 }, ticks: { stroke: c.grid, width: 1 } };
@@ -60,7 +63,7 @@ function made(uPlot, place, name, range) {
   return new uPlot({
     width: place.clientWidth, height: HEIGHT, legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0],
     scales: { x: { time: false, range: (_, from, to) => to === null ? [0, SHORTEST] : [Math.min(from, to - SHORTEST), to] }, y: { range: range ?? ((_, low, high) => [Math.min(low, 0), Math.max(high, 1)]) } },
-    axes: [{ ...axis, values: ago, incrs: STEPS, space: 60, size: 26 }, { ...axis, size: 46 }],
+    axes: [{ ...axis, values: ago, incrs: STEPS, splits: backwards, space: 60, size: 26 }, { ...axis, size: 46 }],
     series: [{}, { stroke: c.path, width: 2, points: { show: false } }],
   }, columns(name), place);
 }
