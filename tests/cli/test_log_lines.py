@@ -15,7 +15,7 @@ import uvloop
 
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
-from roboglot.hosting.logs import LINES_MAX, PERIOD, BoundsLines, NamesRobot
+from roboglot.hosting.logs import LINES_MAX, PERIOD, BoundsLines, HidesQueries, NamesRobot
 from roboglot.hosting.open_files import OpenFiles, ran_out
 from roboglot.model.client_context import concerned, concerning
 from roboglot.model.clock import LockstepClock
@@ -44,6 +44,33 @@ def test_a_line_about_a_robot_names_it() -> None:
         assert line("%d: %s", 1004, "100 %") == "robot b: 1004: 100 %"
         assert line("robot %s said: %s", "b", "hi") == "robot b said: hi"
     assert line("plain") == "plain"
+
+
+@pytest.mark.parametrize(
+    ("logger", "text", "args", "shown"),
+    [
+        (
+            "uvicorn.error",
+            '%s - "WebSocket %s" [accepted]',
+            ("127.0.0.1:4", "/live?token=rg-1&x=a%20b"),
+            '127.0.0.1:4 - "WebSocket /live?…" [accepted]',
+        ),
+        (
+            "httpx",
+            'HTTP Request: %s %s "%s"',
+            ("GET", "http://x/y?key=1", "200 OK"),
+            'HTTP Request: GET http://x/y?… "200 OK"',
+        ),
+        ("websockets.server", "opened %s", ("/?token=1",), "opened /?…"),
+        ("uvicorn.error", "ready?", (), "ready?"),
+        ("roboglot.x", "what is %s", ("/a?b=c",), "what is /a?b=c"),  # our own lines name no queries
+    ],
+)
+def test_lines_of_libraries_hide_query_strings(logger: str, text: str, args: tuple[object, ...], shown: str) -> None:
+    """They may hold a token, the code of a class or a password."""
+    record = logging.LogRecord(logger, logging.INFO, "x.py", 1, text, args, None)
+    assert HidesQueries().filter(record)
+    assert record.getMessage() == shown
 
 
 class Asked(asyncio.Protocol):

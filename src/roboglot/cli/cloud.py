@@ -91,6 +91,7 @@ def _serve(store: CloudStore, address: str, port: int, hosts: list[str], verbose
         ws="none",
         host=address,
         port=port,
+        log_config=None,  # as all log lines: without query strings
         log_level="info" if verbose else "warning",
         lifespan="off",
         limit_concurrency=CONNECTIONS_MAX,

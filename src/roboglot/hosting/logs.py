@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import time
 from collections.abc import Callable
 
@@ -15,6 +16,7 @@ LINES_MAX = 50  # of a kind about one robot in PERIOD
 ALL_LINES_MAX = 250  # of a kind about no single robot: a start logs lines for each of 100 robots
 PERIOD = 10.0  # s
 KINDS_MAX = 1024
+_QUERY = re.compile(r"\?[^\s\"'<>\[\]]+")
 
 
 @dataclass(slots=True)
@@ -59,6 +61,15 @@ def _append(record: logging.LogRecord, text: str) -> None:
     record.msg, record.args = record.getMessage() + text, None
 
 
+class HidesQueries(logging.Filter):
+    """Cuts the query strings out of libraries' lines: they may hold tokens, codes and passwords."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if record.name.partition(".")[0] in NOISY and "?" in (text := record.getMessage()):
+            record.msg, record.args = _QUERY.sub("?…", text), None
+        return True
+
+
 class NamesRobot(logging.Filter):
     """Adds the robot's name to lines about a robot that do not contain it."""
 
@@ -74,6 +85,7 @@ def set_up_logging(verbose: bool) -> None:
     handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)-7s %(message)s  (%(name)s)", "%H:%M:%S"))
     if not verbose:
         handler.addFilter(BoundsLines())
+    handler.addFilter(HidesQueries())
     handler.addFilter(NamesRobot())
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler])
     for name in NOISY:
