@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import httpx
 import pytest
 
-from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.annotations import LineKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
@@ -208,6 +210,35 @@ async def test_the_origin_moves_with_all_that_is_drawn(robot: Robot, client: htt
     home = robot[Docking].home
     assert home is not None
     assert home.x == pytest.approx(-1.0)
+
+
+CURVE = {
+    "id": 0,
+    "start": {"x": 0.0, "y": 0.0},
+    "end": {"x": 3.0, "y": 0.0},
+    "metadata": {"control_point1": "{'x':1,'y':1}", "control_point2": "{'x':2,'y':1}"},
+}
+
+
+async def test_drawings_keep_their_places_when_the_map_is_cleared(
+    robot: Robot, client: httpx.AsyncClient, drawn: None
+) -> None:
+    """The robot's pose becomes the origin, so the numbers of all that is drawn change."""
+    await ok(await client.post(f"{ARTIFACT}/lines/tracks", json=[CURVE]))
+    robot[Localization].set_pose(Pose(2.0, 1.0, math.pi / 2))
+    origin = Pose(2.0, 1.0, math.pi / 2)
+    (wall,), (desk,) = robot[MapAnnotations].current.lines_of(LineKind.WALL), robot[Places].all()
+    await ok(await client.delete(f"{SLAM}/maps"))
+    (moved,) = robot[MapAnnotations].current.lines_of(LineKind.WALL)
+    for before, after in ((wall.start, moved.start), (wall.end, moved.end)):
+        expected = Pose(before.x, before.y).relative_to(origin)
+        assert (after.x, after.y) == pytest.approx((expected.x, expected.y), abs=1e-6)
+    (place,) = robot[Places].all()
+    expected = desk.pose.relative_to(origin)
+    assert (place.pose.x, place.pose.y, place.pose.yaw) == pytest.approx((expected.x, expected.y, expected.yaw))
+    (track,) = (await client.get(f"{ARTIFACT}/lines/tracks")).json()
+    assert track["metadata"]["control_point1"] == "{'x':0.0,'y':1.0}"  # was 1, 1
+    assert (track["start"]["x"], track["start"]["y"]) == pytest.approx((-1.0, 2.0))
 
 
 async def test_moved_origin_is_forgotten_with_map_in_memory(

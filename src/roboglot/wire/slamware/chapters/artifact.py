@@ -118,6 +118,14 @@ class MetadataError(ValueError):
     """A value in the metadata is invalid; the message names it."""
 
 
+def with_control_points(
+    metadata: dict[str, str], first: tuple[float, float], second: tuple[float, float]
+) -> dict[str, str]:
+    """Return a line's metadata with other control points."""
+    texts = (f"{{'x':{round(x, 6) + 0.0!r},'y':{round(y, 6) + 0.0!r}}}" for x, y in (first, second))
+    return metadata | dict(zip(("control_point1", "control_point2"), texts, strict=True))
+
+
 def control_points(metadata: dict[str, str]) -> tuple[Point, Point] | None:
     """Return a curve's control points, None for a straight line. Raises MetadataError.
 

@@ -63,26 +63,25 @@ def wire_area(area: Area) -> wire.RectangleArea:
     return wire.RectangleArea(area.id, AREA_USAGES[area.kind], rectangle, dict(area.metadata))
 
 
-def seen_from(origin: Point, drawn: Drawings) -> Drawings:
+def seen_from(origin: Pose, drawn: Drawings) -> Drawings:
     """Return all drawings in the map's frame after its origin has moved to ``origin``."""
-    by = Pose(origin.x, origin.y)
 
     def point(p: Point) -> Point:
-        return Point(p.x - origin.x, p.y - origin.y)
+        return Pose(p.x, p.y).relative_to(origin).point
 
     def marks(all: Sequence[PointOfInterest]) -> tuple[PointOfInterest, ...]:
-        return tuple(replace(mark, pose=mark.pose.relative_to(by)) for mark in all)
+        return tuple(replace(mark, pose=mark.pose.relative_to(origin)) for mark in all)
+
+    def moved(line: Line) -> Line:
+        line = replace(line, start=point(line.start), end=point(line.end))
+        if line.control is None:
+            return line
+        first, second = map(point, line.control)
+        metadata = wire.with_control_points(dict(line.metadata), (first.x, first.y), (second.x, second.y))
+        return replace(line, control=(first, second), metadata=metadata)
 
     notes = drawn.annotations
-    lines = [
-        replace(
-            line,
-            start=point(line.start),
-            end=point(line.end),
-            control=line.control and (point(line.control[0]), point(line.control[1])),
-        )
-        for line in notes.lines
-    ]
+    lines = map(moved, notes.lines)
     areas = [replace(area, start=point(area.start), end=point(area.end)) for area in notes.areas]
     annotations = replace(
         notes, lines=tuple(lines), areas=tuple(areas), docks=marks(notes.docks), landmarks=marks(notes.landmarks)

@@ -224,10 +224,10 @@ class MapKeeper:
             self._robot[Localization].set_pose(dock.pose if is_docked(self._robot) else before(dock))
 
     async def on_map_cleared(self, origin: Pose) -> None:
-        """Handle the clearing of memory's grid: its origin is now at ``origin``, from which docks are given.
+        """Handle the clearing of memory's grid: its origin is now at ``origin``, from which drawings are given.
 
-        Further drawings belong to no floor of the file: a restart restores the file's grid with the drawings that it
-        has now.
+        The manual clears the map only, and has operations of its own for each kind of drawing. Further drawings
+        belong to no floor of the file: a restart restores the file's grid with the drawings that it has now.
         """
         async with self._turn:
             others, basis = await self._others(), _basis(self._robot)
@@ -235,8 +235,7 @@ class MapKeeper:
             def edit(now: Drawings) -> Replacement:
                 for shift in basis.values():
                     self._put_aside(now, shift, others)
-                docks = (replace(dock, pose=dock.pose.relative_to(origin)) for dock in now.annotations.docks)
-                return Replacement(_with_docks(now, docks), {FLOOR: NO_FLOOR}, {DRAWN: _encoded(others)})
+                return Replacement(seen_from(origin, now), {FLOOR: NO_FLOOR}, {DRAWN: _encoded(others)})
 
             await self._robot[MapMemory].replace(edit)
             self._layers = ()
@@ -246,7 +245,7 @@ class MapKeeper:
         async with self._turn:
             basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in _basis(self._robot).items()}
             await self._robot[MapMemory].replace(
-                lambda now: Replacement(seen_from(origin, now), settings={BASIS: basis})
+                lambda now: Replacement(seen_from(Pose(origin.x, origin.y), now), settings={BASIS: basis})
             )
             self._layers, self.place.known = (), True
 
@@ -266,7 +265,7 @@ class MapKeeper:
     def _put_aside(self, now: Drawings, shift: Sequence[float], others: dict[str, Drawings]) -> None:
         """Add memory's drawings to the ``others``, in the frame of the file's grid before its origin was moved."""
         if (last := self._robot[Settings].get(FLOOR, self.current.map_id)) != NO_FLOOR:
-            others[last] = seen_from(Point(-shift[0], -shift[1]), now)
+            others[last] = seen_from(Pose(-shift[0], -shift[1]), now)
 
     async def _others(self) -> dict[str, Drawings]:
         """Return the drawings, by id, of other floors that the robot has visited since the map was loaded."""

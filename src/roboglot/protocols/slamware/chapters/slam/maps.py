@@ -16,7 +16,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.geometry import ORIGIN, Point
+from roboglot.model.geometry import ORIGIN, Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.motion.home_docks import known_docks
@@ -69,13 +69,13 @@ async def set_composite_map(context: Context, body: bytes) -> None:
 
 @TABLE.on(f"DELETE {API}/maps", right=Right.EDIT, needs=(FileStore, Localization, MapMemory, Mapping, Settings))
 async def clear_map(context: Context) -> None:
-    """Clear the map and start a new one here. Docks keep their places in new coordinates.
+    """Clear the map and start a new one here. Drawings and docks keep their places in new coordinates.
 
     In memory only: a restart loads the map on disk.
     """
     origin = context.robot[Localization].pose
-    if Docking in context.robot and MapAnnotations in context.robot:
-        _check_reach(dock.pose.relative_to(origin).point for dock in known_docks(context.robot))
+    if MapAnnotations in context.robot and Places in context.robot:
+        _check_reach(Pose(p.x, p.y).relative_to(origin).point for p in _drawn(context.robot))
     context.robot[Mapping].clear()
     await context.maps.on_map_cleared(origin)
 
