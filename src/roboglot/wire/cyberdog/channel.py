@@ -23,8 +23,8 @@ KEEPALIVE_PERIOD = 1.0  # s between pings
 KEEPALIVE_DEADLINE = LOST_AFTER
 """s until an unanswered ping, or unacknowledged bytes, end a connection.
 
-The vendor's robots wait 1 s. That ends calls of apps on ordinary Wi-Fi: at 5 % loss and 100 ms each of 12 streams lasted
-some minutes, at 15 % two. Five seconds bear both, and roaming; the app counts as lost no earlier.
+The vendor's robots wait 1 s. That ends calls of apps on ordinary Wi-Fi: over a line of 100 ms, a stream lasts some
+eight minutes at 5 % loss, and two at 15 %. Five seconds bear both; the app counts as lost no earlier.
 """
 
 Options = list[tuple[str, int | str]]
