@@ -232,7 +232,9 @@ class Runtime:
             return CloudLink(address, token, robot.id)
 
         clouds = Clouds(link=cloud, failures=ClientError, outbox=Outbox(self._database, robot.id))
-        site = Site(robot, config.address, self.config.data, programs, clouds, self._tls)
+        access = self.config.access
+        people = Path(access.people) if access.on and access.people else None
+        site = Site(robot, config.address, self.config.data, programs, clouds, self._tls, people=people)
         doors = open_doors(site, self.config, self._types)
         if services and site.frames is not None:
             self._programs[robot.id] = Programs(robot, site.frames, services[-1])

@@ -74,25 +74,21 @@ def _remedy(error: str, wanted: object) -> str:
     found = _PLACE.fullmatch(error)
     _, key, path = found.groups() if found else ("", None, None)
     if unknown := re.search(r"unknown field `([^`]+)`", error):
-        if near := meant(unknown[1], _fields_of(wanted)):
-            return near
-        fields = {name: None for kind in _at(wanted, path) for name in _names(kind)}
-        return f"; there are {', '.join(fields)}" if 0 < len(fields) <= CHOICES_MAX else ""
-    if not re.match(r"Invalid (enum )?value ", error):
+        kinds = [kind for kind in _at(wanted, path) if isinstance(kind, inspect.StructType)]
+        fields = list(dict.fromkeys(field.encode_name for kind in kinds for field in kind.fields))
+        near = meant(unknown[1], _fields_of(wanted))
+        return near or (f"; there are {', '.join(fields)}" if 0 < len(fields) <= CHOICES_MAX else "")
+    if not error.startswith(("Invalid value", "Invalid enum value")):
         return ""
-    kinds = _at(wanted, path)
-    words = {str(word): None for kind in (map(_key, kinds) if key else kinds) for word in _words(kind)}
-    if not 0 < len(words) <= CHOICES_MAX:
-        return ""
-    return f"; use {'one of ' if len(words) > 1 else ''}{', '.join(words)}"
+    words = list(dict.fromkeys(str(word) for kind in _at(wanted, path) for word in _words(kind, of_key=bool(key))))
+    return f"; use {'one of ' if len(words) > 1 else ''}{', '.join(words)}" if 0 < len(words) <= CHOICES_MAX else ""
 
 
 def _at(wanted: object, path: str | None) -> list[inspect.Type]:
     """Return the types that a value may have at a path of msgspec's (``a.b[0].c``) inside of a value of a type."""
     reached = list(_choices(inspect.type_info(wanted)))
-    for name, entry in re.findall(r"([^.\[\]]+)|(\[[^\]]*\])", path or ""):
-        inside = [_entry(kind, entry) if entry else _field(kind, name) for kind in reached]
-        reached = [kind for found in inside for each in found for kind in _choices(each)]
+    for step in re.findall(r"[^.\[\]]+(?![^\[]*\])|\[[^\]]*\]", path or ""):
+        reached = [kind for outer in reached for inner in _inside(outer, step) for kind in _choices(inner)]
     return reached
 
 
@@ -108,41 +104,24 @@ def _choices(kind: inspect.Type) -> Iterator[inspect.Type]:
             yield kind
 
 
-def _field(kind: inspect.Type, name: str) -> Iterator[inspect.Type]:
-    """Yield the type of a field, of a tag too."""
+def _inside(kind: inspect.Type, step: str) -> Iterator[inspect.Type]:
+    """Yield the type of a field, of a tag too, or of an entry: ``[3]`` or ``[...]``."""
     match kind:
-        case inspect.StructType(tag_field=tag_field, tag=tag) if tag is not None and tag_field == name:
+        case inspect.StructType(tag_field=tag_field, tag=tag) if tag is not None and tag_field == step:
             yield inspect.LiteralType((tag,))
-        case (
-            inspect.StructType(fields=fields)
-            | inspect.DataclassType(fields=fields)
-            | inspect.TypedDictType(fields=fields)
-        ):
-            yield from (field.type for field in fields if field.encode_name == name)
-
-
-def _entry(kind: inspect.Type, entry: str) -> Iterator[inspect.Type]:
-    """Yield the type of an entry of a list or an object: ``[3]`` or ``[...]``."""
-    match kind:
+        case inspect.StructType(fields=fields) | inspect.DataclassType(fields=fields):
+            yield from (field.type for field in fields if field.encode_name == step)
         case inspect.DictType(value_type=value):
             yield value
         case inspect.TupleType(item_types=items):
-            yield from [items[int(entry[1:-1])]] if entry[1:-1].isdecimal() else items
+            yield items[int(step[1:-1])]
         case inspect.CollectionType(item_type=item):
             yield item
 
 
-def _key(kind: inspect.Type) -> inspect.Type:
-    return kind.key_type if isinstance(kind, inspect.DictType) else kind
-
-
-def _names(kind: inspect.Type) -> Iterable[str]:
-    return [field.encode_name for field in kind.fields] if isinstance(kind, inspect.StructType) else ()
-
-
-def _words(kind: inspect.Type) -> Iterable[object]:
-    """Return the values that an enumeration or a literal allows."""
-    match kind:
+def _words(kind: inspect.Type, *, of_key: bool) -> Iterable[object]:
+    """Return the values that an enumeration or a literal allows; ``of_key``: those of an object's keys."""
+    match kind.key_type if of_key and isinstance(kind, inspect.DictType) else kind:
         case inspect.EnumType(cls=members):
             return [member.value for member in members]
         case inspect.LiteralType(values=values):

@@ -199,7 +199,7 @@ async def test_plots_show_the_robots_speed_and_battery(served: Served, open_cons
                 await asyncio.sleep(0.05)
 
 
-async def test_each_label_of_a_new_plots_axis_is_another(served: Served, open_console: OpenConsole) -> None:
+async def test_labels_of_new_plots_differ(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.add_init_script(WRITTEN)
     await page.reload()

@@ -64,10 +64,7 @@ class _Call(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Api:
-    """Serves paths below ``/api/``.
-
-    A client's right is checked before its body is read: without it, a body takes no room and teaches nothing.
-    """
+    """Serves paths below ``/api/``; checks a client's right before it reads the body."""
 
     def __init__(self, desk: Desk, classes: Classes) -> None:
         self._desk, self._classes = desk, classes

@@ -105,7 +105,7 @@ class Site:
 
     ``programs`` makes the service for block programs in a time zone; its flag demands that the kernel filters system
     calls. ``tls``: how ports that can encrypt do so. ``frames`` takes programs' frames; a door that has ``provides``
-    sets it for the others.
+    sets it for the others. ``people``: the folder with the list of people, if it is another than ``data``.
     """
 
     robot: Robot
@@ -115,6 +115,7 @@ class Site:
     clouds: Clouds
     tls: Tls | None = None
     frames: FrameRelay | None = None
+    people: Path | None = None
 
 
 class PortKind(Enum):

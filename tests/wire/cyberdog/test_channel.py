@@ -15,7 +15,7 @@ from roboglot.wire.cyberdog.channel import (
 
 
 @pytest.mark.parametrize("options", [server_options(), client_options(APP_NAME)], ids=["server", "client"])
-def test_connections_last_as_long_as_the_app_counts_as_there(options: Options) -> None:
+def test_connections_bear_as_much_as_heartbeats(options: Options) -> None:
     given = dict(options)
     patience = int(given["grpc.keepalive_timeout_ms"]) / 1000
     assert patience >= LOST_AFTER > HEARTBEAT_DEADLINE

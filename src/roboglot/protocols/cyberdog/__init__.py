@@ -12,7 +12,7 @@ from roboglot.wire.contracts import contract
 def _open(config: CyberDogConfig, site: Site) -> Door:
     from roboglot.protocols.cyberdog.server import CyberDogDoor
 
-    return CyberDogDoor(site.robot, site.address, config, site.data, frames=site.frames)
+    return CyberDogDoor(site.robot, site.address, config, site.data, site.frames, site.people)
 
 
 def _chapters() -> Chapters:

@@ -55,19 +55,25 @@ from roboglot.wire.visual.relay import FrameRelay
 
 
 class CyberDogDoor:
-    """One robot as a CyberDog 2. ``data`` holds the certificates of all robots; port 0 takes any free one."""
+    """One robot as a CyberDog 2. ``people``, else ``data``, holds the certificates of all robots; port 0 is any free."""
 
     name = "cyberdog"
 
     def __init__(
-        self, robot: Robot, address: str, config: CyberDogConfig, data: Path, frames: FrameRelay | None = None
+        self,
+        robot: Robot,
+        address: str,
+        config: CyberDogConfig,
+        data: Path,
+        frames: FrameRelay | None = None,
+        people: Path | None = None,
     ) -> None:
         if config.plaintext and not is_loopback(address):
             raise ValueError(f"plaintext gRPC is allowed on loopback addresses only, not on {address}")
         self.port = config.port
         self._address = address
         self._config = config
-        self._data = data
+        self._data, self._certificates = data, (people or data) / FOLDER
         self._robot = robot
         self._relay = frames
         self._server: grpc.aio.Server | None = None
@@ -79,7 +85,7 @@ class CyberDogDoor:
 
     async def start(self) -> None:
         """Bind and listen, and dial the app if its address is configured."""
-        certificates = None if self._config.plaintext else CertificateStore(self._data / FOLDER)
+        certificates = None if self._config.plaintext else CertificateStore(self._certificates)
         self._context = self._assemble(certificates)
         with prompt_wakes():
             self._server = server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
@@ -112,7 +118,7 @@ class CyberDogDoor:
     def endpoints(self) -> Sequence[Endpoint]:
         """The gRPC server."""
         where = f"{self._address}:{self.port}"
-        tls = self._data / FOLDER / "tls"
+        tls = self._certificates / "tls"
         proof = f"-cacert {tls}/ca-cert.pem -cert {tls}/client-cert.pem -key {tls}/client-key.pem"
         security = "-plaintext" if self._config.plaintext else f"{proof} -authority {ROBOT_NAME}"
         proto = f"-import-path {Path(pb.__file__).parent} -proto cyberdog_app.proto"

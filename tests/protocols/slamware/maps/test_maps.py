@@ -220,9 +220,7 @@ CURVE = {
 }
 
 
-async def test_drawings_keep_their_places_when_the_map_is_cleared(
-    robot: Robot, client: httpx.AsyncClient, drawn: None
-) -> None:
+async def test_drawings_stay_where_a_cleared_map_was(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
     """The robot's pose becomes the origin, so the numbers of all that is drawn change."""
     await ok(await client.post(f"{ARTIFACT}/lines/tracks", json=[CURVE]))
     robot[Localization].set_pose(Pose(2.0, 1.0, math.pi / 2))
