@@ -55,7 +55,7 @@ from roboglot.wire.visual.relay import FrameRelay
 
 
 class CyberDogDoor:
-    """One robot as a CyberDog 2. ``people``, else ``data``, holds the certificates of all robots; port 0 is any free."""
+    """One robot as a CyberDog 2. ``people``, else ``data``, holds all robots' certificates; port 0 is any free one."""
 
     name = "cyberdog"
 

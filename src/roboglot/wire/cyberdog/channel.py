@@ -21,7 +21,7 @@ PUSH_DEADLINE = 3.0  # s
 
 KEEPALIVE_PERIOD = 1.0  # s between pings
 KEEPALIVE_DEADLINE = LOST_AFTER
-"""s until an unanswered ping, or unacknowledged bytes, end a connection; after the vendor's 1 s, bad Wi-Fi cut calls."""
+"""s until unanswered pings or bytes end a connection. The vendor's robots wait 1 s; on bad Wi-Fi that cuts calls."""
 
 Options = list[tuple[str, int | str]]
 _LIMITS: Options = [("grpc.max_send_message_length", MESSAGE_MAX), ("grpc.max_receive_message_length", MESSAGE_MAX)]
