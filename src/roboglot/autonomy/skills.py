@@ -137,7 +137,7 @@ class Autonomy:
         if MapAnnotations in robot:
             self._add_annotated(robot, belief)
         if DockContact in robot:
-            self._docking = RearDocking(robot, navigation)
+            self._docking = RearDocking(robot, navigation, belief)
             robot.add(Docking, self._docking)
         if Ledger in robot:
             robot.add(Storeys, Storeys())

@@ -14,6 +14,7 @@ from roboglot.autonomy.docking.known_dock import KnownDock
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.navigation.course import Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
+from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.scan_points import ScanReader
 from roboglot.model.actions import Action
 from roboglot.model.components.energy.battery import Battery, DockContact
@@ -23,7 +24,7 @@ from roboglot.model.components.motion.docking import BEFORE_DOCK, Docking
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, DockNotFound, InvalidGoal, Unreachable
-from roboglot.model.events import ScanTaken
+from roboglot.model.events import DockContactChanged, ScanTaken
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -40,20 +41,29 @@ SIDE_GAIN, TURN_GAIN = 2.0, 3.0  # 1/s
 SIDE_SPEED, TURN_RATE = 0.1, 0.5  # m/s, rad/s
 SIDE_SHIFTS = (0.0, 0.02, -0.02)  # m to the left at which the tries aim in turn: the map may be a little off
 CHARGE_SECONDS = 1.0  # to wait until the battery reports that it charges
+DOCK_MIDDLE, DOCK_REACH = 0.06, 0.22  # m: behind the hull that touches it; around that, of its echoes
 CANDIDATES_MAX = 3  # objects like a dock that are tried, nearest first
 
 
 class RearDocking(Docking):
     """Docking with rear contacts; the dock is known from the first contact or from ``set_home``."""
 
-    def __init__(self, robot: Robot, navigation: GridNavigation) -> None:
-        self._robot = robot
+    def __init__(self, robot: Robot, navigation: GridNavigation, belief: Belief) -> None:
+        self._robot, self._belief = robot, belief
         self._navigation = navigation
         self._known = KnownDock(robot)
+        self._stop = robot.events.listen(DockContactChanged, lambda _: self._attach())
+        self._attach()
 
     def close(self) -> None:
         """Stop listening."""
+        self._stop()
         self._known.close()
+
+    def _attach(self) -> None:
+        """Leave the dock that the robot touches out of its scans."""
+        dock = (-self._robot.description.radius - DOCK_MIDDLE, 0.0, DOCK_REACH)
+        self._belief.attached = (dock,) if self._robot[DockContact].docked else ()
 
     @property
     def home(self) -> Pose | None:

@@ -49,6 +49,7 @@ class Belief:
     revision: int = 0  # of the map
     frame: str = ""  # identifies the loaded map: robots that loaded the same one share coordinates
     others: Sequence[Disc] = ()  # other robots, which are kept off the map
+    attached: Sequence[Disc] = ()  # the dock that the robot touches (base_link), which was perhaps moved with it
     reader: ScanReader = field(init=False)
 
     def __post_init__(self) -> None:

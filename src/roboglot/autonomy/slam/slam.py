@@ -88,7 +88,6 @@ class Slam:
         self._pause = LOST_PERIOD  # s from a search of the whole map to the next
         self._missed, self._fell_at = 0.0, 0.0  # agreement before it fell, and m driven then; 0: it did not fall
         self._elsewhere = Elsewhere()
-        self._compared = belief.map  # the map with which the newest scan was compared
         self._unseen = False  # whether a pose was given, and not yet compared with the whole map
         self._mapped_from = 0.0  # m driven from which scans are added to the map again
         self._search: asyncio.Task[None] | None = None
@@ -152,7 +151,7 @@ class Slam:
         if event.given:
             self._turns.forget()
             self._given_at, self._missed = event.stamp, 0.0
-            self._unseen = self._compared is self._belief.map  # on a map just loaded it may be anywhere
+            self._unseen = True
             self._witness.forget()
             self.whereabouts.note_given(event.stamp)
 
@@ -184,8 +183,9 @@ class Slam:
         stands = way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD
         if stands and not (self._is_unsure or belief.asked):
             return
-        # Objects known to stand there are no evidence on the map.
-        scan = belief.reader.read(event.scan).beside(belief.map_to_odom.compose(odometry), belief.others)
+        # Objects known to stand there are no evidence on the map, nor on a loaded one the dock that the robot touches.
+        scan = belief.reader.read(event.scan).beside(Pose(), belief.attached if belief.frame else ())
+        scan = scan.beside(belief.map_to_odom.compose(odometry), belief.others)
         if len(scan.points) < POINTS_MIN:
             belief.quality *= 1.0 - QUALITY_GAIN
             return
@@ -195,7 +195,7 @@ class Slam:
         self._step = odometry.relative_to(last)
         moved = self._step if 0.0 < seconds < GAP_MAX else None
         self._matched_odometry, self._matched_at = odometry, event.stamp
-        belief.compared_at, belief.asked, self._compared = event.scan.stamp, False, belief.map
+        belief.compared_at, belief.asked = event.scan.stamp, False
         self._way += way
         belief.covariance = self.odometry.spread(belief.covariance, way, turn, moved, seconds)
         searches = False
@@ -317,6 +317,7 @@ class Slam:
         """Search the whole map for the place of ``scan``; a known one is given up only for a much better."""
         belief, grid, agreement = self._belief, self._belief.map, self._agreement
         given, self._unseen = self._unseen and self._belief.lost is None, False
+        anywhere = self._elsewhere.is_new(grid)  # on a map just loaded
         self._looked_at, self._looking, self._pause = stamp, True, min(2.0 * self._pause, FELL_PERIOD_MAX)
 
         def then(found: list[Match]) -> None:
@@ -330,8 +331,9 @@ class Slam:
                 found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
             near = found[0].pose.distance_to(pose) < NEAR
             if belief.lost is None:
-                stood = self._way - self._fell_at <= STOOD
-                if not self._elsewhere.replaces(found[0], odometry, belief, agreement, given=given, stood=stood):
+                stood = anywhere or self._way - self._fell_at <= STOOD
+                meant = given and not anywhere
+                if not self._elsewhere.replaces(found[0], odometry, belief, agreement, given=meant, stood=stood):
                     return
                 if not given or len(found) > 1:
                     self.whereabouts.lose(LostReason.NO_FIT, stamp)

@@ -131,6 +131,10 @@ class Elsewhere:
         """Note that a scan fits this map at the believed place."""
         self._map_to_odom, self._fitted = None, grid
 
+    def is_new(self, grid: object) -> bool:
+        """Return whether no scan has fitted this map yet."""
+        return grid is not self._fitted
+
     def replaces(
         self, found: Match, odometry: Pose, belief: Belief, agreement: float, *, given: bool, stood: bool
     ) -> bool:
@@ -147,4 +151,4 @@ class Elsewhere:
         before, self._map_to_odom = self._map_to_odom, found.pose.compose(odometry.inverse())
         again = before.compose(odometry) if before else believed
         turned = abs(wrap_angle(again.yaw - found.pose.yaw))
-        return near or belief.map is not self._fitted or (again.distance_to(found.pose) < SAME and turned < SAME_YAW)
+        return near or self.is_new(belief.map) or (again.distance_to(found.pose) < SAME and turned < SAME_YAW)
