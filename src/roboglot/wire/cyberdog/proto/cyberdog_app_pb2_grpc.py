@@ -25,28 +25,25 @@ class GrpcAppStub:
             _registered_method=True)
 
 
+def _refuse(context):
+    context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+    context.set_details('Method not implemented!')
+    raise NotImplementedError('Method not implemented!')
+
+
 class GrpcAppServicer:
 
     def sendMsg(self, request, context):
-        """A JSON message by its number; the answers of one request come as a stream.
-        """
-        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
-        context.set_details('Method not implemented!')
-        raise NotImplementedError('Method not implemented!')
+        """A JSON message by its number; the answers of one request come as a stream."""
+        _refuse(context)
 
     def heartbeat(self, request, context):
-        """Robot to app, twice a second.
-        """
-        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
-        context.set_details('Method not implemented!')
-        raise NotImplementedError('Method not implemented!')
+        """Robot to app, twice a second."""
+        _refuse(context)
 
     def getFile(self, request, context):
-        """App to robot: photos and videos.
-        """
-        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
-        context.set_details('Method not implemented!')
-        raise NotImplementedError('Method not implemented!')
+        """App to robot: photos and videos."""
+        _refuse(context)
 
 
 def add_GrpcAppServicer_to_server(servicer, server):

@@ -47,8 +47,8 @@ def is_docked(robot: Robot) -> bool:
 class PlaceMemory:
     """Memory of the place; while it is unknown, the last one stays stored.
 
-    ``frame`` returns the digest of the map on disk, the id of the floor in memory, and the m (x, y) by which its origin
-    has moved since; None if memory holds another map. ``known``: whether it is that of ``frame``, or of another door.
+    ``frame``: the map on disk (digest), the floor in memory, and the m (x, y) by which its origin has moved; None if
+    memory holds another map, as it also does while not ``known``.
     """
 
     def __init__(self, robot: Robot, frame: Callable[[], tuple[str, str, Sequence[float]] | None]) -> None:
