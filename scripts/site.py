@@ -37,6 +37,7 @@ INTERFACES = {
     "roboglot.model.components.mapping.localization": "For finding out where a robot is.",
     "roboglot.protocols.door": "For adding a door.",
 }
+CHINESE = ".zh.md"
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)|(!)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -48,9 +49,11 @@ def place(source: str) -> str | None:
 
 
 def rewritten(text: str, source: str) -> str:
-    """The page's text with links that fit its new place."""
+    """Return the page's text with links that fit its new place."""
     here = place(source)
     assert here is not None
+    chinese = source.endswith(CHINESE)
+    twin = source.removesuffix(CHINESE) + ".md" if chinese else source.removesuffix(".md") + CHINESE
 
     def link(found: re.Match[str]) -> str:
         words, target = (found[1], found[2]) if found[2] else (found[4], found[5])
@@ -60,15 +63,46 @@ def rewritten(text: str, source: str) -> str:
         path, _, anchor = target.partition("#")
         file = os.path.normpath(PurePosixPath(source).parent / path)
         new = place(file) if (ROOT / file).is_file() else None
-        if new is None or new.endswith(".zh.md"):  # the site's own switch leads to the other language
+        if new is None:
             return words
-        if (ROOT / file).with_suffix(".zh.md").exists():
-            anchor = ""  # the Chinese page has Chinese headings
-        relative = os.path.relpath(new, PurePosixPath(here).parent)
+        if file == twin or (not chinese and new.endswith(CHINESE)):  # the site's own switch leads to the other language
+            if not anchor:
+                return words
+            up = "../" * (here.count("/") + 1)  # out of the Chinese pages' folder
+            return f'<a href="{up}{new.removesuffix(".md")}.html#{anchor}">{words}</a>'
+        relative = os.path.relpath(new.replace(CHINESE, ".md"), PurePosixPath(here).parent)
         return f"{mark}[{words}]({relative}{'#' + anchor if anchor else ''})"
 
     parts = re.split(r"(^```.*?^```[ \t]*$)", text, flags=re.MULTILINE | re.DOTALL)
     return "".join(part if part.startswith("```") else LINK.sub(link, part) for part in parts)
+
+
+def headings(text: str) -> list[str]:
+    """Return the headings below the title, with their marks."""
+    prose = re.sub(r"^```.*?^```[ \t]*$", "", text, flags=re.MULTILINE | re.DOTALL)
+    return re.findall(r"^#{2,} .*$", prose, re.MULTILINE)
+
+
+def slug(heading: str) -> str:
+    """Return the anchor of a heading, as GitHub and ``toc`` in mkdocs.yml make it."""
+    return re.sub(r"[^\w\- ]", "", heading.lstrip("# ").lower()).replace(" ", "-")
+
+
+def with_english_anchors(chinese: str, english: str) -> str:
+    """Return a Chinese page to which links with English anchors lead.
+
+    Pages without a Chinese one are built among the Chinese pages, too, and link to their English headings. Where the
+    two pages have not the same headings, such links lead to the page's title.
+    """
+    ours, theirs = headings(chinese), headings(english)
+    anchors = [f'<a id="{slug(heading)}"></a>' for heading in theirs if slug(heading) not in map(slug, ours)]
+    if [len(one.split()[0]) for one in ours] != [len(one.split()[0]) for one in theirs]:
+        title, _, rest = chinese.partition("\n")
+        return f"{title}\n\n{''.join(anchors)}\n{rest}"
+    for our, their in zip(ours, theirs, strict=True):
+        if slug(our) != slug(their):
+            chinese = chinese.replace(f"\n{our}\n", f'\n<a id="{slug(their)}"></a>\n\n{our}\n', 1)
+    return chinese
 
 
 def gather() -> int:
@@ -80,7 +114,10 @@ def gather() -> int:
         new = PAGES / str(place(source))
         new.parent.mkdir(parents=True, exist_ok=True)
         if source.endswith(".md"):
-            new.write_text(rewritten((ROOT / source).read_text("utf-8"), source), "utf-8")
+            text = rewritten((ROOT / source).read_text("utf-8"), source)
+            if source.endswith(CHINESE):
+                text = with_english_anchors(text, (ROOT / (source.removesuffix(CHINESE) + ".md")).read_text("utf-8"))
+            new.write_text(text, "utf-8")
         else:
             shutil.copy(ROOT / source, new)
     for module, reader in INTERFACES.items():

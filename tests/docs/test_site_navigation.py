@@ -1,11 +1,36 @@
-"""The site's navigation; the languages are switched by the site itself."""
+"""The site: its navigation, and the links of both languages; the languages are switched by the site itself."""
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from tests.docs.test_docs import FENCE, LINK
 
 ROOT = Path(__file__).parents[2]
+PLACED = re.compile(r'<a id="([^"]+)"></a>')
+TWIN = re.compile(r'<a href="([^"]+)\.html#([^"]+)">')  # to the page in the other language
+
+
+@pytest.fixture
+def site() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("site_pages", ROOT / "scripts/site.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def pages(site: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(site, "PAGES", tmp_path)
+    site.gather()
+    return tmp_path
 
 
 def test_navigation_names_each_page_once_in_english() -> None:
@@ -14,3 +39,48 @@ def test_navigation_names_each_page_once_in_english() -> None:
     pages = re.findall(r"[\w./]+\.md$", navigation, re.MULTILINE)
     assert len(pages) > 40
     assert [page for page in pages if page.endswith(".zh.md") or pages.count(page) > 1] == []
+
+
+def test_links_lead_somewhere_in_both_languages(site: ModuleType, pages: Path) -> None:
+    """Links from pages without a Chinese one, too: they are built among the Chinese pages."""
+
+    def anchors(page: Path) -> set[str]:
+        text = page.read_text("utf-8")
+        return {site.slug(heading) for heading in site.headings(text)} | set(PLACED.findall(text))
+
+    dead, count = [], 0
+    for page in sorted(pages.rglob("*.md")):
+        for target in LINK.findall(FENCE.sub("", page.read_text("utf-8"))):
+            path, _, anchor = target.partition("#")
+            if re.match(r"[a-z]+:", target) or (path and not path.endswith(".md")):
+                continue
+            count += 1
+            english = page.parent / path if path else page
+            chinese = english.with_suffix(".zh.md")
+            if page.name.endswith(".zh.md"):
+                reached = [chinese if path and chinese.exists() else english]
+            else:
+                reached = [english, chinese] if path and chinese.exists() else [english]
+            dead += [f"{page}: {target}" for to in reached if not to.exists() or (anchor and anchor not in anchors(to))]
+    assert dead == []
+    assert count > 200
+
+
+def test_chinese_pages_stay_linked(pages: Path) -> None:
+    """Links between them were plain words on the site."""
+    assert "](console.md)" in (pages / "start.zh.md").read_text("utf-8")
+    assert "](protocols/slamware.md#四种语言的第一次调用)" in (pages / "start.zh.md").read_text("utf-8")
+    assert "](start.md)" not in (pages / "start.zh.md").read_text("utf-8"), "the site has a switch"
+
+
+def test_links_to_english_sections_leave_the_chinese_pages(site: ModuleType, pages: Path) -> None:
+    found = [
+        (page.relative_to(pages), *link)
+        for page in pages.rglob("*.zh.md")
+        for link in TWIN.findall(page.read_text("utf-8"))
+    ]
+    assert found
+    for page, path, anchor in found:
+        target = pages.parent / "site" / "zh" / page.parent / path
+        english = pages / Path(*target.resolve().relative_to((pages.parent / "site").resolve()).parts)
+        assert anchor in map(site.slug, site.headings(english.with_suffix(".md").read_text("utf-8"))), page
