@@ -197,7 +197,11 @@ async def test_with_access_the_console_asks_who_comes(tmp_path: Path, monkeypatc
 async def test_maps_are_kept_loaded_exported_and_forgotten(shown: Shown) -> None:
     assert (await shown.ask("/api/robots/a/save_map", {"map": "x"}))[0] == 409  # nothing has been seen yet
     await shown.clock.advance(3.0)
-    assert (await shown.ask("/api/robots/a/save_map", {"map": "hall"}))[0] == 200
+    assert (await shown.ask("/api/robots/a/save_map", {"map": " hall "}))[0] == 200
+    for unreadable in (" ", "a\nb", "a\0", "\u202ehall"):
+        assert (await shown.ask("/api/robots/a/save_map", {"map": unreadable}))[0] == 400
+        assert (await shown.ask("/api/robots/a/add_place", {"name": unreadable, "x": 0, "y": 0}))[0] == 400
+        assert (await shown.ask("/api/world/add_person", {"name": unreadable, "x": 0, "y": 0}))[0] == 400
     assert (await shown.ask("/api/robots/a/maps", {}))[1]["result"] == ["hall"]
     packed = zipfile.ZipFile(io.BytesIO(await shown.read("/api/robots/a/map.zip")))
     assert packed.namelist() == ["map.yaml", "map.pgm"]

@@ -13,7 +13,7 @@ from typing import Annotated
 import msgspec
 
 from roboglot.console.drawings import NAMES
-from roboglot.console.verbs.robots import SOURCE, VERBS, Meters, Name, Radians, Spot, Started, started
+from roboglot.console.verbs.robots import SOURCE, VERBS, Meters, Name, Radians, Spot, Started, started, visible
 from roboglot.media.ros_map import encode_ros_map
 from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind, Line, LineKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
@@ -70,7 +70,7 @@ async def clear_map(robot: Robot) -> None:
 async def add_place(robot: Robot, *, name: Name, x: Meters, y: Meters, yaw: Radians = 0.0) -> str:
     """Put a named place on the map; the answer is its id."""
     id = str(uuid.uuid4())
-    await robot[Places].put(PointOfInterest(id, Pose(x, y, yaw), {NAMES[0]: name}))
+    await robot[Places].put(PointOfInterest(id, Pose(x, y, yaw), {NAMES[0]: visible(name)}))
     return id
 
 
@@ -118,7 +118,7 @@ async def save_map(robot: Robot, *, map: Name) -> None:
     grid = robot[Mapping].grid
     if not grid.width:
         raise Refused("the map is empty")
-    await robot[MapLibrary].put(StoredMap(map, grid, robot.clock.epoch(), dock=known_dock(robot)))
+    await robot[MapLibrary].put(StoredMap(visible(map), grid, robot.clock.epoch(), dock=known_dock(robot)))
 
 
 @VERBS.on("load_map", right=Right.EDIT, needs=(MapLibrary, Localization))

@@ -24,6 +24,7 @@ from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease, moves
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Twist
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable, Right
@@ -39,6 +40,14 @@ Moment = Annotated[float, msgspec.Meta(gt=0, le=2)]  # s
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=80)]
 Spot = tuple[Meters, Meters]
 Spots = Annotated[list[Spot], msgspec.Meta(min_length=1, max_length=WAYPOINTS_MAX)]
+
+
+def visible(name: str) -> str:
+    """Return the name of a new thing without blanks around it. Raises InvalidGoal if people could not read it."""
+    if not (name := name.strip()) or not name.isprintable():
+        raise InvalidGoal("a name has letters, and no line breaks or invisible characters")
+    return name
+
 
 VERBS: OperationTable[str] = OperationTable("console", Right.DRIVE, exact=True)
 

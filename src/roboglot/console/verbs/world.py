@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from roboglot.console.verbs.robots import Meters, Name, Radians, Text
+from roboglot.console.verbs.robots import Meters, Name, Radians, Text, visible
 from roboglot.model.geometry import Point, Pose, Vector3
 from roboglot.model.perception import TagKind
 from roboglot.model.sound import claps, tone
@@ -140,7 +140,7 @@ async def add_person(
     stage: Stage, *, x: Meters, y: Meters, yaw: Radians = 0.0, floor: Floor = 0, name: PersonName = ""
 ) -> str:
     """Put one more person there; the answer is their name."""
-    return stage.add_person(Pose(x, y, yaw), floor, name)
+    return stage.add_person(Pose(x, y, yaw), floor, visible(name) if name else "")
 
 
 @WORLD_VERBS.on("remove_person")
