@@ -6,6 +6,7 @@ import asyncio
 import json
 from pathlib import Path
 
+import grpc
 import pytest
 
 from roboglot.access.store import AccessStore, Grant
@@ -110,6 +111,27 @@ async def test_live_pictures_end(runtime: Runtime, store: AccessStore, data: Pat
         store.revoke(loser)
         runtime.guard.reload()
         assert len(door._context.video._peers) == left
+
+
+async def test_open_streams_end_with_the_right(runtime: Runtime, store: AccessStore, data: Path) -> None:
+    """That of a task, too, which would say nothing more by itself."""
+    for name in ("mapper", "another"):
+        store.add_app(name, [Grant("a", MAY_ALL)])
+    guard, clock = runtime.guard, runtime.clock
+    assert guard is not None
+    assert isinstance(clock, LockstepClock)
+    guard.reload()
+    async with app_of(data / "cyberdog", "mapper") as stub:
+        answers = stub.sendMsg(pb.SendRequest(nameCode=Code.START_TASK, params=json.dumps({"type": 5})), timeout=60.0)
+        first = json.loads((await anext(aiter(answers))).data)
+        assert first == {"accepted": 1}
+        store.revoke("another")
+        guard.reload()
+        store.revoke("mapper")
+        guard.reload()
+        rest = [json.loads(answer.data) async for answer in answers]
+        assert rest[-1] == {"error_code": 322}
+        assert await answers.code() is grpc.StatusCode.OK
 
 
 async def test_orders_end_with_their_own_clients_right(runtime: Runtime, store: AccessStore) -> None:

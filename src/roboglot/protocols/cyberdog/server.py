@@ -91,7 +91,9 @@ class CyberDogDoor:
             self._server = server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         self._handshakes = Handshakes(self._address, self._config.port)
         self._cleanup.append(self._handshakes.close)
-        add_calls(server, Service(self._context, self._handshakes), self._robot.clock.holding)
+        service = Service(self._context, self._handshakes)
+        self._cleanup.append(self._robot.admission.on_lost(service.cut_off))
+        add_calls(server, service, self._robot.clock.holding)
         if self._config.reflection:
             from roboglot.protocols.cyberdog.reflection import add_reflection
 

@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 FRAME = 64  # bytes of a message besides its text, with a margin
 CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message, whatever their encoding
+LOST = "\0"  # in place of a client that lost a right
 CALLERS_MAX = 1024  # whose names are kept
 CALLS_MAX = 512  # at the same time, over all connections
 HOST_CALLS_MAX = CALLS_MAX * 3 // 4  # of one host, so that others still reach the robot
@@ -54,6 +55,13 @@ class Service:
         self._context, self._handshakes = context, handshakes
         self._callers: dict[str, _Caller] = {}  # by peer, as gRPC writes it
         self._open: dict[str, int] = {}  # calls under way, by host
+        self._of: dict[asyncio.Task[object], str] = {}  # with access: the client whose request a task serves
+
+    def cut_off(self, who: str) -> None:
+        """End the requests of a client that lost a right."""
+        for task in [task for task, client in self._of.items() if client == who]:
+            self._of[task] = LOST
+            task.cancel()
 
     async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:  # noqa: N802 - the service's name
         """Serve one request with any number of answers, and return the last; the status is OK but for too many."""
@@ -83,13 +91,30 @@ class Service:
 
     async def _send(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:
         robot, peer = self._context.robot, rpc.peer()
-        if robot.admission.enforced:
-            await self._admit(rpc, peer)
+        if not robot.admission.enforced:
+            return await self._send_admitted(request, rpc, peer)
+        await self._admit(rpc, peer)
+        if request is not None:
+            await self._count(peer, len(request.params))
+        task = asyncio.current_task()
+        assert task is not None
+        self._of[task] = identity()
+        try:
+            return await self._send_admitted(request, rpc, peer)
+        except asyncio.CancelledError:
+            if self._of[task] != LOST or request is None:
+                raise
+            return _answer(request.nameCode, error(InBandError.UNAVAILABLE))
+        finally:
+            del self._of[task]
+
+    async def _send_admitted(
+        self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext, peer: str
+    ) -> pb.RecResponse | None:
+        robot = self._context.robot
         if request is None:
             _note_unreadable(peer)
             return _answer(0, error(InBandError.BAD_PARAMETERS))
-        if robot.admission.enforced:
-            await self._count(peer, len(request.params))
         if (fairness := robot.fairness) is None:
             return await self._serve(request, rpc, peer)
         use = fairness.of(peer.partition(":")[2])
