@@ -293,7 +293,7 @@ async def test_audit_keeps_changes_by_the_console(runtime: Runtime, store: Acces
     assert [row for row in rows if row[1] != "go_to"] == [
         ("cell", "take_control", "done"),
         ("eye", "release_control", "refused"),
-        ("cell", "class open", "refused"),
+        ("cell", "class", "refused"),
         ("boss", "class open", "done"),
     ]
 

@@ -62,7 +62,7 @@ export function t(key, values = {}) {
   return text.replace(/\{(\w+)\}/g, (_, name) => (name === "why" ? translated(String(values.why ?? "")) : String(values[name] ?? "")));
 }
 
-/** What the server may say, in Chinese: pieces of the English between what is filled in, most words first. */
+/** The server's sentences: pieces of the English between gaps, and the Chinese, most words first. */
 const sentences = signal(/** @type {[string[], string][]} */ ([]));
 const SOON = 1500; // ms after the page
 effect(() => { if (language.value === "zh") setTimeout(learn, SOON); });
@@ -73,7 +73,7 @@ async function learn() {
   sentences.value = known.map(([en, zh]) => /** @type {[string[], string]} */ ([en.split("{}"), zh])).sort(([a], [b]) => b.join("").length - a.join("").length);
 }
 
-/** What fills the gaps between pieces of a sentence; null if it is another one. @param {string[]} pieces @param {string} text */
+/** What fills the gaps; null if it is another sentence. @param {string[]} pieces @param {string} text */
 function gaps([first, ...rest], text) {
   if (!rest.length) return text === first ? [] : null;
   const last = /** @type {string} */ (rest.pop()), found = [];
@@ -90,15 +90,15 @@ function gaps([first, ...rest], text) {
   return found.some((gap) => /[.!?] [A-Z]/.test(gap)) ? null : found;
 }
 
-/** A sentence of the server's in the language chosen, as it came where it is not known. @param {string} text @returns {string} */
+/** A sentence of the server's in the language chosen, if it is known. @param {string} text @returns {string} */
 export function translated(text) {
   if (language.value !== "zh" || !/[a-z]{2}/.test(text)) return text;
   for (const [pieces, zh] of sentences.value) {
     const found = gaps(pieces, text);
     if (found) return zh.replace(/\{(\d)\}/g, (_, i) => robotWord(found[i]));
   }
-  const parts = text.split(/(?<=[.!?;]) (?!(?:did you mean|there are|use) )(?=\w)|(?=; (?:did you mean|there are|use) )/);
-  return parts.length > 1 ? parts.map(translated).join("") : text;
+  const parts = text.split(/(?<=[.!?]) (?=\w)|(?=; \w)/);
+  return parts[1] ? parts.map(translated).join("") : text;
 }
 
 /** A word of the robot's own (a status, a stage, a fault) where we know it in this language; else what is known of the server.

@@ -8,8 +8,8 @@ import { age, clock, current, poses, stale, state } from "../link.js";
 const PERIOD = 500; // ms
 const NOTED_MAX = 1200; // a robot
 const HEIGHT = 130; // px
-const SHORTEST = 10; // s that the axis shows at least
-const STEPS = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600]; // s between two labels, which name whole seconds
+const SHORTEST = 10; // s of the axis, at least
+const STEPS = [1, 2, 5, 10, 20, 30, 60, 120]; // s between labels
 
 /** What is noted of a robot; each chart shows one or two of them. @type {Record<string, () => number | null>} */
 const SOURCES = {
@@ -53,8 +53,12 @@ function plotting() {
   return library;
 }
 
-/** Where the labels stand: at the newest value, and in whole steps before it. */
-const backwards = (_plot, _axis, from, to, step) => Array.from({ length: Math.floor((to - from) / step) + 1 }, (_, i) => to - i * step).reverse();
+/** Labels at the newest value, and in whole steps before it. */
+function backwards(_plot, _axis, from, to, step) {
+  const found = [];
+  for (let at = to; at >= from; at -= step) found.unshift(at);
+  return found;
+}
 
 /** @param {any} uPlot @param {HTMLElement} place @param {string} name @param {number[] | null} range */
 function made(uPlot, place, name, range) {
@@ -62,7 +66,7 @@ function made(uPlot, place, name, range) {
   const ago = (plot, values) => values.map((v) => `${Math.round(v - (plot.data[0].at(-1) ?? 0))} s`);
   return new uPlot({
     width: place.clientWidth, height: HEIGHT, legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0],
-    scales: { x: { time: false, range: (_, from, to) => to === null ? [0, SHORTEST] : [Math.min(from, to - SHORTEST), to] }, y: { range: range ?? ((_, low, high) => [Math.min(low, 0), Math.max(high, 1)]) } },
+    scales: { x: { time: false, range: (_, from, to) => [Math.min(from, to - SHORTEST), to] }, y: { range: range ?? ((_, low, high) => [Math.min(low, 0), Math.max(high, 1)]) } },
     axes: [{ ...axis, values: ago, incrs: STEPS, splits: backwards, space: 60, size: 26 }, { ...axis, size: 46 }],
     series: [{}, { stroke: c.path, width: 2, points: { show: false } }],
   }, columns(name), place);
