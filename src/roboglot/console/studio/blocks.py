@@ -65,7 +65,8 @@ def table() -> dict[str, Any]:
 @cache
 def _labels() -> dict[str, Any]:
     text = importlib.resources.files(__package__).joinpath("labels.toml").read_text("utf-8")
-    return tomllib.loads(text)
+    parts = tomllib.loads(text).items()
+    return {part: {"cyberdog" * (key[0] == ".") + key: it for key, it in rows.items()} for part, rows in parts}
 
 
 def label_of(key: str) -> dict[str, str]:
