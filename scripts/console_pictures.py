@@ -1,7 +1,7 @@
 """Draws the console's views at three widths and in both languages, for people to look at before a release.
 
 .venv/bin/python scripts/console_pictures.py [folder]: without a folder only docs/images/console.png is drawn.
-Needs playwright and Debian's chromium.
+Needs playwright, Debian's chromium and a Chinese font (fonts-wqy-microhei).
 """
 
 from __future__ import annotations

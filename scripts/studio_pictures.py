@@ -1,6 +1,7 @@
 """Draws the studio at three widths and in both languages, for people to look at before a release.
 
-.venv/bin/python scripts/studio_pictures.py FOLDER. Needs playwright and Debian's chromium.
+.venv/bin/python scripts/studio_pictures.py FOLDER. Needs playwright, Debian's chromium and a Chinese
+font (fonts-wqy-microhei).
 """
 
 from __future__ import annotations

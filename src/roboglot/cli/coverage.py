@@ -54,7 +54,7 @@ def command(
         print(json.dumps({name: _numbers(coverage) for name, coverage in measured.items()}))
         return
     for name, coverage in measured.items():
-        print(f"{name:13} {len(coverage.done):4} of {len(coverage.rows)}, {len(coverage.partly)} more in part")
+        print(f"{name:17} {len(coverage.done):4} of {len(coverage.rows)}, {len(coverage.partly)} more in part")
 
 
 def _numbers(coverage: Coverage) -> dict[str, object]:
