@@ -110,6 +110,35 @@ async def test_going_around_is_bounded() -> None:
         replanner._take(follower, planned(6.0))
 
 
+async def go_around(replanner: Replanner, follower: Any, seconds: float) -> None:
+    """Take eight ways that are blocked one after the other."""
+    for _ in range(8):
+        replanner._lookout.blocked = True
+        assert replanner._take(follower, planned(6.0))
+        await replanner._clock.sleep(seconds)
+
+
+async def advancing(clock: Any, work: Any) -> None:
+    task = asyncio.ensure_future(work)
+    while not task.done():
+        await clock.advance(0.5)
+    await task
+
+
+async def test_goal_blocked_on_all_sides_is_given_up() -> None:
+    replanner, follower = replanning(PilotTuning())
+    with pytest.raises(Blocked, match="on the goal: 6 ways"):
+        await advancing(replanner._clock, go_around(replanner, follower, 6.0))
+
+
+@pytest.mark.parametrize(("place", "seconds", "leaves"), [(2.0, 6.0, None), (0.0, 1.0, None), (0.0, 6.0, math.inf)])
+async def test_others_and_the_way_do_not_count(place: float, seconds: float, leaves: float | None) -> None:
+    """Obstacles far from the goal, for a moment only, or robots."""
+    replanner, follower = replanning(PilotTuning(), leaves=leaves)
+    replanner._lookout.blocked_place = Point(place)
+    await advancing(replanner._clock, go_around(replanner, follower, seconds))
+
+
 @pytest.mark.parametrize(
     ("leaves", "turning", "taken"), [(1.0, 0.0, True), (1.0, 2.0, False), (4.0, 2.0, True), (math.inf, 2.0, True)]
 )

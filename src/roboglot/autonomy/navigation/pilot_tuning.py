@@ -31,6 +31,8 @@ class PilotTuning:
     detours_max: int = 10  # per drive
     around: float = 0.5  # a route longer than the blocked one by this is a different route …
     arounds_max: int = 40  # … and is taken at most so often per drive
+    at_goal: float = 1.0  # from the goal within which an obstacle may stand on it …
+    at_goal_max: int = 6  # … and that many ways around it, in more than the patience's time, show that it does
     polite_period: float = 1.0  # between two plans around a robot that comes into the way
     stray: float = 0.4  # from the route at which it is planned again
     unknown_seam: float = 1.0  # of unknown floor on a route that count as known: the map has holes along its edges

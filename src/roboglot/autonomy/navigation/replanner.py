@@ -32,7 +32,8 @@ class Replanner:
         self._planned_at = -math.inf
         self._stale = self._polite = False  # the plan only leads around other robots
         self._around = False  # … only around the obstacle in the way
-        self._detours = self._arounds = 0
+        self._detours = self._arounds = self._at_goal = 0
+        self._at_goal_since = math.inf
         events = course.robot.events
         self._listeners = [events.listen(kind, self._distrust) for kind in DISTRUSTED]
 
@@ -166,7 +167,10 @@ class Replanner:
         if len(self._goal.points) - self.passed(follower) != len(route.goals):
             self._stale = True  # a goal was reached meanwhile
             return False
-        self._count(detour, around=lookout.blocked and route.length > follower.left + tuning.around)
+        around = lookout.blocked and route.length > follower.left + tuning.around
+        self._count(detour, around=around)
+        if around and not self._course.traffic.is_closed_by_others(lookout.blocked_place):
+            self._check_goal(self._goal.points[self.passed(follower)])
         self._first += follower.passed
         follower.take(route)
         if lookout.blocked:
@@ -204,3 +208,13 @@ class Replanner:
         self._arounds += around
         if self._detours > self._tuning.detours_max or self._arounds > self._tuning.arounds_max:
             raise Blocked(f"every way was blocked, {max(self._detours, self._arounds) - 1} times")
+
+    def _check_goal(self, goal: Point) -> None:
+        """Raise Blocked for a goal that was blocked from all sides: the map shows only those that the robot sees."""
+        now, tuning = self._clock.time(), self._tuning
+        if self._lookout.blocked_place.distance_to(goal) > tuning.at_goal:
+            self._at_goal, self._at_goal_since = 0, math.inf
+            return
+        self._at_goal, self._at_goal_since = self._at_goal + 1, min(self._at_goal_since, now)
+        if self._at_goal > tuning.at_goal_max and now - self._at_goal_since > tuning.patience:
+            raise Blocked(f"an obstacle stands on the goal: {self._at_goal - 1} ways around it were blocked")
