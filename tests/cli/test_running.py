@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from roboglot.cli.control import running
+from roboglot.cli.control import running, stop
 from roboglot.cli.control.lease import send
 from roboglot.control import lease_server
 from roboglot.control.record_server import Answer, Request
@@ -93,3 +93,18 @@ async def test_every_world_that_refuses_is_named(tmp_path: Path) -> None:
     finally:
         for server in servers:
             await server.close()
+
+
+@pytest.mark.parametrize(
+    ("taken_by", "hint"), [("", "may move it again: `roboglot lease a --take`"), ("a person", None)]
+)
+def test_stop_names_what_keeps_robots_standing(
+    taken_by: str, hint: str | None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A program that runs drives on half a second later."""
+    control = lease_server.Control("a", "", "", 0.0, taken_by, "", "")
+    monkeypatch.setattr(stop, "send", lambda *_: lease_server.Answer([control]))
+    stop.command("a")
+    shown = capsys.readouterr().out
+    assert shown.startswith("a stands\n")
+    assert (hint in shown) if hint else shown == "a stands\n"

@@ -15,9 +15,12 @@ def command(
     all_: Annotated[bool, typer.Option("--all", help="Stop all robots at once.")] = False,
     data: Data = None,
 ) -> None:
-    """Stop a robot, or all. Their clients may move them again: `roboglot lease --all --take` keeps them standing."""
+    """Stop a robot, or all. Programs and clients may move them again: `roboglot lease` keeps them standing."""
     if bool(robot) == all_:
         raise typer.BadParameter("name a robot, or give --all")
     answer = send("stop", Request("stop", robot, all=all_), data)
     count = len(answer.robots)
     print(f"{count} robots stand" if all_ and count > 1 else f"{robot or answer.robots[0].robot} stands")
+    if any(not each.taken_by for each in answer.robots if robot in ("", each.robot)):
+        lease = f"roboglot lease {robot or '--all'} --take"
+        print(f"Programs and clients go on, and may move {'it' if robot else 'them'} again: `{lease}` prevents that.")
