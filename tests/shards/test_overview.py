@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import json
+from email.message import Message
 from types import SimpleNamespace
 from typing import Any, ClassVar
+from unittest.mock import patch
+from urllib.error import HTTPError
+from urllib.request import Request
 
 import pytest
 
@@ -58,6 +63,20 @@ async def test_worlds_that_do_not_answer_say_why(fleet_host) -> None:
     assert await glances.state("a3") == {"error": "this world has no console"}
     with pytest.raises(Refused, match="sign in first"):
         await glances.picture("a2")
+
+
+async def test_worlds_that_ask_for_a_log_in(fleet_host) -> None:
+    """Each console has its own; a browser that signs in there is not known to the fleet's page."""
+
+    def refuse(request: Request, timeout: float) -> None:
+        raise HTTPError(request.full_url, 401, "Unauthorized", Message(), io.BytesIO(b'{"error": "say who you are"}'))
+
+    with patch("roboglot.agents.console.urlopen", refuse):
+        assert await Snapshots(fleet_host).state("a1") == {"error": "its console asks for a log-in: sign in there"}
+
+
+async def test_unknown_robots_have_no_state(fleet_host) -> None:
+    glances = Snapshots(fleet_host, Console)
     with pytest.raises(LookupError):
         await glances.state("zoe")
 

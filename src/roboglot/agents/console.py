@@ -19,7 +19,9 @@ T = TypeVar("T")
 
 
 class Refused(Exception):
-    """The console refused or failed; the text is the reason."""
+    """The console refused or failed; the text is the reason, ``status`` HTTP's, if there was an answer."""
+
+    status = 0
 
 
 class ConsoleClient:
@@ -49,7 +51,9 @@ class ConsoleClient:
                 data: bytes = reply.read(ANSWER_MAX + 1)
         except HTTPError as error:
             with error:
-                raise Refused(_reason(error)) from None
+                refused = Refused(_reason(error))
+                refused.status = error.code
+                raise refused from None
         except (URLError, OSError) as error:
             why = getattr(error, "reason", error)
             raise Refused(f"no roboglot answers at {self._url}: {why}; start it with `roboglot up`") from None

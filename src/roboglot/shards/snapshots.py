@@ -52,7 +52,8 @@ class Snapshots:
                 async with self._turns:
                     found = await console.get(dict, "robots", robot)
             except Refused as refused:
-                return {"error": str(refused)}
+                why = "its console asks for a log-in: sign in there"
+                return {"error": why if refused.status == 401 else str(refused)}
             return {name: found[name] for name in SHOWN if name in found}
 
         return await self._states.get(robot, look)
