@@ -121,6 +121,17 @@ async def test_the_page_of_programs_runs_and_keeps_them(tmp_path: Path) -> None:
         assert_pose(user.moved, x=0.5, y=0.0)
 
 
+@pytest.mark.slow  # programs of their own; tests/cli has the commands
+@pytest.mark.parametrize("suffix", [".md", ".zh.md"])
+async def test_pages_for_pupils_start_their_robots(suffix: str, tmp_path: Path) -> None:
+    async with terminal(tmp_path, free_addresses(1)) as user:
+        for name in ("studio", "language"):
+            for line in commands(block_with(DOCS.parent / f"programs/{name}{suffix}", ".venv/bin/roboglot")):
+                ended = await user.type(line)
+                assert ended.status == 0, ended
+                assert re.search("3 of 3 stars|clear on 4 of 4 sides", ended.said)
+
+
 @pytest.mark.slow  # a long story; tests/drivers has the lease
 async def test_the_drivers_page_takes_and_releases_control(tmp_path: Path) -> None:
     block = block_with(DOCS.parent / "drivers.md", "lease b --take").replace("lease b", "lease a")
@@ -144,8 +155,14 @@ async def test_the_dogs_page_photographs_and_films(tmp_path: Path) -> None:
 async def test_the_page_of_recordings_records_what_runs(tmp_path: Path) -> None:
     async with terminal(tmp_path, free_addresses(1), body="hermes") as user:
         await user.type_block(block_with(DOCS.parent / "recording.md", "record mark", "bash"))
-        ended = await user.type(".venv/bin/roboglot record info today.mcap")
-        assert ended.status == 0, ended
+        page = DOCS.parent / "recording.md"
+        _, export = commands(block_with(page, "--rosbag2 today-bag", "bash"))
+        _, compare, *_ = commands(block_with(page, "compare today.mcap yesterday.mcap", "bash"))
+        for line in (".venv/bin/roboglot record info today.mcap", export, compare.replace("yesterday", "today")):
+            ended = await user.type(line)
+            assert ended.status == 0, ended
+        assert "fidelity: 100 %" in ended.said
+        assert (tmp_path / "today-bag/metadata.yaml").exists()
 
 
 @pytest.mark.slow  # a long story; tests/cli/test_access_command.py has the commands
