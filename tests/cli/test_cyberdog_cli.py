@@ -90,3 +90,13 @@ def test_mistakes_are_reported_in_a_line(run: Run, words: list[str]) -> None:
     assert failed.returncode == 1
     assert failed.stderr.startswith("roboglot cyberdog: ")
     assert "Traceback" not in failed.stderr
+
+
+def test_certificates_of_another_robot_are_named(run: Run, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "roboglot", "certs", "--export", str(tmp_path), "--data", str(tmp_path / "other")]
+    subprocess.run(command, check=True, capture_output=True, timeout=180)
+    failed = run("status", "--certs", str(tmp_path))
+    assert failed.returncode == 1
+    said = f"roboglot cyberdog: the robot at {ADDRESS} has other certificates than {tmp_path}:"
+    assert failed.stderr.startswith(said)
+    assert "--data" in failed.stderr

@@ -26,6 +26,7 @@ from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Feedback
 
 NAMES = ("watch", "status", "stand", "lie", "drive", "map", "go", "charge", "photo", "record", "stop")
+UNTRUSTED = "CERTIFICATE_VERIFY_FAILED"  # in gRPC's words
 LINE_PERIOD = 0.5  # s between two lines
 FIRST_MAX = 20.0  # s before a map must begin to grow
 Work = Callable[[CyberDogClient, list[str]], Awaitable[None]]
@@ -51,16 +52,27 @@ def command(
     """
     if what not in WORK:
         sys.exit(f"roboglot cyberdog: {what!r} is none of {', '.join(WORK)}")
+    os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # a failed handshake is reported below
+    folder = certs or _own(data)
     try:
-        proof = None if plaintext else Certificates.load(certs or _own(data))
+        proof = None if plaintext else Certificates.load(folder)
     except OSError as error:
         sys.exit(f"roboglot cyberdog: no certificates: {in_words(error)}; `roboglot certs --export DIR` writes them")
     try:
         asyncio.run(_at(CyberDogClient(robot, proof, app_port=app_port), WORK[what], words or []))
     except (ClientError, OSError, ValueError) as error:  # a TimeoutError has no text
-        sys.exit(f"roboglot cyberdog: {in_words(error) or 'nothing came in time'}")
+        sys.exit(f"roboglot cyberdog: {_why(in_words(error), robot, folder)}")
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _why(words: str, robot: str, folder: Path) -> str:
+    if UNTRUSTED in words:
+        return (
+            f"the robot at {robot} has other certificates than {folder}: give --data the folder of its `roboglot up`, "
+            "or --certs that of its `roboglot certs --export`"
+        )
+    return words or "nothing came in time"
 
 
 def _own(data: Path | None) -> Path:
