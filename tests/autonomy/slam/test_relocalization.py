@@ -119,6 +119,21 @@ async def test_place_found_everywhere_replaces_a_half_fitting_one(tour: Tour, mo
 
 
 @pytest.mark.world("empty")
+@pytest.mark.parametrize(("x", "lost"), [(3.0, LostReason.AMBIGUOUS), (1.0, None)])
+async def test_robot_stays_lost_while_only_other_places_fit(
+    tour: Tour, monkeypatch: pytest.MonkeyPatch, x: float, lost: LostReason | None
+) -> None:
+    await tour.go((2.0, 5.0))
+    estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
+    here = tour.robot[Localization].pose
+    found = [Match(Pose(here.x + away, here.y, 0.0), np.diag(SURE), 0.0, 100, 100, 100) for away in (x, 4.0)]
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: found)
+    estimator.whereabouts.lose(LostReason.NO_FIT, tour.clock.time())  # the believed place still fits
+    await tour.clock.advance(3.0)
+    assert tour.robot[Localization].lost is lost
+
+
+@pytest.mark.world("empty")
 async def test_lost_robot_keeps_saying_that_places_look_alike(tour: Tour) -> None:
     await tour.go((8.5, 5.0))
     tour.world.hands.place("a", Pose(5.6, 5.0))

@@ -338,7 +338,7 @@ class Slam:
                 if not given or len(found) > 1:
                     self.whereabouts.lose(LostReason.NO_FIT, stamp)
             if len(found) > 1:
-                belief.lost = LostReason.AMBIGUOUS
+                self.whereabouts.be_ambiguous(found, pose)
                 return
             self._mapped_from = self._way + (0.0 if near else PROBATION)
             self.believe(found[0], odometry, RecoveryMeans.NEARBY if near else RecoveryMeans.WHOLE_MAP)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import Support
@@ -38,6 +39,7 @@ class Whereabouts:
         self._doubts = self._good = 0
         self._doubted_at = self._lost_at = math.inf
         self._given_at = -math.inf  # s: since when a pose is unconfirmed, set by a client or found after a displacement
+        self._elsewhere = False  # whether a search found several places, none of them near the believed one
         self.sure = True  # whether scans may be added to the map
 
     def note_scan(self, stamp: float) -> bool:
@@ -82,7 +84,7 @@ class Whereabouts:
             self._belief.confirmed = True
             self._events.publish(PoseConfirmed(stamp=stamp, pose=self._belief.pose))
         if self._belief.lost is not None:
-            if self._good >= CONFIRMED:
+            if self._good >= CONFIRMED and not self._elsewhere:
                 self.find(RecoveryMeans.NEARBY, stamp)
         elif not self._belief.confirmed and stamp - self._given_at >= DOUBT_SECONDS:
             self.lose(LostReason.NO_GROUND if new_ground else LostReason.NO_FIT, stamp)
@@ -96,10 +98,15 @@ class Whereabouts:
             self._lost_at, self._good = stamp, 0
             self._events.publish(LocalizationLost(stamp=stamp, reason=reason, quality=self._belief.quality))
 
+    def be_ambiguous(self, found: Sequence[Match], believed: Pose) -> None:
+        """Note that the scan fits several places; unless the ``believed`` one is among them, only a search ends that."""
+        self._belief.lost = LostReason.AMBIGUOUS
+        self._elsewhere = all(match.pose.distance_to(believed) >= NEAR for match in found)
+
     def find(self, means: RecoveryMeans, stamp: float) -> None:
         """Note that the pose is known; scans are added to the map after further confirmations."""
         belief = self._belief
-        self._doubts, self._doubted_at, belief.confirmed = 0, math.inf, True
+        self._doubts, self._doubted_at, belief.confirmed, self._elsewhere = 0, math.inf, True, False
         if belief.lost is None:
             return
         belief.lost, self._good = None, 0
@@ -118,6 +125,7 @@ class Whereabouts:
     def begin(self) -> None:
         """Begin a new map, whose first scan defines the pose."""
         self._doubts, self._doubted_at, self.sure, self._belief.confirmed = 0, math.inf, True, True
+        self._elsewhere = False
 
 
 class Elsewhere:
