@@ -4,6 +4,7 @@ The environment is made without a network: the wheel is built here, and the pack
 linked from this environment, nothing else.
 """
 
+import json
 import os
 import re
 import shutil
@@ -21,6 +22,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from roboglot.console.assets import Assets
 from roboglot.extras import EXTRA_OF, MODULES, UP, explained, own_version
 from roboglot.testing.addresses import free_addresses
 from roboglot.testing.process import served
@@ -91,6 +93,13 @@ def test_the_core_is_small(core: Path) -> None:
         sizes[file.relative_to(site).parts[0]] += file.stat().st_size
     assert sizes.total() <= CORE_BYTES_MAX, sizes.most_common(10)
     assert not [name for name in HEAVY if (site / name).exists()]
+
+
+def test_pages_in_a_wheel_equal_the_sources(core: Path) -> None:
+    code = "from roboglot.console.assets import Assets; print(json.dumps({p: a.tag for p, a in Assets().all()}))"
+    done = run(core, "-c", f"import json; {code}")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == {path: asset.tag for path, asset in Assets().all()}
 
 
 def test_the_start_screen_names_an_installed_file(core: Path) -> None:

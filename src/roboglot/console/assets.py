@@ -52,13 +52,12 @@ def _paths() -> dict[str, Path]:
 
 @cache
 def _read(path: Path) -> Asset:
-    plain = path.read_bytes()
-    if path.suffix == ".gz":  # large libraries are stored compressed
+    plain, packed, kind = path.read_bytes(), b"", Path(path.name.removesuffix(".gz")).suffix
+    if path.suffix == ".gz":  # large libraries are stored compressed; in a wheel all pages are
         packed, plain = plain, gzip.decompress(plain)
-        return Asset(TYPES[Path(path.stem).suffix], plain, packed, _tag(plain))
-    if path.suffix == ".js":  # comments are stripped from our own modules; line numbers stay
-        plain = _COMMENT.sub(b"", plain)
-    return Asset(TYPES[path.suffix], plain, gzip.compress(plain, 9, mtime=0), _tag(plain))
+    if kind == ".js":  # comments are stripped from our own modules; line numbers stay
+        packed, plain = b"", _COMMENT.sub(b"", plain)
+    return Asset(TYPES[kind], plain, packed or gzip.compress(plain, 9, mtime=0), _tag(plain))
 
 
 def _tag(plain: bytes) -> str:

@@ -99,7 +99,7 @@ class Whereabouts:
             self._events.publish(LocalizationLost(stamp=stamp, reason=reason, quality=self._belief.quality))
 
     def be_ambiguous(self, found: Sequence[Match], believed: Pose) -> None:
-        """Note that the scan fits several places; unless the ``believed`` one is among them, only a search ends that."""
+        """Note that the scan fits several places; if none is near the ``believed`` one, only a search ends that."""
         self._belief.lost = LostReason.AMBIGUOUS
         self._elsewhere = all(match.pose.distance_to(believed) >= NEAR for match in found)
 
