@@ -7,6 +7,7 @@ from typing import Any
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
+from roboglot.programs.functions import ability_set
 from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import call
 
@@ -15,6 +16,7 @@ class Caller:
     """``await caller("cyberdog.motion.turn", 90)`` lets robot time pass until the call returns."""
 
     def __init__(self, robot: Robot, clock: LockstepClock) -> None:
+        ability_set()  # loads the functions
         self.session = Session(robot, "t", self)
         self.robot = robot
         self.clock = clock

@@ -200,6 +200,18 @@ async def test_pausing_holds_a_walk_and_its_time(caller: Caller, world: World) -
     assert_pose(world.truth.pose_of("a").relative_to(before), x=1.0, y=0.0, within=0.1)
 
 
+async def test_motion_that_begins_during_a_pause_waits(caller: Caller, world: World) -> None:
+    before = world.truth.pose_of("a")
+    caller.session.pause()
+    move = caller.session.robot[Driving].move_by(Pose(0.5), source=caller.session.source)
+    await caller.clock.advance(5.0)
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
+    caller.session.resume()
+    await caller.clock.advance(5.0)
+    assert move.status is ActionStatus.SUCCEEDED
+    assert_pose(world.truth.pose_of("a").relative_to(before), x=0.5, y=0.0)
+
+
 async def test_takeover_of_the_base_is_reported(caller: Caller) -> None:
     walking = caller.start("cyberdog.motion.go_straight", 0.25, 0, 10)
     await caller.clock.advance(1.0)

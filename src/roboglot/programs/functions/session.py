@@ -6,7 +6,7 @@ Knows no process and no store; its ``host`` does.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from typing import Protocol, TypeVar, cast
 
 from roboglot.model.actions import Action, ActionStatus
@@ -63,16 +63,20 @@ class Session:
         self._going_on = asyncio.Event()
         self._going_on.set()
         self._paused = asyncio.Event()
+        self._end_watch: Callable[[], None] = _nothing  # of actions that begin during a pause
 
     def pause(self) -> None:
-        """Pause the program's actions and waits."""
+        """Pause the program's actions and waits, and actions that a call with several begins during the pause."""
         self._going_on.clear()
         self._paused.set()
         for action in self._actions():
             action.pause()
+        self._end_watch()
+        self._end_watch = self.robot.events.listen(ActionChanged, self._pause_new)
 
     def resume(self) -> None:
         """Continue the program's actions and waits."""
+        self._end_watch()
         self._paused.clear()
         self._going_on.set()
         for action in self._actions():
@@ -80,6 +84,7 @@ class Session:
 
     def cancel(self, reason: str) -> None:
         """Cancel all actions of the program and release its holds; the robot brakes by itself."""
+        self._end_watch()
         for action in self._actions():
             action.cancel(reason)
         while self._parts:
@@ -125,6 +130,10 @@ class Session:
             action.cancel()
         await action.done()
 
+    def _pause_new(self, event: ActionChanged) -> None:
+        if event.action.source == self.source and event.action.status is ActionStatus.ACCEPTED:
+            event.action.pause()
+
     def _actions(self) -> list[Action]:
         return [action for action in self.robot.actions.running() if action.source == self.source]
 
@@ -132,6 +141,10 @@ class Session:
         with self.robot.events.subscribe(ActionChanged) as changes:
             while action.status is ActionStatus.ACCEPTED:
                 await changes.next()
+
+
+def _nothing() -> None:
+    """Do nothing: nothing is watched."""
 
 
 async def _either(*waits: Awaitable[object]) -> None:
