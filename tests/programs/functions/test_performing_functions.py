@@ -55,6 +55,25 @@ async def test_a_motion_ends_where_its_name_says(caller: Caller, world: World, n
     assert caller.clock.time() - start == pytest.approx(spec.duration, abs=1.5)
 
 
+@pytest.mark.parametrize("name", ["bow", "jump3d_forward60cm", "space_walk"])
+async def test_pausing_holds_a_motion(caller: Caller, world: World, name: str) -> None:
+    await off_the_dock(caller)
+    performing, start = caller.start(f"cyberdog.motion.{name}"), caller.clock.time()
+    await caller.clock.advance(0.6)
+    caller.session.pause()
+    await caller.clock.advance(1.5)  # a jump lands first
+    legs, before = caller.robot[Legs], world.truth.pose_of("a")
+    held = legs.attitude, legs.body_height
+    await caller.clock.advance(10.0)
+    assert not performing.done()
+    assert (legs.attitude, legs.body_height) == held
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
+    caller.session.resume()
+    await caller.clock.advance(20.0)
+    assert field(performing.result(), "response.code") == 0
+    assert caller.clock.time() - start > 11.5
+
+
 async def test_wagging_needs_sitting_down_first(caller: Caller) -> None:
     legs = caller.robot[Legs]
     await off_the_dock(caller)

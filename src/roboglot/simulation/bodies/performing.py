@@ -96,14 +96,24 @@ class Track:
 
 
 class Performance:
-    """A motion under way: its frames, whether an obstacle was ``hit``, and ``lift`` of the last frame."""
+    """A motion under way: its frames, whether it is ``held``, whether an obstacle was ``hit``, the last ``lift``."""
 
     def __init__(self, frames: Iterator[MotionTick]) -> None:
         self.frames = frames
         self.frame: MotionTick | None = None
         self.lift: float | None = None
         self.over = False
+        self.held = False
         self.hit = False
+
+    @property
+    def in_the_air(self) -> bool:
+        """True if the feet have left the ground, so that nothing can hold the motion."""
+        return self.frame is not None and self.frame.airborne
+
+    def hold(self) -> None:
+        """Hold the present frame, or the one after landing."""
+        self.held = True
 
 
 def motion_frames(spec: MotionSpec, begin: Body, stance: Stance) -> Iterator[MotionTick]:

@@ -232,10 +232,9 @@ class SimulatedLegs(Legs):
         self._become(Posture.CHANGING)
         begin = self._hull.pose
         performance, self._performing = Performance(make()), motion
-        self._player.performance = performance
         self.duty.begin()
         try:
-            await self._player.until_over(performance, self._clock, LOOK)
+            await self._player.perform(performance, action, self._clock, LOOK)
         except asyncio.CancelledError:
             if action.status is ActionStatus.CANCELING:  # otherwise the loop is closing and its clock may stand still
                 self._player.give_up(performance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from roboglot.model.action import Action
 from roboglot.model.clock import Clock
 from roboglot.model.geometry import STILL
 from roboglot.simulation.bodies.hull import Hull
@@ -20,6 +21,14 @@ class MotionPlayer:
         self._hull, self._base, self._torso, self._steps, self._stance = hull, base, torso, steps, stance
         self.performance: Performance | None = None
 
+    async def perform(self, performance: Performance, action: Action, clock: Clock, period: float) -> None:
+        """Perform until the motion is over or replaced, checking every ``period`` s; hold it while paused."""
+        self.performance = performance
+        while not performance.over and self.performance is performance:
+            await action.hold(performance.hold)
+            performance.held = False
+            await clock.sleep(period)
+
     async def until_over(self, performance: Performance, clock: Clock, period: float) -> None:
         """Wait until a performance is over or replaced, checking every ``period`` s."""
         while not performance.over and self.performance is performance:
@@ -27,12 +36,15 @@ class MotionPlayer:
 
     def give_up(self, performance: Performance) -> None:
         """Replace the remaining frames: land if in the air, then straighten."""
-        torso = self._torso
+        torso, performance.held = self._torso, False
         performance.frames = given_up(performance, self._hull, torso.body, torso.straight, self._stance)
 
     def play(self, performance: Performance) -> None:
         """Move base_link, torso and feet by the next frame; give up a motion that meets an obstacle."""
         frame = performance.frame
+        if performance.held and not performance.in_the_air:
+            self._base.carry(STILL)
+            return
         if frame and not performance.hit and in_the_way(self._hull, frame.twist):
             performance.hit = True
             self.give_up(performance)
