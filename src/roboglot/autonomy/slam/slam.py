@@ -322,8 +322,7 @@ class Slam:
 
         def then(found: list[Match]) -> None:
             self._looking = False
-            if belief.lost is LostReason.AMBIGUOUS:
-                belief.lost = LostReason.NO_FIT
+            self.whereabouts.forget_places()
             if not found or belief.map is not grid or not belief.localizing or self._given_at > stamp:
                 return
             pose = belief.map_to_odom.compose(odometry)

@@ -103,6 +103,12 @@ class Whereabouts:
         self._belief.lost = LostReason.AMBIGUOUS
         self._elsewhere = all(match.pose.distance_to(believed) >= NEAR for match in found)
 
+    def forget_places(self) -> None:
+        """Forget the places that the last search found, as a newer one has ended."""
+        self._elsewhere = False
+        if self._belief.lost is LostReason.AMBIGUOUS:
+            self._belief.lost = LostReason.NO_FIT
+
     def find(self, means: RecoveryMeans, stamp: float) -> None:
         """Note that the pose is known; scans are added to the map after further confirmations."""
         belief = self._belief
