@@ -65,16 +65,7 @@ def table() -> dict[str, Any]:
 @cache
 def _labels() -> dict[str, Any]:
     text = importlib.resources.files(__package__).joinpath("labels.toml").read_text("utf-8")
-    return {
-        part: {"cyberdog" * (key[0] == ".") + key: _named(part, row) for key, row in rows.items()}
-        for part, rows in tomllib.loads(text).items()
-    }
-
-
-def _named(part: str, row: str | list[str]) -> object:
-    """Return a row's values by name."""
-    third = "colour" if part == "groups" else "unit"
-    return row if isinstance(row, str) else dict(zip(("en", "zh", third), row, strict=False))
+    return tomllib.loads(text)
 
 
 def label_of(key: str) -> dict[str, str]:
