@@ -47,8 +47,9 @@ def is_docked(robot: Robot) -> bool:
 class PlaceMemory:
     """Memory of the place; while it is unknown, the last one stays stored.
 
-    ``frame``: the map on disk (digest), the floor in memory, and the m (x, y) by which its origin has moved; None if
-    memory holds another map, as it also does while not ``known``.
+    ``frame`` returns the digest of the map on disk, the id of the floor in memory, and the m (x, y) by which its origin
+    has moved since; None if memory holds another map. ``known``: whether memory still holds what ``frame`` describes,
+    and not a map that another door has put there.
     """
 
     def __init__(self, robot: Robot, frame: Callable[[], tuple[str, str, Sequence[float]] | None]) -> None:
