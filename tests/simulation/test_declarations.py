@@ -58,6 +58,7 @@ def test_the_shipped_worlds_load(name):
         ("to = [6, 4] }", "too = [6, 4] }", r"world.toml:8: .*did you mean 'to'\?"),
         ("to = [6, 4] }", "to = [6] }", r"world.toml:8: .*walls\[1\].to"),
         ("from = [6, 0]", 'from = [6, "x"]', r"world.toml:8: .*walls\[1\].from\[1\]"),
+        ("size = [1, 1, 1] }", "size = [1, 1, 1], facing = nan }", r"world.toml:10: .*facing must be at least -3600"),
         ("radius = 0.3", "radius = -0.3", r"world.toml:16: .*furniture\[0\].radius"),
         ('shape = "cylinder"', 'shape = "ball"', r"world.toml:16: .*'ball'"),
         ("doors = [{ at = 2 }]", "doors = [{ at = 5.9 }]", r"floors\[0\].walls\[0\].doors\[0\].*6 m long"),

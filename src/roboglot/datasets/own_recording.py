@@ -72,14 +72,14 @@ def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
     """Yield schema and bytes of scans and transforms."""
     with explaining("reading recordings", "recording"):
         from mcap.records import Channel, Message, Schema
-        from mcap.stream_reader import StreamReader
 
-        from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
+        from roboglot.wire.mcap_chunks import stream_of
+        from roboglot.wire.mcap_damage import DAMAGE
     schemas: dict[int, str] = {}
     channels: dict[int, str] = {}
     with path.open("rb") as file:
         try:
-            for record in StreamReader(file, record_size_limit=RECORD_MAX).records:
+            for record in stream_of(file):
                 if isinstance(record, Schema):
                     schemas[record.id] = record.name
                 elif isinstance(record, Channel):

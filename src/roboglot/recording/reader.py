@@ -15,7 +15,7 @@ from typing import IO, Any
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from msgspec import DecodeError
 
@@ -24,11 +24,11 @@ from roboglot.model.tap import DRIVER, SILENT, Direction, Exchange
 from roboglot.recording.latched_values import REPEATED
 from roboglot.recording.messages import decode_exchange, decode_input
 from roboglot.values import dataclass
+from roboglot.wire.mcap_chunks import Allowance, Bomb, records_in
 from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
 
 log = logging.getLogger(__name__)
 EXCHANGES_MAX = 2_000_000
-UNPACKED_MAX = 256 << 20  # bytes of a chunk
 
 
 class BadRecording(ValueError):
@@ -162,8 +162,13 @@ def stream(path: Path, file: IO[bytes], *, chunks: bool = False) -> Iterator[Mca
 
     Damaged chunks are left out, with a warning, and so is then the footer. Raises BadRecording, OSError.
     """
-    is_damaged = False
+    is_damaged, allowance = False, Allowance(file)
     for record in _undivided(path, file):
+        if isinstance(record, Chunk):
+            try:
+                allowance.take(record)
+            except Bomb as error:
+                raise BadRecording(f"{path}: {error}") from None
         if isinstance(record, Chunk) and not chunks:
             try:
                 yield from unpacked(path, record)
@@ -198,10 +203,8 @@ def _undivided(path: Path, file: IO[bytes]) -> Iterator[McapRecord]:
 
 def unpacked(path: Path, chunk: Chunk) -> Sequence[McapRecord]:
     """Return the records of a chunk. Raises BadRecording."""
-    if chunk.uncompressed_size > UNPACKED_MAX:
-        raise BadRecording(f"{path}: a chunk of more than {UNPACKED_MAX} bytes")
     try:
-        return breakup_chunk(chunk, validate_crc=True)
+        return records_in(chunk)
     except DAMAGE as error:
         raise BadRecording(f"{path} is damaged: {error}") from None
 
@@ -245,6 +248,8 @@ def _part_of(path: Path) -> str:
 def _read_part(path: Path, recording: Recording, *, first: bool) -> None:
     try:
         _read_records(path, recording, first=first)
+    except BadRecording:
+        raise
     except (DecodeError, ValueError, TypeError) as error:
         raise BadRecording(f"{path} has a message that cannot be read: {error}") from None
 

@@ -21,6 +21,8 @@ from roboglot.values import dataclass
 from roboglot.wire.mcap_damage import DAMAGE
 
 TOPICS_MAX = 4096
+WAITING_MAX = 1 << 30  # bytes of messages read ahead, because their chunks overlap
+SHOT_BYTES = 150  # of a message, beside its data
 RECORD_HEAD = 9  # bytes: opcode and length
 
 
@@ -80,14 +82,20 @@ class Reel:
         Messages of the same time come together. Raises BadRecording, OSError.
         """
         waiting: list[Shot] = []
+        held = 0  # bytes in ``waiting``
         start = bisect_left(self._ends, since)
         for number, chunk in enumerate(self._chunks[start:], start + 1):
             if chunk.last >= since:
-                waiting += (shot for shot in self._read(chunk) if shot.at >= since)
+                new = [shot for shot in self._read(chunk) if shot.at >= since]
+                held += _bytes_of(new)
+                if held > WAITING_MAX:
+                    raise BadRecording(f"{chunk.part.path}: more than {WAITING_MAX} bytes in chunks of the same time")
+                waiting += new
                 waiting.sort(key=_time)
             until = self._chunks[number].first if number < len(self._chunks) else None
             ready = len(waiting) if until is None else _before(waiting, until)
             if ready:
+                held -= _bytes_of(waiting[:ready])
                 yield waiting[:ready]
                 del waiting[:ready]
 
@@ -172,6 +180,10 @@ class Reel:
 
 def _time(shot: Shot) -> int:
     return shot.at
+
+
+def _bytes_of(shots: Sequence[Shot]) -> int:
+    return sum(len(shot.data) + SHOT_BYTES for shot in shots)
 
 
 def _before(shots: Sequence[Shot], until: int) -> int:

@@ -1,5 +1,7 @@
 """ROS maps become worlds: free stays free, walls stay walls, bad files are named."""
 
+import os
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -139,3 +141,23 @@ def test_noise_does_not_become_a_million_boxes(write):
     speckles = np.random.default_rng(1).choice([0, 254], (200, 200))
     with pytest.raises(BadFile, match="clean the map"):
         load_world(write(speckles))
+
+
+@pytest.mark.parametrize(
+    ("image", "message"),
+    [
+        (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n%%EOF\n", "not an image"),  # not run
+        (b"P5\n9 9\n0\n" + bytes(81), "maxval"),
+        (b"P2\n9 9\n255\n" + b"9" * 99, "Token too long"),
+        (b"P5\n99999 99999\n255\n", "pixels"),
+        (None, "not a file"),
+    ],
+)
+def test_hostile_images_are_refused(write, tmp_path, image, message):
+    path = write(room(), image="hostile.pgm")
+    if image is None:
+        os.mkfifo(tmp_path / "hostile.pgm")
+    else:
+        (tmp_path / "hostile.pgm").write_bytes(image)
+    with pytest.raises(BadFile, match=message):
+        load_world(path)

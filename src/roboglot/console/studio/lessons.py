@@ -17,6 +17,7 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.language import Problem
 from roboglot.programs.rehearsing import Act, Played, Scene
 from roboglot.spelling import meant
+from roboglot.text_files import convert_toml
 from roboglot.validation import why_invalid
 
 log = logging.getLogger(__name__)
@@ -147,7 +148,7 @@ def _box(x: float, y: float, width: float, depth: float) -> list[Point]:
 def read(text: str) -> Lesson:
     """Return the lesson of a file's text. Raises ValueError in plain words."""
     try:
-        return msgspec.toml.decode(text, type=Lesson)
+        return convert_toml(text, Lesson)
     except msgspec.ValidationError as error:
         raise ValueError(why_invalid(error, "the mission", wanted=Lesson)) from None
 

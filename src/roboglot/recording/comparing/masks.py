@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from enum import StrEnum
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.recording.comparing.trees import kind_of
+from roboglot.text_files import convert_toml
 from roboglot.validation import why_invalid
 
 RULES_MAX = 1000
@@ -86,8 +86,8 @@ STRICT = Mask(tolerance=0.0, share=0.0, seconds=1e-6, seconds_share=0.0)
 def read_mask(path: Path) -> Mask:
     """Read a TOML file. Raises ValueError, OSError."""
     try:
-        mask = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Mask)
-    except (msgspec.ValidationError, tomllib.TOMLDecodeError) as error:
+        mask = convert_toml(path.read_text(encoding="utf-8"), Mask)
+    except ValueError as error:
         raise ValueError(f"{path}: {why_invalid(error, wanted=Mask)}") from None
     if len(mask.rule) > RULES_MAX:
         raise ValueError(f"{path}: more than {RULES_MAX} rules")

@@ -13,6 +13,7 @@ from typing import TypeVar, cast
 
 import msgspec
 
+from roboglot.text_files import convert_toml
 from roboglot.validation import why_invalid
 
 T = TypeVar("T")
@@ -39,14 +40,14 @@ def read_toml(path: Path, structure: type[T]) -> T:
     except msgspec.ValidationError as error:
         why = why_invalid(error, "the file", wanted=structure)
         raise BadFile(f"{path}{_line_of(text, str(error))}: {why}") from None
-    except msgspec.DecodeError as error:
+    except ValueError as error:
         raise BadFile(f"{path}: not TOML: {error}") from None
 
 
 @lru_cache(maxsize=DECODED_MAX)
 def _decoded(text: str, structure: object) -> object:
     """Return the (frozen) structure of a text, cached: a hundred robots of a kind decode their body once."""
-    return msgspec.toml.decode(text, type=structure, strict=False)
+    return convert_toml(text, cast(type[object], structure), strict=False)
 
 
 def _line_of(text: str, message: str) -> str:

@@ -27,6 +27,7 @@ STAIR_STEPS_MAX = 30
 Positive = Annotated[float, Meta(gt=0, le=1000)]
 NotNegative = Annotated[float, Meta(ge=0, le=1000)]
 Coordinate = Annotated[float, Meta(ge=-10_000, le=10_000)]
+Degrees = Annotated[float, Meta(ge=-3600, le=3600)]
 Spot = tuple[Coordinate, Coordinate]
 TagNumber = Annotated[int, Meta(ge=0, le=APRIL_MAX)]
 Material = Literal["plain", "glass", "mirror"]
@@ -60,7 +61,7 @@ class Box(Struct, frozen=True, forbid_unknown_fields=True, tag="box", tag_field=
 
     at: Spot
     size: tuple[Positive, Positive, Positive]
-    facing: float = 0.0
+    facing: Degrees = 0.0
     base: NotNegative = 0.0
     material: Material = "plain"
 
@@ -81,7 +82,7 @@ class Dock(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     at: Spot
-    facing: float = 0.0
+    facing: Degrees = 0.0
     tag: TagNumber | None = None
 
     @property
@@ -104,7 +105,7 @@ class Shelf(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     at: Spot
-    facing: float = 0.0
+    facing: Degrees = 0.0
     size: tuple[Positive, Positive] = (0.9, 0.9)
     clearance: Positive = 1.0
     height: Positive = 1.6
@@ -124,7 +125,7 @@ class Person(Struct, frozen=True, forbid_unknown_fields=True):
     radius: Annotated[float, Meta(gt=0.05, le=0.5)] = 0.22
     height: Annotated[float, Meta(gt=0.5, le=2.5)] = 1.72
     name: Annotated[str, Meta(max_length=50)] = ""
-    facing: float | None = None
+    facing: Degrees | None = None
     age: Annotated[float, Meta(ge=1, le=120)] = 35.0
     emotion: Emotion = Emotion.NEUTRAL
     voice: Annotated[float, Meta(ge=60, le=500)] = 150.0
@@ -179,7 +180,7 @@ class Georeference(Struct, frozen=True, forbid_unknown_fields=True):
     latitude: Annotated[float, Meta(ge=-89, le=89)]
     longitude: Annotated[float, Meta(ge=-180, le=180)]
     altitude: Annotated[float, Meta(ge=-500, le=9000)] = 0.0
-    north: float = 90.0
+    north: Degrees = 90.0
 
 
 class Marker(Struct, frozen=True, forbid_unknown_fields=True):
@@ -189,7 +190,7 @@ class Marker(Struct, frozen=True, forbid_unknown_fields=True):
     symbol: Annotated[
         str, Meta(min_length=1, max_length=8, pattern="^([0-9A-Z?]{1,3}|heart|stop|left|right|forward|backward)$")
     ]
-    facing: float = 0.0
+    facing: Degrees = 0.0
     height: NotNegative = 0.5
     size: Annotated[float, Meta(gt=0.02, le=2)] = 0.3
     colour: Colour = "red"
@@ -201,7 +202,7 @@ class Tag(Struct, frozen=True, forbid_unknown_fields=True):
     at: Spot
     text: Annotated[str, Meta(min_length=1, max_length=100)]
     kind: TagKind = TagKind.APRIL
-    facing: float = 0.0
+    facing: Degrees = 0.0
     height: NotNegative = 0.4
     size: Annotated[float, Meta(gt=0.02, le=2)] = 0.16
 
@@ -210,7 +211,7 @@ class Reflector(Struct, frozen=True, forbid_unknown_fields=True):
     """A vertical strip of reflecting foil from height ``base`` to ``top``, m."""
 
     at: Spot
-    facing: float = 0.0
+    facing: Degrees = 0.0
     width: Annotated[float, Meta(gt=0.01, le=1)] = 0.1
     base: NotNegative = 0.1
     top: Positive = 0.7
@@ -233,7 +234,7 @@ class Terrain(Struct, frozen=True, forbid_unknown_fields=True):
     at: Spot
     profile: Annotated[tuple[tuple[NotNegative, NotNegative], ...], Meta(min_length=2, max_length=50)]
     width: Positive = 1.0
-    facing: float = 0.0
+    facing: Degrees = 0.0
     grip: Annotated[float, Meta(ge=0, le=2)] = 1.0
 
 
@@ -248,7 +249,7 @@ class Stairs(Struct, frozen=True, forbid_unknown_fields=True):
     rise: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.15
     run: Annotated[float, Meta(ge=0.1, le=2)] = 0.3
     width: Positive = 1.0
-    facing: float = 0.0
+    facing: Degrees = 0.0
     landing: NotNegative = 1.0
 
     @property
@@ -284,7 +285,7 @@ class Start(Struct, frozen=True, forbid_unknown_fields=True):
     """Start of the first robot, instead of a dock."""
 
     at: Spot
-    facing: float = 0.0
+    facing: Degrees = 0.0
     floor: Annotated[int, Meta(ge=0, lt=FLOORS_MAX)] = 0
 
 
@@ -297,7 +298,7 @@ class Lift(Struct, frozen=True, forbid_unknown_fields=True):
 
     at: Spot
     size: tuple[Positive, Positive] = (1.6, 1.6)
-    facing: float = 0.0
+    facing: Degrees = 0.0
     door_width: Positive = 1.0
     parked_at: Annotated[int, Meta(ge=0, lt=FLOORS_MAX)] = 0
     speed: Annotated[float, Meta(gt=0, le=10)] = 1.0

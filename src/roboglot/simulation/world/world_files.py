@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.building.rectangles import cover
-from roboglot.simulation.world.declarations import FILE_BYTES_MAX, BadFile, read_toml
+from roboglot.simulation.world.declarations import BadFile, read_toml
 from roboglot.simulation.world.description import (
     SOLIDS_MAX,
     AccessPoint,
     Box,
+    Coordinate,
     Dock,
     Floor,
     Spot,
@@ -29,10 +30,13 @@ from roboglot.simulation.world.description import (
 )
 from roboglot.simulation.world.description_checks import completed
 from roboglot.spelling import instead
+from roboglot.text_files import in_bounds
 from roboglot.validation import why_invalid
 
 WORLDS = Path(__file__).parent.parent / "worlds"
 CELLS_MAX = 16_000_000
+ROS_MAP_BYTES_MAX = 64 << 10  # of the yaml, which has six fields
+IMAGES = ("PPM", "PNG", "BMP", "GIF", "JPEG", "TIFF")  # not EPS, which Pillow has Ghostscript run as a program
 HEIGHT = 2.5
 WALL_LENGTH = 1.0  # m from which a solid counts as a wall rather than an object
 ROOM = (2.0, 1.5, 1.0, 0.75, 0.6, 0.5)  # m of free floor around a robot that leaves its dock; the first that exists
@@ -46,7 +50,7 @@ class RosMap(Struct, frozen=True):
 
     image: str
     resolution: Annotated[float, Meta(gt=0.001, le=1.0)]
-    origin: tuple[float, float, float]
+    origin: tuple[Coordinate, Coordinate, float]
     occupied_thresh: Annotated[float, Meta(ge=0, le=1)]
     free_thresh: Annotated[float, Meta(ge=0, le=1)]
     negate: Literal[0, 1] = 0
@@ -107,15 +111,19 @@ def _read(path: Path) -> RosMap:
     import yaml
 
     try:
-        if path.stat().st_size > FILE_BYTES_MAX:
-            raise BadFile(f"{path}: larger than {FILE_BYTES_MAX} bytes")
-        ros_map = msgspec.convert(yaml.safe_load(path.read_text(encoding="utf-8")), RosMap, strict=False)
+        if path.stat().st_size > ROS_MAP_BYTES_MAX:
+            raise BadFile(f"{path}: larger than {ROS_MAP_BYTES_MAX} bytes")
+        with in_bounds():
+            values = yaml.safe_load(path.read_text(encoding="utf-8"))
+        ros_map = msgspec.convert(values, RosMap, strict=False)
     except OSError as error:
         raise BadFile(f"{path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise BadFile(f"{path}: not YAML: {error}") from None
     except msgspec.ValidationError as error:
         raise BadFile(f"{path}: not a ROS map: {why_invalid(error, wanted=RosMap)}") from None
+    except BadFile:
+        raise
+    except (yaml.YAMLError, ValueError) as error:
+        raise BadFile(f"{path}: not YAML: {error}") from None
     if ros_map.origin[2]:
         raise BadFile(f"{path}: origin has a yaw of {ros_map.origin[2]}; only maps with yaw 0 can be imported")
     if ros_map.free_thresh >= ros_map.occupied_thresh:
@@ -130,14 +138,18 @@ def _pixels(path: Path) -> NDArray[np.float64]:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        if path.exists() and not path.is_file():
+            raise BadFile(f"{path}: not a file")
+        with Image.open(path, formats=IMAGES) as image:
             if image.width * image.height > CELLS_MAX:
                 raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than {CELLS_MAX}")
             return np.asarray(image.convert("L"), dtype=np.float64)[::-1]
     except OSError as error:
         reason = "not an image" if isinstance(error, UnidentifiedImageError) else error.strerror or str(error)
         raise BadFile(f"{path}: {reason}") from None
-    except Image.DecompressionBombError as error:
+    except BadFile:
+        raise
+    except (Image.DecompressionBombError, ValueError, SyntaxError) as error:
         raise BadFile(f"{path}: {error}") from None
 
 

@@ -13,6 +13,7 @@ import msgspec
 
 from roboglot.spelling import instead
 from roboglot.testing.requirements import SPEED, Wanted, WantedFault
+from roboglot.text_files import in_bounds
 from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 
@@ -212,13 +213,14 @@ def read(path: Path) -> Found:
     try:
         if path.stat().st_size > BYTES_MAX:
             raise BadScenario(f"longer than {BYTES_MAX} bytes")
-        values = read_yaml(path.read_text(encoding="utf-8"))
+        with in_bounds():
+            values = read_yaml(path.read_text(encoding="utf-8"))
         if isinstance(values, dict):
             values.pop("$schema", None)
         scenario = msgspec.convert(values, Scenario)
         _check(scenario)
         scenario.given.wanted(path.parent)
-    except (OSError, UnicodeDecodeError, YAMLError, msgspec.ValidationError, BadScenario, RecursionError) as error:
+    except (OSError, ValueError, YAMLError, BadScenario) as error:
         spoken = isinstance(error, OSError) and error.strerror
         why = spoken or why_invalid(error, "the file", wanted=Scenario)
         raise BadScenario(f"{path}: {' '.join(why.split())}") from None
