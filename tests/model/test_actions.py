@@ -158,3 +158,16 @@ async def test_the_last_twenty_are_remembered(actions: Actions) -> None:
     assert actions.get(HISTORY_MAX + 5).status is ActionStatus.SUCCEEDED
     with pytest.raises(NotFound):
         actions.get(5)
+
+
+async def test_one_that_has_returned_serves_no_request(actions: Actions) -> None:
+    """Its status still shows it running when a request comes in the very turn in which its code returns."""
+    seen: list[tuple[ActionStatus, bool]] = []
+
+    async def run(action: Action) -> None:
+        look = lambda: seen.append((action.status, action.may_go_on("door")))  # noqa: E731
+        look()
+        asyncio.get_running_loop().call_soon(look)
+
+    await actions.start("drive", run, resources={"base"}, source="door").done()
+    assert seen == [(ActionStatus.EXECUTING, True), (ActionStatus.EXECUTING, False)]

@@ -124,9 +124,12 @@ class Action:
             self._owner.announce(self)
 
     def may_go_on(self, source: str) -> bool:
-        """True if this action can serve a new request of ``source``: it runs and comes from the same client."""
+        """True if this action can serve a new request of ``source``: it runs and comes from the same client.
+
+        False as soon as its code has returned, which the status shows only in the loop's next turn.
+        """
         going = self.status in (ActionStatus.ACCEPTED, ActionStatus.EXECUTING)
-        return going and (self.source, self.client) == (source, client())
+        return going and not (self._task and self._task.done()) and (self.source, self.client) == (source, client())
 
     def report(self, feedback: object) -> None:
         """Publish progress, from the action's own code; the same feedback twice in a row is published once."""
