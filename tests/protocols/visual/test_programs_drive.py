@@ -137,3 +137,31 @@ async def test_save_of_waiting_task_names_the_way_out(connect: Connect, robot: R
     answer = await app.save("t", "print(2)\n")
     assert answer["state"] == 27
     assert answer["describe"].endswith("t is in run_wait. It waits for its time: shut it down first.")
+
+
+ENDLESS = """
+while True:
+    cyberdog.motion.go_straight(0.4, 0, 0)
+"""
+POLLING = """
+calls, began = 0, time.monotonic()
+while time.monotonic() < began + 1:
+    calls += 1
+print(calls)
+"""
+
+
+async def test_endless_calls_let_lockstep_time_pass(connect: Connect, robot: Robot, world: World) -> None:
+    """A call that waits for nothing takes a millisecond, as on a real robot, or time would stand."""
+    app = await connect(robot)
+    before = world.truth.pose_of("a")
+    await app.start("t", ENDLESS)
+    await app.clock.advance(2.0)
+    assert world.truth.pose_of("a").distance_to(before) > 0.5
+    await app.ask("shutdown", "t")
+
+
+async def test_polling_program_ends_in_lockstep(app: FrontEnd) -> None:
+    await app.start("t", POLLING)
+    await app.ends("t", pace=0.5)
+    assert await app.printed("t") == ["999"]  # and one before the loop

@@ -30,6 +30,7 @@ from roboglot.programs.language.places import Step
 from roboglot.programs.library.modules import HEADER_LINES
 from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks.block_stops import MARKS, BlockStops
+from roboglot.programs.tasks.call_time import CallTime
 from roboglot.programs.tasks.control import ControlWatch
 from roboglot.programs.tasks.process_time import ProcessTime
 from roboglot.programs.tasks.replay import Replay
@@ -119,6 +120,7 @@ class TaskRun:
         run.noticed = notice
         self.control = ControlWatch(robot, f"visual {task.id}", lambda text: self.log.write("error", text))
         self.time = ProcessTime(robot.clock)
+        self._call_time = CallTime(robot.clock, self._session.sleep)
 
     @property
     def line(self) -> int:
@@ -285,6 +287,7 @@ class TaskRun:
         if request.interrupted:
             value = await call_cut_off(self._session, request.name, request.args, request.kwargs)
         else:
+            await self._call_time.begin()
             with self._clock.holding():
                 await self._journal.begin(request.name)
             value = await call_function(self._session, request.name, request.args, request.kwargs)
