@@ -13,11 +13,12 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, InvalidGoal, NotLocalized, Unreachable
 from roboglot.model.events import ActionChanged, LocalizationLost, LocalizationRecovered
-from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
+from roboglot.model.geometry import ORIGIN, Point, Pose, Twist, wrap_angle
 from roboglot.model.maps import OccupancyGrid
 from roboglot.testing import assert_pose
 from tests.narrowing import of_kind
@@ -264,6 +265,23 @@ async def test_navigation_gives_up_on_a_foreign_map(tour: Tour) -> None:
     assert isinstance(action.error, NotLocalized), action.reason
     assert tour.robot[Localization].lost is not None
     assert tour.world.truth.pose_of("a").distance_to(tour.start) < 2.0  # it stopped soon after
+
+
+@pytest.mark.world("empty")
+async def test_drive_ends_with_its_map(tour: Tour) -> None:
+    """On a map with another origin its goal is elsewhere; a map that grew in its frame changes nothing."""
+    drive = tour.head_for((8.0, 5.0))
+    await tour.clock.advance(3.0)
+    mapping = tour.robot[Mapping]
+    tour.robot[Docking].set_home(Pose(1.0, 0.5))
+    mapping.load(mapping.grid, tour.robot[Localization].pose, origin=ORIGIN)
+    await tour.clock.advance(0.5)
+    assert tour.robot[Base].velocity.speed > 0.1
+    assert tour.robot[Docking].home == Pose(1.0, 0.5)
+    mapping.clear()
+    await tour.end_of(drive)
+    assert isinstance(drive.error, Unreachable), drive.reason
+    assert tour.robot[Base].velocity.speed < 0.01
 
 
 @pytest.mark.world("empty")

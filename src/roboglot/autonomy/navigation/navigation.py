@@ -19,7 +19,8 @@ from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
-from roboglot.model.geometry import POSITION_MAX, Path, Point
+from roboglot.model.events import MapReplaced
+from roboglot.model.geometry import ORIGIN, POSITION_MAX, Path, Point
 from roboglot.model.robot import Robot
 
 GOALS_MAX = 500
@@ -55,9 +56,24 @@ class GridNavigation(Navigation):
     ) -> None:
         """Drive to the goals, with retries, within an action that holds the base. Raises Blocked, Unreachable.
 
-        ``journey`` counts the goals passed, even if the drive fails.
+        ``journey`` counts the goals passed, even if the drive fails. The action is aborted if the map is replaced: on
+        another map the goals are elsewhere.
         """
-        tries_left, journey = goal.options.retries, journey or Journey()
+
+        def check_map(event: MapReplaced) -> None:
+            if event.origin != ORIGIN:
+                action.abort(Unreachable("the map was replaced, and with it the goal's place"))
+
+        end_watch = self._robot.events.listen(MapReplaced, check_map)
+        try:
+            await self._drive(action, goal, report, journey or Journey())
+        finally:
+            end_watch()
+
+    async def _drive(
+        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], journey: Journey
+    ) -> None:
+        tries_left = goal.options.retries
         while True:
             try:
                 await self._attempt(action, goal, report, journey)

@@ -51,12 +51,12 @@ class LidarMapping(Mapping):
         self._belief.forget_map()
         self._robot.events.publish(MapReplaced(stamp=self._robot.clock.time(), origin=origin))
 
-    def load(self, grid: OccupancyGrid, pose: Pose) -> None:
+    def load(self, grid: OccupancyGrid, pose: Pose, *, origin: Pose | None = None) -> None:
         if not all(map(math.isfinite, (pose.x, pose.y, pose.yaw))):
             raise InvalidGoal(f"not a place on this map: {pose}")
         self._belief.take_map(evidence_of(grid), pose)
         now = self._robot.clock.time()
-        self._robot.events.publish(MapReplaced(stamp=now))
+        self._robot.events.publish(MapReplaced(stamp=now, origin=origin))
         self._robot.events.publish(PoseJumped(stamp=now, pose=pose, given=True))
 
     def move_origin(self, point: Point) -> Point:

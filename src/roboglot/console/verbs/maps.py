@@ -22,7 +22,7 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.errors import NotFound, Refused
-from roboglot.model.geometry import Point, Pose
+from roboglot.model.geometry import ORIGIN, Point, Pose
 from roboglot.model.map_loading import known_dock
 from roboglot.model.map_loading import load_map as take_into_use
 from roboglot.model.map_merging import aligned, merged
@@ -138,7 +138,7 @@ async def merge_map(robot: Robot, *, map: Name, x: Meters = 0.0, y: Meters = 0.0
     if not here.width:
         raise Refused("the map is empty")
     place, grid = await asyncio.to_thread(_both, here, stored.grid, Pose(x, y, yaw))
-    robot[Mapping].load(grid, robot[Localization].pose)
+    robot[Mapping].load(grid, robot[Localization].pose, origin=ORIGIN)
     return Placed(place.x, place.y, place.yaw)
 
 

@@ -135,7 +135,7 @@ class SlamwareMapping(ReportedMapping):
 
         self._supervisor.send("clearing the map", clear())
 
-    def load(self, grid: OccupancyGrid, pose: Pose) -> None:
+    def load(self, grid: OccupancyGrid, pose: Pose, *, origin: Pose | None = None) -> None:
         if grid.width * grid.height > CELLS_MAX:
             raise InvalidGoal(f"a map has at most {CELLS_MAX} cells")
 

@@ -45,10 +45,11 @@ class Mapping(Component):
         """Delete the map; the robot's pose becomes the new origin. Publishes ``MapReplaced``."""
 
     @abstractmethod
-    def load(self, grid: OccupancyGrid, pose: Pose) -> None:
+    def load(self, grid: OccupancyGrid, pose: Pose, *, origin: Pose | None = None) -> None:
         """Replace the map by ``grid``, with the robot at ``pose``, or near enough for the lidar to correct it.
 
-        Its cells are resampled to this map's. Raises InvalidGoal if it is too large. Publishes ``MapReplaced``.
+        ``origin``: of the new map in the old one, if they are related. Its cells are resampled to this map's. Raises
+        InvalidGoal if it is too large. Publishes ``MapReplaced``.
         """
 
     @abstractmethod

@@ -29,7 +29,7 @@ class CyberDogMapping(ReportedMapping):
     def clear(self) -> None:
         raise Refused("this robot's map belongs to its app")
 
-    def load(self, grid: OccupancyGrid, pose: Pose) -> None:
+    def load(self, grid: OccupancyGrid, pose: Pose, *, origin: Pose | None = None) -> None:
         raise Refused("this robot's map belongs to its app")
 
     def move_origin(self, point: Point) -> Point:
