@@ -31,6 +31,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
 from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, before, home_dock, known_docks, settle_home
+from roboglot.protocols.slamware.chapters.slam.clearing import Clearing
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.protocols.slamware.chapters.slam.last_place import PlaceMemory, is_docked, last_place
 from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
@@ -61,6 +62,7 @@ class MapKeeper:
         self._loaded = ""  # the digest of that file
         self.current = FloorName()
         self.place = PlaceMemory(robot, lambda: _frame_on_disk(robot))
+        self.clearing = Clearing(robot, self._on_map_cleared)
 
     @property
     def start_floor(self) -> FloorMap | None:
@@ -81,6 +83,7 @@ class MapKeeper:
             pass
         except RobotError as error:
             log.warning("cannot load the saved map of robot %s: %s", self._robot.id, error)
+        self.clearing.start()
         self.place.start()
 
     @property
@@ -223,7 +226,7 @@ class MapKeeper:
         if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
             self._robot[Localization].set_pose(dock.pose if is_docked(self._robot) else before(dock))
 
-    async def on_map_cleared(self, origin: Pose) -> None:
+    async def _on_map_cleared(self, origin: Pose) -> None:
         """Handle the clearing of memory's grid: its origin is now at ``origin``, from which drawings are given.
 
         The manual clears the map only, and has operations of its own for each kind of drawing. Further drawings

@@ -1,0 +1,65 @@
+"""Clearing of the map in memory, by this door or another: what is drawn stays where it is, in new coordinates."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import MapMemory
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.errors import RobotError
+from roboglot.model.events import MapReplaced
+from roboglot.model.geometry import Pose
+from roboglot.model.robot import Robot
+
+log = logging.getLogger(__name__)
+
+
+class Clearing:
+    """Has ``move`` take the drawings along to the origin of each map that begins where the robot stands."""
+
+    def __init__(self, robot: Robot, move: Callable[[Pose], Awaitable[None]]) -> None:
+        self._robot, self._move = robot, move
+        self._waited_for = False  # this door clears the map, and waits for the drawings
+        self._moving: asyncio.Task[None] | None = None
+        self._end_watch: Callable[[], None] | None = None
+
+    def start(self) -> None:
+        """Begin to follow other doors, unless that has begun."""
+        if self._end_watch is None and MapMemory in self._robot:
+            self._end_watch = self._robot.events.listen(MapReplaced, self._replaced)
+
+    async def close(self) -> None:
+        """Finish moving drawings."""
+        if self._end_watch is not None:
+            self._end_watch()
+        if self._moving is not None:
+            await asyncio.wait([self._moving])
+
+    async def clear(self) -> None:
+        """Clear the map and begin a new one where the robot is; return once the drawings are on it."""
+        origin = self._robot[Localization].pose
+        self._waited_for = True
+        try:
+            self._robot[Mapping].clear()
+        finally:
+            self._waited_for = False
+        await self._move(origin)
+
+    def _replaced(self, event: MapReplaced) -> None:
+        origin = event.origin
+        if origin is None or self._waited_for or self._robot[Mapping].grid.width:
+            return
+        before = self._moving
+
+        async def move() -> None:
+            if before is not None:
+                await asyncio.wait([before])
+            try:
+                await self._move(origin)
+            except RobotError as error:
+                log.warning("cannot move the drawings of robot %s to the new map: %s", self._robot.id, error)
+
+        self._moving = asyncio.get_running_loop().create_task(move(), name="drawings move to a new map")
