@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import random
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
@@ -14,7 +16,7 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from roboglot.access.store import AccessStore, open_store
+from roboglot.access.store import AccessStore, Grant, open_store
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols.cyberdog.certificates import export_app
 from roboglot.runtime import Runtime
@@ -26,6 +28,8 @@ from tests.access.matrix import ADDRESS, CALLERS, TextCaller, frame_states, open
 DRIVER = next(caller for caller in CALLERS if caller.name == "drive")
 PROGRAMMER = next(caller for caller in CALLERS if caller.name == "program")
 Gone = Callable[[], Awaitable[bool]]
+Way = Callable[[Runtime, Path], AbstractAsyncContextManager[tuple[str, Gone]]]
+LASTS = 3600.0  # s for which a right is given
 
 
 @asynccontextmanager
@@ -38,7 +42,7 @@ async def by_rest(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone
 
         async def gone() -> bool:
             try:
-                return (await client.post("/api/core/motion/v1/actions", json=go)).status_code == 401
+                return (await client.post("/api/core/motion/v1/actions", json=go)).status_code in (401, 403)
             except httpx.TransportError:  # the connection was closed
                 return False
 
@@ -130,22 +134,62 @@ async def hold(page: ClientConnection) -> None:
         pass
 
 
-@pytest.mark.parametrize("way", [by_rest, by_text, by_gait, by_program, by_hand])
-async def test_actions_of_a_revoked_client_stop(
-    way: Callable[[Runtime, Path], AbstractAsyncContextManager[tuple[str, Gone]]],
-    runtime: Runtime,
-    store: AccessStore,
-    data: Path,
+WAYS: list[Way] = [by_rest, by_text, by_gait, by_program, by_hand]
+
+
+@pytest.mark.parametrize("way", WAYS)
+async def test_actions_of_a_revoked_client_stop(way: Way, runtime: Runtime, store: AccessStore, data: Path) -> None:
+    await check_it_stops(way, revoke, runtime, data)
+
+
+@pytest.mark.parametrize(
+    "way", [by_gait, *(pytest.param(way, marks=pytest.mark.slow) for way in WAYS if way != by_gait)]
+)
+async def test_actions_of_a_client_whose_right_expires_stop(
+    way: Way, runtime: Runtime, store: AccessStore, data: Path
 ) -> None:
+    until = time.time() + LASTS
+    store.allow(DRIVER.address, [Grant("a", DRIVER.rights, until)])
+    store.allow(PROGRAMMER.address, [Grant("a", PROGRAMMER.rights, until)])
+    store.add_app("drive", [Grant("a", DRIVER.rights, until)])
+    await check_it_stops(way, expire, runtime, data)
+
+
+@pytest.mark.slow  # further moments; the tests above have one each
+@pytest.mark.parametrize("seed", range(15))
+async def test_right_that_ends_at_any_moment(seed: int, runtime: Runtime, store: AccessStore, data: Path) -> None:
+    draw = random.Random(seed)
+    await check_it_stops(
+        WAYS[seed % len(WAYS)], revoke, runtime, data, later=draw.choice([0.02, 0.3, draw.uniform(0, 6)])
+    )
+
+
+def revoke(_: Runtime, data: Path, who: str) -> None:
+    other = open_store(data)  # as `roboglot access revoke` does in its own process
+    other.revoke(who)
+    other.close()
+
+
+def expire(runtime: Runtime, _: Path, __: str) -> None:
+    assert runtime.guard is not None
+    runtime.guard.now = lambda: time.time() + 2 * LASTS
+
+
+async def check_it_stops(
+    way: Way, end: Callable[[Runtime, Path, str], None], runtime: Runtime, data: Path, *, later: float = 0.0
+) -> None:
+    """Assert that what a client has the robot do stops with its right, which ends ``later`` s after it began."""
     clock, robot = runtime.clock, runtime.fleet.robots["a"]
     assert isinstance(clock, LockstepClock)
     async with way(runtime, data) as (who, gone), asyncio.timeout(60.0):
         while not any(action.identity == who for action in robot.actions.running()):
             await clock.advance(0.05)
             await asyncio.sleep(0.005)
-        other = open_store(data)  # as `roboglot access revoke` does in its own process
-        other.revoke(who)
-        other.close()
+        while later > 0.0:
+            await clock.advance(min(0.05, later))
+            await asyncio.sleep(0.005)
+            later -= 0.05
+        end(runtime, data, who)
         closing = asyncio.ensure_future(until(gone))
         while robot.actions.running() or not closing.done():
             await clock.advance(0.05)
