@@ -125,6 +125,18 @@ async def test_a_large_head_in_one_piece_is_refused(port: int) -> None:
     writer.close()
 
 
+async def test_headers_after_a_body_are_bounded(port: int) -> None:
+    """The parser hands over trailers as headers, and they were all kept: 200 MB for 12 MB."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    chunked = REQUEST.replace(b"Content-Length: 2", b"Transfer-Encoding: chunked").removesuffix(b"{}")
+    assert chunked != REQUEST
+    writer.write(chunked + b"2\r\n{}\r\n0\r\n" + HEAD_MAX // 4 * b"x:y\r\n")
+    with contextlib.suppress(ConnectionError):
+        answered = await asyncio.wait_for(reader.read(), PATIENCE)
+        assert not answered or answered.startswith(b"HTTP/1.1 400 ")
+    writer.close()
+
+
 async def test_large_requests_one_behind_other_are_no_head(port: int) -> None:
     body = b" " * (2 * HEAD_MAX)
     request = REQUEST.replace(b"th: 2", b"th: %d" % len(body)).removesuffix(b"{}") + body

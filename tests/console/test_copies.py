@@ -43,6 +43,13 @@ def test_rest_becomes_curl_with_its_body() -> None:
     assert words[-2:] == ['{"it\'s": "quoted"}', "http://127.0.0.1:1448/api/x?y=1"]
 
 
+def test_curl_reads_no_file_and_expands_nothing() -> None:
+    """A body ``@FILE`` would send that file, and brackets in a path would become many requests."""
+    words = shlex.split(copy(request("slamware", "POST /x", b"POST /x/[1-9999999]\n\n@/etc/passwd"), "curl", REST))
+    assert words[words.index("@/etc/passwd") - 1] == "--data-raw"
+    assert "--globoff" in words
+
+
 def test_text_becomes_netcat_in_sdk_mode() -> None:
     line = copy(request("robomaster", "chassis move", b"chassis move x 0.5"), "nc", TEXT)
     assert line == "printf '%s' 'command;chassis move x 0.5;' | nc -w 5 127.0.0.1 40923"

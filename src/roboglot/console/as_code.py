@@ -72,11 +72,11 @@ def rest(payload: bytes) -> Request:
 
 
 def _curl(request: Request, address: str) -> str:
-    parts = ["curl", "-sS"]
+    parts = ["curl", "-sS"] if not set("[]{}") & set(request.path) else ["curl", "-sS", "--globoff"]
     if request.method != "GET":
         parts += ["-X", request.method]
     if request.body:
-        parts += ["-H", "Content-Type: application/json", "-d", readable(request.body)]
+        parts += ["-H", "Content-Type: application/json", "--data-raw", readable(request.body)]
     return shlex.join([*parts, address + request.path])
 
 

@@ -134,6 +134,9 @@ class Pieces(asyncio.Transport):
         super().__init__()
         self.all: list[bytes] = []
 
+    def is_closing(self) -> bool:
+        return False
+
     def write(self, data: bytes | bytearray | memoryview) -> None:
         self.all.append(bytes(data))
 

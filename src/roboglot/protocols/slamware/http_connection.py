@@ -23,6 +23,7 @@ from uvicorn.server import ServerState
 from roboglot.protocols.slamware.bodies import Scope
 from roboglot.protocols.slamware.config import CONNECTIONS_MAX
 from roboglot.protocols.slamware.errors import REASON
+from roboglot.transport.outlet import Outlet
 
 HEAD_MAX = 32 * 1024  # bytes of a request's line and headers
 PIECE = 1 << 20  # bytes of a body
@@ -49,7 +50,7 @@ class Answering(Protocol):
         """Return a function that returns the whole response to a repetition, or None if that must be parsed."""
 
 
-class ReasonTransport(asyncio.Transport):
+class ReasonTransport(Outlet):
     """Transport that moves the header REASON of a response into its status line.
 
     It keeps the head of a response until the loop's next turn, to send it with the body: one write and one packet are
@@ -57,28 +58,12 @@ class ReasonTransport(asyncio.Transport):
     """
 
     def __init__(self, transport: asyncio.Transport) -> None:
-        super().__init__()
-        self._inner = transport
+        super().__init__(transport)
         self._head = b""
-
-    def is_closing(self) -> bool:
-        return self._inner.is_closing()
 
     def close(self) -> None:
         self.flush()
-        self._inner.close()
-
-    def abort(self) -> None:
-        self._inner.abort()
-
-    def pause_reading(self) -> None:
-        self._inner.pause_reading()
-
-    def resume_reading(self) -> None:
-        self._inner.resume_reading()
-
-    def get_extra_info(self, name: str, default: object = None) -> object:
-        return self._inner.get_extra_info(name, default)
+        super().close()
 
     def write(self, data: bytes | bytearray | memoryview[object]) -> None:
         """Send ``data``; keep a response's head, which is always one piece, until its body comes."""
@@ -88,21 +73,21 @@ class ReasonTransport(asyncio.Transport):
             asyncio.get_running_loop().call_soon(self.flush)  # if the body comes later
         elif self._head and len(data) <= JOINED_MAX:
             head, self._head = self._head, b""
-            self._inner.write(head + data)
+            super().write(head + data)
         else:
             self.flush()
-            self._inner.write(data)
+            super().write(data)
 
     def send(self, response: bytes) -> None:
         """Send a whole response."""
         self.flush()
-        self._inner.write(response)
+        super().write(response)
 
     def flush(self) -> None:
         """Send a head whose response has no body, or a large one."""
         if self._head:
             head, self._head = self._head, b""
-            self._inner.write(head)
+            super().write(head)
 
 
 def with_reason(head: bytes) -> bytes:

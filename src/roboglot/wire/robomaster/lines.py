@@ -34,6 +34,8 @@ class LineSplitter:
         """
         *complete, tail = data.split(END)
         for part in complete:
+            if (not part or part.isspace()) and not (self._tail or self._overlong):  # quickly: they may be a flood
+                continue
             text = self._finish(part)
             if text != "":
                 yield text
