@@ -27,7 +27,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))  # the tests' PostgreSQL serv
 
 from roboglot.shards.messages import Beat, Ready, encode, pair
 from roboglot.shards.plan import FleetPlan, plan_fleet
-from roboglot.shards.supervisor import State, Supervisor
+from roboglot.shards.states import State
+from roboglot.shards.supervisor import Supervisor
 from roboglot.storage.dead_programs import Silence
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry
@@ -106,7 +107,7 @@ async def coordinate(
     with tempfile.TemporaryDirectory() as folder:
         supervisor = Listening(plan, Path(folder))
         supervisor.adopt(links)
-        await supervisor.until(lambda: all(shard.state is State.READY for shard in supervisor.shards.values()))
+        await supervisor.shards.until(lambda: all(shard.state is State.READY for shard in supervisor.shards.values()))
         silence = asyncio.create_task(Silence(Homes(database), robots).look_always())
         await asyncio.sleep(2.0)
         server, own, began = used_by("postgres"), time.process_time(), time.monotonic()
@@ -147,7 +148,7 @@ def look_by_ray(claims: Claims, plan: FleetPlan, seconds: float) -> None:
     class Asking(ClusterFleet):
         def _begin(self, shard: object) -> None:
             self._actors[shard.plan.name] = actor  # type: ignore[attr-defined]
-            self._turn_to(shard, State.STARTING)  # type: ignore[arg-type]
+            self.shards.turn_to(shard, State.STARTING)  # type: ignore[arg-type]
 
     async def look() -> float:
         with tempfile.TemporaryDirectory() as folder:

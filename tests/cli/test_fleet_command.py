@@ -11,7 +11,7 @@ from roboglot.cli import fleet
 from roboglot.shards import forking
 from roboglot.shards.plan import PLAN, plan_fleet, save
 from roboglot.shards.requests import Answer, RobotRow, Row
-from roboglot.shards.supervisor import Shard, State
+from roboglot.shards.states import Shard, State
 from roboglot.testing.addresses import free_addresses
 
 TEMPLATE = 'world = "moon"\n'

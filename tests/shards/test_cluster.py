@@ -23,7 +23,7 @@ from ray.cluster_utils import Cluster
 
 from roboglot.shards.cluster import ClusterFleet, _answer, join, joined, own_token, refuse_unfenced
 from roboglot.shards.plan import plan_fleet
-from roboglot.shards.supervisor import State
+from roboglot.shards.states import State
 from roboglot.storage.homes import Home, Homes
 from roboglot.storage.opening import open_registry
 from roboglot.testing.addresses import free_addresses
@@ -99,7 +99,7 @@ async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster
             began = time.monotonic()
             cluster.remove_node(nodes[victim], allow_graceful=False)
             moved = [shard for name, shard in fleet.shards.items() if where[name] == victim]
-            await fleet.until(
+            await fleet.shards.until(
                 lambda: all(s.state is State.READY and fleet._nodes.get(s.plan.name) != victim for s in moved)
             )
             print(f"robots of a killed node are back after {time.monotonic() - began:.1f} s")

@@ -19,7 +19,7 @@ from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.overview import PAGE, SEEN_MAX, Overview
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.snapshots import Snapshots
-from roboglot.shards.supervisor import Shard, State
+from roboglot.shards.states import Shard, State
 from roboglot.transport import http as connections
 
 PICTURE = b"\x89PNG"

@@ -14,7 +14,8 @@ import pytest
 from roboglot.shards import supervisor as module
 from roboglot.shards.messages import Beat, News, Ready, Refusal, encode, pair
 from roboglot.shards.plan import plan_fleet
-from roboglot.shards.supervisor import STARTING_MAX, Shard, State, Supervisor
+from roboglot.shards.states import Shard, State
+from roboglot.shards.supervisor import STARTING_MAX, Supervisor
 
 
 class Forks:
@@ -59,7 +60,7 @@ async def supervisor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIt
     monkeypatch.setattr(module, "Forks", Forks)
     made = Supervisor(plan_fleet(STARTING_MAX + 2, 1, {}, tmp_path), tmp_path, memory_max=100 << 20)
     starting = asyncio.create_task(made.start())
-    await made.until(lambda: forks(made).forked != [])
+    await made.shards.until(lambda: forks(made).forked != [])
     yield made
     starting.cancel()
     await made.close()
@@ -79,7 +80,7 @@ async def test_few_start_at_a_time_then_the_next(supervisor: Supervisor) -> None
     states = [shard.state for shard in supervisor.shards.values()]
     assert states == [State.STARTING] * STARTING_MAX + [State.WAITING] * 2
     forks(supervisor).say(1, Ready({}))
-    await supervisor.until(lambda: len(forks(supervisor).forked) == STARTING_MAX + 1)
+    await supervisor.shards.until(lambda: len(forks(supervisor).forked) == STARTING_MAX + 1)
     assert [shard.state for shard in supervisor.shards.values()].count(State.STARTING) == STARTING_MAX
 
 
@@ -88,7 +89,7 @@ async def test_dead_one_returns_at_growing_distances(
 ) -> None:
     monkeypatch.setattr(module, "PAUSES", (0.0, 3600.0))
     forks(supervisor).die(1, -signal.SIGKILL)
-    await supervisor.until(lambda: forks(supervisor).forked.count(1) == 2)
+    await supervisor.shards.until(lambda: forks(supervisor).forked.count(1) == 2)
     assert "shard w1 is down: killed by SIGKILL; it starts again at once" in caplog.text
     forks(supervisor).die(1, 1)
     assert first(supervisor).state is State.FAILED
@@ -117,15 +118,17 @@ async def test_one_that_grows_too_large_is_restarted_orderly(supervisor: Supervi
         forks(supervisor).say(number, Ready({}))
     forks(supervisor).say(1, Beat(1.0, 200 << 20, 1.0))
     forks(supervisor).say(1, Ready({}))
-    await supervisor.until(lambda: [s.state for s in supervisor.shards.values()].count(State.READY) == STARTING_MAX)
+    await supervisor.shards.until(
+        lambda: [s.state for s in supervisor.shards.values()].count(State.READY) == STARTING_MAX
+    )
     for number in (STARTING_MAX + 1, STARTING_MAX + 2):
-        await supervisor.until(partial(lambda number: number in forks(supervisor).links, number))
+        await supervisor.shards.until(partial(lambda number: number in forks(supervisor).links, number))
         forks(supervisor).say(number, Ready({}))
     supervisor._look_after()
     supervisor._look_after()
     assert forks(supervisor).ended == [(1, signal.SIGTERM)], "once"
     forks(supervisor).die(1, 0)
-    await supervisor.until(lambda: forks(supervisor).forked.count(1) == 2)
+    await supervisor.shards.until(lambda: forks(supervisor).forked.count(1) == 2)
     assert "200 MB of 100" in first(supervisor).reason
 
 
@@ -140,3 +143,11 @@ async def test_stopping_one_that_waits_needs_no_process(supervisor: Supervisor) 
     await supervisor.stop(last)
     assert last.state is State.STOPPED
     assert last.number not in forks(supervisor).forked
+
+
+async def test_start_does_not_wait_for_a_stopped_shard(supervisor: Supervisor) -> None:
+    *others, last = supervisor.shards.values()
+    await supervisor.stop(last)
+    for shard in others:
+        supervisor.shards.turn_to(shard, State.READY)
+    await asyncio.wait_for(supervisor.shards.settle(), 5.0)

@@ -214,7 +214,7 @@ def logs(
 ) -> None:
     """Print the end of a shard's log, even if no fleet is up."""
     from roboglot.shards.plan import load
-    from roboglot.shards.supervisor import LOG_FILE
+    from roboglot.shards.states import LOG_FILE
 
     folder = _folder(data)
     try:
@@ -297,33 +297,33 @@ def _fleet_host(plan: FleetPlan, folder: Path, where: _Where) -> FleetHost:
 async def _serve(fleet_host: Callable[[], FleetHost], folder: Path, began: float) -> None:
     """Keep the fleet up until a signal. Raises NoWorld."""
     from roboglot.shards.classes import FleetClasses
-    from roboglot.shards.desk import FleetDesk
+    from roboglot.shards.command_server import CommandServer
     from roboglot.shards.overview import Overview
 
     stop = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    supervisor = fleet_host()
-    desk, classes = FleetDesk(supervisor, folder), FleetClasses(folder)
-    page = Overview(supervisor, _first_address(supervisor))
+    host = fleet_host()
+    commands, classes = CommandServer(host, folder), FleetClasses(folder)
+    page = Overview(host, _first_address(host))
     ending = asyncio.ensure_future(stop.wait())
     await classes.open()  # shards look for this socket when they start
-    starting = asyncio.ensure_future(supervisor.start())
+    starting = asyncio.ensure_future(host.start())
     try:
-        await desk.open()
+        await commands.open()
         await asyncio.wait([ending, starting], return_when=asyncio.FIRST_COMPLETED)
         if starting.done():
-            _refuse_hopeless(supervisor)
+            _refuse_hopeless(host)
             page.open()
-            print(_up(supervisor, time.monotonic() - began, starting.result(), page.address))
+            print(_up(host, time.monotonic() - began, starting.result(), page.address))
             print("ready", flush=True)
             await ending
     finally:
         starting.cancel()
         ending.cancel()
         await page.close()
-        await desk.close()
-        await supervisor.close()
+        await commands.close()
+        await host.close()
         await classes.close()
 
 
@@ -339,7 +339,7 @@ def _first_address(fleet_host: FleetHost) -> str:
 
 def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
     """Return the text of `fleet up` when all worlds are up or have failed."""
-    from roboglot.shards.supervisor import State
+    from roboglot.shards.states import State
 
     shards = list(fleet_host.shards.values())
     ready, robots = sum(shard.state is State.READY for shard in shards), sum(len(s.plan.robots) for s in shards)

@@ -9,10 +9,9 @@ import asyncio
 import hashlib
 import logging
 import os
-import shutil
 import sqlite3
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,7 +24,7 @@ from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.actor import Condition, ShardActor
 from roboglot.shards.messages import Beat
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
-from roboglot.shards.supervisor import LOG_FILE, LOG_MAX, Shard, State
+from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
 from roboglot.storage.dead_programs import Silence
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry
@@ -124,14 +123,13 @@ class ClusterFleet:
         """Lock ``folder`` for this program. Raises FolderInUse."""
         self.plan, self.folder, self._lasting, self._local = plan, folder, lasting, where == LOCAL
         self._lock = lock_folder(folder)
-        self.shards = {p.name: Shard(n, p, folder / "shards" / p.name) for n, p in enumerate(plan.shards, start=1)}
+        self.shards = Shards(plan, folder)
         self._mark = hashlib.sha256(str(folder).encode()).hexdigest()[:8]
         self._actors: dict[str, Actor] = {}
         self._nodes: dict[str, str] = {}
         self._runs: dict[str, int] = {}
         self._watch: asyncio.Task[None] | None = None
         self._silence: asyncio.Task[None] | None = None
-        self._changed = asyncio.Event()
         self._loop = asyncio.get_running_loop()
 
     @property
@@ -152,9 +150,9 @@ class ClusterFleet:
         self._silence = self._loop.create_task(_free_the_silent(self.plan), name="watch over silent homes")
         self._watch = self._loop.create_task(self._look_always(), name="looks at shards")
         try:
-            await asyncio.wait_for(self.until(lambda: all(map(_settled, self.shards.values()))), START_MAX)
+            await asyncio.wait_for(self.shards.settle(), START_MAX)
         except TimeoutError:
-            waiting = [shard.plan.name for shard in self.shards.values() if not _settled(shard)]
+            waiting = [shard.plan.name for shard in self.shards.values() if not shard.is_settled]
             log.warning("shards %s are not up yet; perhaps the cluster has no room", ", ".join(waiting))
         return 0.0
 
@@ -171,23 +169,17 @@ class ClusterFleet:
     async def stop(self, shard: Shard) -> None:
         """Stop a shard and leave it stopped."""
         if shard.state is not State.STOPPED:
-            self._turn_to(shard, State.STOPPING)
+            self.shards.turn_to(shard, State.STOPPING)
             await self._end(shard)
             shard.pid = 0
-            self._turn_to(shard, State.STOPPED)
+            self.shards.turn_to(shard, State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
         """Restart a shard, or start it; return when it is ready or has failed."""
         await self.stop(shard)
         shard.hopeless, shard.reason = False, ""
         await asyncio.to_thread(self._begin, shard)
-        await asyncio.wait_for(self.until(lambda: _settled(shard)), START_MAX)
-
-    async def reset(self, shard: Shard) -> None:
-        """Delete a shard's stored data and restart it."""
-        await self.stop(shard)
-        await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
-        await self.restart(shard)
+        await asyncio.wait_for(self.shards.until(lambda: shard.is_settled), START_MAX)
 
     def _begin(self, shard: Shard) -> None:
         """Create the shard's actor, or find a running one."""
@@ -207,7 +199,7 @@ class ClusterFleet:
         self._actors[plan.name] = actor.remote(plan.settings, str(shard.folder), of_node=not self._local)
         self._runs.pop(plan.name, None)
         shard.ready, shard.beat = None, Beat(0.0, 0, 0.0)
-        self._turn_to(shard, State.STARTING)
+        self.shards.turn_to(shard, State.STARTING)
 
     async def _end(self, shard: Shard) -> None:
         actor = self._actors.pop(shard.plan.name, None)
@@ -237,7 +229,7 @@ class ClusterFleet:
         except RayError as error:
             log.warning("cannot query shard %s: %s", shard.plan.name, error)
             shard.reason = str(error).strip().splitlines()[0]
-            self._turn_to(shard, State.FAILED)
+            self.shards.turn_to(shard, State.FAILED)
             return
         if actor is self._actors.get(shard.plan.name):
             self._seen(shard, msgspec.json.decode(answer, type=Condition))
@@ -247,7 +239,7 @@ class ClusterFleet:
             log.warning("shard %s does not answer on %s", shard.plan.name, self._nodes.get(shard.plan.name))
             shard.reason = "it does not answer; Ray starts it again if its process or node is gone"
             shard.ready = None
-            self._turn_to(shard, State.STARTING)
+            self.shards.turn_to(shard, State.STARTING)
 
     def _seen(self, shard: Shard, condition: Condition) -> None:
         _keep(shard.folder / LOG_FILE, condition.lines)
@@ -268,17 +260,7 @@ class ClusterFleet:
         if state is State.READY:
             shard.reason = ""
         if state is not shard.state:
-            self._turn_to(shard, state)
-
-    def _turn_to(self, shard: Shard, state: State) -> None:
-        shard.turn_to(state, self._loop.time())
-        self._changed.set()
-
-    async def until(self, condition: Callable[[], bool]) -> None:
-        """Wait until a condition on shards holds."""
-        while not condition():
-            self._changed.clear()
-            await self._changed.wait()
+            self.shards.turn_to(shard, state)
 
 
 async def _answer(reference: Reference) -> bytes:
@@ -288,15 +270,10 @@ async def _answer(reference: Reference) -> bytes:
     return await asyncio.shield(answer)
 
 
-def _settled(shard: Shard) -> bool:
-    return shard.state in (State.READY, State.FAILED, State.STOPPED)
-
-
 def _keep(path: Path, lines: list[str]) -> None:
     if lines:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if path.exists() and path.stat().st_size > LOG_MAX:
-            path.replace(path.with_suffix(".old"))
+        rotate(path)
         with path.open("a", encoding="utf-8") as file:
             file.write("\n".join([*lines, ""]))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from roboglot.shards.plan import FleetPlan
-from roboglot.shards.supervisor import Shard
+from roboglot.shards.states import Shard
 
 
 class FleetHost(Protocol):
@@ -39,6 +39,3 @@ class FleetHost(Protocol):
 
     async def restart(self, shard: Shard) -> None:
         """Restart a shard, or start it; return when it is ready or has failed."""
-
-    async def reset(self, shard: Shard) -> None:
-        """Delete a shard's stored data and restart it."""

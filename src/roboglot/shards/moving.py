@@ -8,7 +8,7 @@ from pathlib import Path
 from roboglot.config import ROBOTS_MAX, serial_of
 from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.plan import ShardPlan, checked, save
-from roboglot.shards.supervisor import State
+from roboglot.shards.states import State
 from roboglot.storage.transfer import copy_robot, forget_robot
 
 DATABASE = "roboglot.db"  # in a shard's data folder

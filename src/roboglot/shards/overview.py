@@ -21,7 +21,7 @@ from roboglot.model.background import load
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.snapshots import Snapshots
-from roboglot.shards.supervisor import Shard
+from roboglot.shards.states import Shard
 
 log = logging.getLogger(__name__)
 PORT = 50070  # or the next free one

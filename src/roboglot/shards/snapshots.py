@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 
 from roboglot.agents.console import ConsoleClient, Refused
 from roboglot.shards.fleet_host import FleetHost
-from roboglot.shards.supervisor import Shard, State
+from roboglot.shards.states import Shard, State
 
 PERIOD = 1.0  # s for which an answer is reused
 AT_ONCE_MAX = 8  # requests to consoles in progress

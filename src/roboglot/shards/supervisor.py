@@ -6,11 +6,7 @@ import asyncio
 import fcntl
 import logging
 import os
-import shutil
 import signal
-import socket
-from collections.abc import Callable
-from enum import StrEnum
 from pathlib import Path
 
 import msgspec
@@ -18,8 +14,9 @@ import msgspec
 from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.forking import Forks, NotWarm, Nursery
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
-from roboglot.shards.plan import FleetPlan, ShardPlan, save
+from roboglot.shards.plan import FleetPlan, save
 from roboglot.shards.shard import SETTINGS
+from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
 
 log = logging.getLogger(__name__)
 STARTING_MAX = 2 * max(2, os.cpu_count() or 2)  # at the same time; a shard waits for the disk half of its start
@@ -29,43 +26,6 @@ STOP_MAX = 12.0  # s for it to close
 SLOW, SLOW_FOR, SETTLING = 0.9, 10, 10.0  # x real time; checks in a row; s after the start that are not judged
 STEADY = 60.0  # s of running after which earlier crashes are forgotten
 PAUSES = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)  # s before the next attempt, by the number of crashes in a row
-LOG_FILE = "log"
-LOG_MAX = 10 << 20  # bytes of a shard's log that are kept on start
-
-
-class State(StrEnum):
-    """State of a shard."""
-
-    WAITING = "waiting"  # for its turn
-    STARTING = "starting"
-    READY = "ready"
-    STOPPING = "stopping"
-    STOPPED = "stopped"  # by request
-    FAILED = "failed"  # retried, unless its settings are wrong
-
-
-class Shard:
-    """One shard as the supervisor sees it."""
-
-    def __init__(self, number: int, plan: ShardPlan, folder: Path) -> None:
-        self.number, self.plan, self.folder = number, plan, folder
-        self.state = State.WAITING
-        self.pid = self.restarts = self.deaths = 0  # restarts: crashes in a row
-        self.slow_for = 0  # checks in a row
-        self.since = 0.0  # s by the loop's clock: start of the state
-        self.heard = 0.0  # s by the loop's clock
-        self.beat = Beat(0.0, 0, 0.0)
-        self.ready: Ready | None = None
-        self.reason = ""
-        self.hopeless = False
-        self.link: socket.socket | None = None
-        self.again: asyncio.TimerHandle | None = None
-
-    def turn_to(self, state: State, now: float) -> None:
-        """Change the state; one that was stopped by request has no reason."""
-        self.state, self.since = state, now
-        if state is State.STOPPED:
-            self.reason = ""
 
 
 class Supervisor:
@@ -79,12 +39,11 @@ class Supervisor:
         self._memory_max = memory_max
         self.plan, self.folder = plan, folder
         self._lock = lock_folder(folder)
-        self.shards = {p.name: Shard(n, p, folder / "shards" / p.name) for n, p in enumerate(plan.shards, start=1)}
+        self.shards = Shards(plan, folder)
         self._by_number = {shard.number: shard for shard in self.shards.values()}
         self._forks = Forks(self._born, self._dead, nursery)
         self._turn: asyncio.Task[None] | None = None
         self._watch: asyncio.TimerHandle | None = None
-        self._changed = asyncio.Event()  # set and cleared with every change of a state
         self._loop = asyncio.get_running_loop()
         self._wake = asyncio.Event()
         self._closing = False
@@ -108,7 +67,7 @@ class Supervisor:
             self._enqueue(shard)
         self._turn = self._loop.create_task(self._start_in_turn(), name="starts of shards")
         self._watch = self._loop.call_later(1.0, self._look_after)
-        await self.until(lambda: all(shard.state in (State.READY, State.FAILED) for shard in self.shards.values()))
+        await self.shards.settle()
         return seconds
 
     async def close(self) -> None:
@@ -122,12 +81,6 @@ class Supervisor:
             self._unlink(shard)
         os.close(self._lock)
 
-    async def until(self, condition: Callable[[], bool]) -> None:
-        """Wait until a condition on shards holds."""
-        while not condition():
-            self._changed.clear()
-            await self._changed.wait()
-
     async def stop(self, shard: Shard) -> None:
         """Stop a shard and leave it stopped."""
         if shard.again is not None:
@@ -137,20 +90,14 @@ class Supervisor:
         elif shard.state is not State.STOPPED:
             self._turn_to(shard, State.STOPPING)
             self._forks.end(shard.number, signal.SIGTERM)
-            await self.until(lambda: shard.state is State.STOPPED)
+            await self.shards.until(lambda: shard.state is State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
         """Restart a shard, or start it; return when it is ready or has failed."""
         await self.stop(shard)
         shard.deaths, shard.hopeless, shard.reason = 0, False, ""
         self._enqueue(shard)
-        await self.until(lambda: shard.state in (State.READY, State.FAILED, State.STOPPED))
-
-    async def reset(self, shard: Shard) -> None:
-        """Delete a shard's stored data (programs, maps, places, certificates) and restart it."""
-        await self.stop(shard)
-        await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
-        await self.restart(shard)
+        await self.shards.until(lambda: shard.is_settled)
 
     def _enqueue(self, shard: Shard) -> None:
         self._turn_to(shard, State.WAITING)
@@ -281,8 +228,7 @@ class Supervisor:
             self._forks.end(shard.number, signal.SIGTERM)
 
     def _turn_to(self, shard: Shard, state: State) -> None:
-        shard.turn_to(state, self._loop.time())
-        self._changed.set()
+        self.shards.turn_to(shard, state)
         self._wake.set()
 
     def _unlink(self, shard: Shard) -> None:
@@ -293,9 +239,8 @@ class Supervisor:
 
 
 def _open_log(path: Path) -> int:
-    """Return a descriptor that appends to the log; a log that is too long is renamed and replaces the last such one."""
-    if path.exists() and path.stat().st_size > LOG_MAX:
-        path.replace(path.with_suffix(".old"))
+    """Return a descriptor that appends to the log, or to a new one if that is too long."""
+    rotate(path)
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
     fcntl.fcntl(descriptor, fcntl.F_SETFD, fcntl.FD_CLOEXEC)
     return descriptor

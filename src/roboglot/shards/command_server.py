@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shutil
 from pathlib import Path
 
 import msgspec
@@ -11,15 +12,15 @@ from roboglot.hosting.local_socket import LocalServer
 from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.moving import move_robot
 from roboglot.shards.requests import SOCKET, Answer, Request, RobotRow, Row
-from roboglot.shards.supervisor import Shard
+from roboglot.shards.states import Shard
 from roboglot.validation import why_invalid
 
 
-class FleetDesk(LocalServer):
+class CommandServer(LocalServer):
     """Command server of one fleet."""
 
-    def __init__(self, supervisor: FleetHost, folder: Path) -> None:
-        self._supervisor = supervisor
+    def __init__(self, host: FleetHost, folder: Path) -> None:
+        self._host = host
         super().__init__(folder / SOCKET, "roboglot fleet", self._answer)
         self._turn = asyncio.Lock()
 
@@ -34,25 +35,32 @@ class FleetDesk(LocalServer):
             error = why_invalid(refused, "the request", wanted=Request)
         except (LookupError, ValueError, OSError) as refused:
             error = str(refused.args[0]) if refused.args else type(refused).__name__
-        rows = [_row(shard) for shard in self._supervisor.shards.values()]
-        return msgspec.json.encode(Answer(rows, self._supervisor.nursery, error))
+        rows = [_row(shard) for shard in self._host.shards.values()]
+        return msgspec.json.encode(Answer(rows, self._host.nursery, error))
 
     async def _grant(self, request: Request) -> None:
-        supervisor = self._supervisor
-        if request.do in ("move", "reset") and not supervisor.stores_here:
+        host = self._host
+        if request.do in ("move", "reset") and not host.stores_here:
             raise ValueError(f"{request.do} is for fleets of one machine: robots of a cluster store in the database")
         match request.do:
             case "move":
-                await move_robot(supervisor, request.robot, request.to)
+                await move_robot(host, request.robot, request.to)
             case "reset":
-                await supervisor.reset(self._shard(request.shard))
+                await _reset(host, self._shard(request.shard))
             case verb:
-                shards = [self._shard(request.shard)] if request.shard else list(supervisor.shards.values())
-                act = supervisor.stop if verb == "stop" else supervisor.restart
+                shards = [self._shard(request.shard)] if request.shard else list(host.shards.values())
+                act = host.stop if verb == "stop" else host.restart
                 await asyncio.gather(*map(act, shards))
 
     def _shard(self, name: str) -> Shard:
-        return self._supervisor.shards[self._supervisor.plan.find(name).name]
+        return self._host.shards[self._host.plan.find(name).name]
+
+
+async def _reset(host: FleetHost, shard: Shard) -> None:
+    """Delete a shard's stored data (programs, maps, places, certificates) and restart it."""
+    await host.stop(shard)
+    await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
+    await host.restart(shard)
 
 
 def _row(shard: Shard) -> Row:

@@ -1,0 +1,84 @@
+"""Shards of a fleet as the program that keeps them up sees them: their states, last reports and log files."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+
+from roboglot.shards.messages import Beat, Ready
+from roboglot.shards.plan import FleetPlan, ShardPlan
+
+LOG_FILE = "log"
+LOG_MAX = 10 << 20  # bytes of a shard's log from which the next start begins a new one
+
+
+class State(StrEnum):
+    """State of a shard."""
+
+    WAITING = "waiting"  # for its turn
+    STARTING = "starting"
+    READY = "ready"
+    STOPPING = "stopping"
+    STOPPED = "stopped"  # by request
+    FAILED = "failed"  # retried, unless its settings are wrong
+
+
+class Shard:
+    """One shard: its state and its last report."""
+
+    def __init__(self, number: int, plan: ShardPlan, folder: Path) -> None:
+        self.number, self.plan, self.folder = number, plan, folder
+        self.state = State.WAITING
+        self.pid = self.restarts = self.deaths = 0  # deaths: crashes in a row
+        self.slow_for = 0  # checks in a row
+        self.since = 0.0  # s by the loop's clock: start of the state
+        self.heard = 0.0  # s by the loop's clock
+        self.beat = Beat(0.0, 0, 0.0)
+        self.ready: Ready | None = None
+        self.reason = ""
+        self.hopeless = False
+        self.link: socket.socket | None = None
+        self.again: asyncio.TimerHandle | None = None
+
+    @property
+    def is_settled(self) -> bool:
+        """True if it is ready, has failed, or was stopped."""
+        return self.state in (State.READY, State.FAILED, State.STOPPED)
+
+
+class Shards(dict[str, Shard]):
+    """All shards of a plan by name, each with its folder in ``folder``."""
+
+    def __init__(self, plan: FleetPlan, folder: Path) -> None:
+        super().__init__(
+            (shard.name, Shard(number, shard, folder / "shards" / shard.name))
+            for number, shard in enumerate(plan.shards, start=1)
+        )
+        self._changed = asyncio.Event()  # set with every change of a state
+        self._loop = asyncio.get_running_loop()
+
+    def turn_to(self, shard: Shard, state: State) -> None:
+        """Change a shard's state; one that was stopped by request has no reason."""
+        shard.state, shard.since = state, self._loop.time()
+        if state is State.STOPPED:
+            shard.reason = ""
+        self._changed.set()
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        """Wait until a condition on shards holds."""
+        while not condition():
+            self._changed.clear()
+            await self._changed.wait()
+
+    async def settle(self) -> None:
+        """Wait until every shard is ready, has failed, or was stopped."""
+        await self.until(lambda: all(shard.is_settled for shard in self.values()))
+
+
+def rotate(log: Path) -> None:
+    """Rename a log that is too long; it replaces the last such one."""
+    if log.exists() and log.stat().st_size > LOG_MAX:
+        log.replace(log.with_suffix(".old"))
