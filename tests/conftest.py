@@ -26,6 +26,7 @@ from hypothesis.internal.conjecture import providers
 from hypothesis.internal.constants_ast import Constants
 
 from roboglot.cli.warm import installation
+from roboglot.hosting import closing
 from tests import warm_start
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ if importlib.util.find_spec("sniffio") is None:
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background; tests interrupt their processes
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+closing.CLOSE_SECONDS = 30.0  # a busy machine may close connections late; tests would find them half closed
 os.environ.setdefault(installation.WARM, "0")  # no process outlives the tests, and workers are measured as they are
 warm_start.install()
 gc.disable()  # until all tests are collected: there is no garbage yet, and looking for it takes a sixth of that time

@@ -10,9 +10,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
-from roboglot import runtime
 from roboglot.config import Config, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.power import Power
@@ -53,12 +50,6 @@ assert uvicorn.Config is uvicorn.config.Config
 from uvicorn import Server, run
 assert Server is sys.modules["uvicorn.server"].Server and uvicorn.run is run and uvicorn.Config is uvicorn.config.Config
 """
-
-
-@pytest.fixture(autouse=True)
-def whole_closing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a busy machine nothing is left behind half closed, for other tests to find."""
-    monkeypatch.setattr(runtime, "CLOSE_SECONDS", 30.0)
 
 
 def config(data: Path) -> Config:

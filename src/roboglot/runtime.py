@@ -8,7 +8,7 @@ import gc
 import logging
 import os
 import ssl
-from collections.abc import Awaitable, Coroutine, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime, tzinfo
 from functools import partial
 from pathlib import Path
@@ -26,11 +26,9 @@ from roboglot.control.lease_server import LeaseServer
 from roboglot.control.record_server import RecordServer
 from roboglot.extras import own_version
 from roboglot.fleet import build_fleet, clock_of, origin_of
+from roboglot.hosting.closing import close_in_time
 from roboglot.hosting.folder_lock import lock_folder
-from roboglot.model.client_context import concerning
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.errors import RobotError
-from roboglot.model.events import Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.events import Limits
@@ -38,7 +36,8 @@ from roboglot.programs.rehearsing import Scene
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols import DOORS, open_doors
 from roboglot.protocols.browsers import own_names
-from roboglot.protocols.door import Clouds, Door, DoorType, Endpoint, PortKind, Site
+from roboglot.protocols.door import Clouds, DoorType, Endpoint, PortKind, Site
+from roboglot.protocols.robot_doors import RobotDoors
 from roboglot.rehearsal import Rehearsals, scene_of
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_database, open_registry
@@ -54,77 +53,7 @@ if TYPE_CHECKING:
     from roboglot.recording.recorder import Recorder
 
 log = logging.getLogger(__name__)
-LAST_WORDS = 0.2  # s to send outstanding answers before the robot switches off
 RING_FOLDER = "recordings"  # in the data folder: the minutes before a fault
-CLOSE_SECONDS = 0.5  # s for one part to close before it is abandoned
-
-
-class RobotDoors:
-    """One robot's doors: opened and closed together, and whenever the robot itself switches on or off."""
-
-    def __init__(self, robot: Robot, doors: Sequence[Door]) -> None:
-        self._robot = robot
-        self._doors = doors
-        self._turn = asyncio.Lock()
-        self._open = self._ended = False
-        self._following: set[asyncio.Task[None]] = set()
-        self._leave = [
-            robot.events.listen(Rebooting, lambda _: self._follow(self._go_away())),
-            robot.events.listen(ShuttingDown, lambda _: self._follow(self._go_away())),
-            robot.events.listen(Rebooted, lambda _: self._follow(self._come_back())),
-        ]
-
-    @property
-    def endpoints(self) -> Sequence[Endpoint]:
-        """Addresses that the doors listen at."""
-        return [endpoint for door in self._doors for endpoint in door.endpoints]
-
-    def door(self, name: str) -> Door:
-        """Return the door of a protocol. Raises LookupError."""
-        found = next((door for door in self._doors if door.name == name), None)
-        if found is None:
-            raise LookupError(f"robot {self._robot.id} has no {name} door")
-        return found
-
-    async def open(self) -> None:
-        """Open closed doors. Raises OSError with the address if it is taken."""
-        async with self._turn:
-            if not self._open and not self._ended:
-                self._open = True
-                with concerning(self._robot.id):
-                    for door in self._doors:
-                        await door.start()
-
-    async def close(self) -> None:
-        """Close the doors for good."""
-        for leave in self._leave:
-            leave()
-        self._ended = True  # a robot coming up at this moment must not open doors that are closed for good
-        await self._shut()
-
-    async def _go_away(self) -> None:
-        await asyncio.sleep(LAST_WORDS)
-        log.info("robot %s is off: its doors are closed", self._robot.id)
-        await self._shut()
-
-    async def _come_back(self) -> None:
-        try:
-            await self.open()
-        except OSError as error:
-            log.error("robot %s is up again, but its doors did not open: %s", self._robot.id, error)
-
-    async def _shut(self) -> None:
-        async with self._turn:
-            if self._open:
-                self._open = False
-                await asyncio.gather(
-                    *(_in_time(f"robot {self._robot.id}: the {door.name} door", door.close()) for door in self._doors)
-                )
-
-    def _follow(self, change: Coroutine[None, None, None]) -> None:
-        task = asyncio.get_running_loop().create_task(change)
-        self._following.add(task)
-        task.add_done_callback(self._following.discard)
 
 
 class Runtime:
@@ -349,19 +278,19 @@ class Runtime:
     async def close(self) -> None:
         """Stop the robots, close doors, world, engine and file; parts that take too long are abandoned."""
         if self.console is not None:
-            await _in_time("the console", self.console.close())
+            await close_in_time("the console", self.console.close())
         await asyncio.gather(*(doors.close() for doors in self.doors.values()))
-        await _in_time("control of the robots", self.leases.close())
+        await close_in_time("control of the robots", self.leases.close())
         await self._record_server.close()
         if self.clock.repeats:  # from here on robot time needed to stop depends on the machine
             await self._close_recorder()
-        await _in_time("the fleet", self.fleet.close())
+        await close_in_time("the fleet", self.fleet.close())
         await self._close_recorder()
-        await _in_time("the rehearsals", self._rehearsals.close())
+        await close_in_time("the rehearsals", self._rehearsals.close())
         if self._engine is not None:
-            await _in_time("the program engine", self._engine.close())
+            await close_in_time("the program engine", self._engine.close())
         if self._gateway is not None:
-            await _in_time("the gateway", self._gateway.close())
+            await close_in_time("the gateway", self._gateway.close())
         if self._residence is not None:
             await self._residence.close()
         if self.guard is not None:
@@ -377,13 +306,3 @@ class Runtime:
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
             await recorder.close()
-
-
-async def _in_time(name: str, closing: Awaitable[None]) -> None:
-    """Wait for ``closing``, at most ``CLOSE_SECONDS`` s; log failures."""
-    try:
-        await asyncio.wait_for(closing, CLOSE_SECONDS)
-    except TimeoutError:
-        log.warning("%s did not close in time", name)
-    except RobotError as error:
-        log.error("cannot close %s cleanly: %s", name, error)

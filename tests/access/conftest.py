@@ -37,8 +37,7 @@ def store(data: Path) -> AccessStore:
 
 
 @pytest.fixture
-async def runtime(data: Path, store: AccessStore, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Runtime]:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)  # a busy machine may close connections late
+async def runtime(data: Path, store: AccessStore) -> AsyncIterator[Runtime]:
     base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
     access = AccessConfig(on=True, local=False, requests=1_000_000, connections=1000, logins=3)
     runtime = Runtime(replace(base, robots=(RobotConfig("a", "universal", ADDRESS),), access=access))

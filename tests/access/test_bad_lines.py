@@ -92,7 +92,6 @@ async def pass_time(clock: LockstepClock) -> None:
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     monkeypatch.setattr("roboglot.access.tunnel.heartbeat.QUIET_AFTER", 20.0)  # a busy machine is no silent line
 
 

@@ -37,11 +37,6 @@ async def robots(data: Path, access: AccessConfig) -> AsyncIterator[Runtime]:
     await runtime.close()
 
 
-@pytest.fixture(autouse=True)
-def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)  # a busy machine may close connections late
-
-
 @pytest.fixture
 def token(data: Path) -> str:
     store = open_store(data)

@@ -45,7 +45,6 @@ async def next_kind(reader: asyncio.StreamReader) -> FrameKind:
 @pytest.fixture
 async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[tuple[Runtime, str]]:
     """A robot behind a gateway, and a token that drives it."""
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     for limit in ("QUIET_AFTER", "LOST_AFTER"):
         monkeypatch.setattr(heartbeat, limit, 20.0)  # a busy machine must not look like a lost tunnel
     store = open_store(data)

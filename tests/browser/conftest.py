@@ -83,12 +83,9 @@ async def opened(tmp_path_factory: pytest.TempPathFactory, site: int) -> AsyncIt
     )
     runtime = Runtime(config)
     assert isinstance(runtime.clock, LockstepClock)
-    monkeypatch = pytest.MonkeyPatch()
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)  # a busy machine may close connections late
     await runtime.start()
     yield Served(runtime.fleet.robots["a"], runtime.clock, runtime)
     await runtime.close()
-    monkeypatch.undo()
 
 
 @pytest_asyncio.fixture(loop_scope="session")

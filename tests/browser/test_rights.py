@@ -82,15 +82,12 @@ async def guarded(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Gua
     runtime = Runtime(replace(base, robots=robots, access=access, console=ConsoleConfig(port=0)))
     assert isinstance(runtime.clock, LockstepClock)
     assert runtime.console is not None
-    monkeypatch = pytest.MonkeyPatch()
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     store = open_store(data)
     await runtime.start()
     await runtime.console.ready()
     yield Guarded(runtime, runtime.clock, store, runtime.console.address)
     store.close()
     await runtime.close()
-    monkeypatch.undo()
 
 
 @pytest_asyncio.fixture(loop_scope="session")

@@ -26,9 +26,8 @@ Page = Any
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def worlds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[list[Shown]]:
+async def worlds(tmp_path: Path) -> AsyncIterator[list[Shown]]:
     """Two worlds that share a classroom, as ``roboglot fleet up --worlds 2`` has them."""
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     classes = FleetClasses(tmp_path)
     await classes.open()
     async with world(tmp_path, "w1", free_addresses(1)) as first, world(tmp_path, "w2", free_addresses(1)) as second:

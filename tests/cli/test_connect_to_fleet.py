@@ -33,7 +33,6 @@ NAME = "/api/core/system/v1/robot/info"
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     for limit in ("QUIET_AFTER", "LOST_AFTER"):
         monkeypatch.setattr(heartbeat, limit, 20.0)  # a busy machine must not look like a lost tunnel
     monkeypatch.setattr(dialling, "AGAIN_AFTER", 0.01)

@@ -12,7 +12,6 @@ from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
-import pytest
 import pytest_asyncio
 
 from roboglot.config import ConsoleConfig, RobotConfig, load_config
@@ -68,11 +67,10 @@ def _fetch(request: Request) -> tuple[int, Any]:
 
 
 @pytest_asyncio.fixture
-async def shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Shown]:
+async def shown(tmp_path: Path) -> AsyncIterator[Shown]:
     """A runtime as ``roboglot up --world empty --lockstep`` starts it; the console takes any port."""
     base = load_config(None, {"data": str(tmp_path), "world": "empty", "lockstep": True})
     config = replace(base, robots=(RobotConfig("a", "universal", ADDRESS),), console=ConsoleConfig(port=0))
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     runtime = Runtime(config)
     assert isinstance(runtime.clock, LockstepClock)
     assert runtime.console is not None

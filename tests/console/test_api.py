@@ -177,8 +177,7 @@ async def test_a_robot_docks_by_the_console(shown: Shown) -> None:
         assert state["history"][0]["reason"]
 
 
-async def test_with_access_the_console_asks_who_comes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+async def test_with_access_the_console_asks_who_comes(tmp_path: Path) -> None:
     base = load_config(None, {"data": str(tmp_path), "world": "empty", "lockstep": True})
     robots = (RobotConfig("a", "universal", ADDRESS),)
     access, console = AccessConfig(on=True, local=False), ConsoleConfig(port=0)

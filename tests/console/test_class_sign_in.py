@@ -52,8 +52,7 @@ async def paged(shown: Shown, cookie: str) -> AsyncIterator[Page]:
         yield made
 
 
-async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path) -> None:
     classes, asking = FleetClasses(tmp_path), AccessConfig(on=True, local=False)
     await classes.open()
     (tmp_path / "w1").mkdir()
@@ -93,7 +92,6 @@ async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path, monkeypatch:
 
 async def test_old_class_admits_no_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The class is closed until its teacher is back."""
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     asking = AccessConfig(on=True, local=True)
     async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown, paged(shown, "") as teacher:
         code = await opened(teacher)
@@ -105,8 +103,7 @@ async def test_old_class_admits_no_one(tmp_path: Path, monkeypatch: pytest.Monke
         assert (status, answer["error"]) == (401, "this class is over, unless its teacher comes back")
 
 
-async def test_rights_that_are_gained_reach_open_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+async def test_rights_that_are_gained_reach_open_pages(tmp_path: Path) -> None:
     (tmp_path / "w").mkdir()
     store = open_store(tmp_path / "w")
     store.allow("127.0.0.1", [Grant("*", frozenset({Right.SEE}))])
@@ -131,8 +128,7 @@ async def test_rights_that_are_gained_reach_open_pages(tmp_path: Path, monkeypat
     store.close()
 
 
-async def test_one_list_lets_people_into_all_worlds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+async def test_one_list_lets_people_into_all_worlds(tmp_path: Path) -> None:
     plan = plan_fleet(2, 1, {"access": {"local": False}}, tmp_path)
     asking = checked(plan.shards[1]).access
     assert asking == checked(plan.shards[0]).access
@@ -151,9 +147,8 @@ async def test_one_list_lets_people_into_all_worlds(tmp_path: Path, monkeypatch:
     store.close()
 
 
-async def test_signing_out_ends_open_pages_and_sound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_signing_out_ends_open_pages_and_sound(tmp_path: Path) -> None:
     """A page in another tab drove on as the one who had signed out."""
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     (tmp_path / "w").mkdir()
     store = open_store(tmp_path / "w")
     store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])

@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
 import pytest_asyncio
 
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
@@ -47,9 +46,8 @@ async def world(
 
 
 @pytest_asyncio.fixture
-async def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[list[Shown]]:
+async def fleet(tmp_path: Path) -> AsyncIterator[list[Shown]]:
     """Two worlds with one classroom, as ``roboglot fleet up --worlds 2`` has them."""
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     classes = FleetClasses(tmp_path)
     await classes.open()
     async with world(tmp_path, "w1", ADDRESS) as first, world(tmp_path, "w2", OTHER_ADDRESS) as second:
@@ -136,8 +134,7 @@ async def test_all_are_stopped_without_their_pages_too(fleet: list[Shown]) -> No
         assert service.running() == []
 
 
-async def test_a_world_that_ends_leaves_the_class(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+async def test_a_world_that_ends_leaves_the_class(tmp_path: Path) -> None:
     classes = FleetClasses(tmp_path)
     await classes.open()
     async with world(tmp_path, "w1", ADDRESS) as first, page(first) as teacher:
@@ -159,8 +156,7 @@ async def test_a_world_that_ends_leaves_the_class(tmp_path: Path, monkeypatch: p
         assert "out of reach" in (await teacher.kind("refused"))["why"]
 
 
-async def test_handed_in_work_survives_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+async def test_handed_in_work_survives_a_restart(tmp_path: Path) -> None:
     async with world(tmp_path, "w", ADDRESS, shared=False) as shown, page(shown) as teacher, page(shown) as anna:
         code = await opened(teacher)
         await asked(anna, do="join", code=code, name="Anna")

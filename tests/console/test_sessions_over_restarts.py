@@ -106,8 +106,7 @@ async def names(shown: Shown, *cookies: str) -> list[str]:
     return [await asyncio.to_thread(me, shown.url, cookie) for cookie in cookies]
 
 
-async def test_a_class_goes_on_after_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+async def test_a_class_goes_on_after_a_restart(tmp_path: Path) -> None:
     add_admins(tmp_path / "w", "mx", "gone", "changed")
     async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
@@ -166,8 +165,7 @@ async def opened_class(shown: Shown) -> tuple[str, str]:
     return teacher, str((await asyncio.to_thread(lesson, shown.url, teacher, do="open", name="7b"))["code"])
 
 
-async def test_consoles_class_takes_pupils_after_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
+async def test_consoles_class_takes_pupils_after_a_restart(tmp_path: Path) -> None:
     add_admins(tmp_path / "w", "mx")
     async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         teacher, code = await opened_class(shown)
@@ -185,9 +183,8 @@ async def test_consoles_class_takes_pupils_after_a_restart(tmp_path: Path, monke
         assert (await signed(shown, name="Cem", code=code))[0] == 401
 
 
-async def test_robots_locked_in_a_class_that_is_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_robots_locked_in_a_class_that_is_over(tmp_path: Path) -> None:
     """They stay locked over a restart, and their teacher can still unlock them."""
-    monkeypatch.setattr("roboglot.runtime.CLOSE_SECONDS", 30.0)
     add_admins(tmp_path / "w", "mx")
     async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         teacher, code = await opened_class(shown)

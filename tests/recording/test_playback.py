@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 from websockets.asyncio.client import connect
 
-from roboglot import runtime
 from roboglot.clients.errors import LinkLost
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
 from roboglot.demo.clients.phone import Phone
@@ -36,11 +35,6 @@ SPEED = 4.0
 FAST, LATE = 40.0, 0.2  # s of the robot
 PROGRAM = "cyberdog.task.block('one');\ncyberdog.task.block('two');\n"
 Script = Callable[[str], Awaitable[Any]]
-
-
-@pytest.fixture(autouse=True)
-def whole_closing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runtime, "CLOSE_SECONDS", 30.0)
 
 
 def config(folder: Path, body: str, record: str, **doors: dict[str, object]) -> Config:

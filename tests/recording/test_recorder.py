@@ -14,7 +14,6 @@ import pytest
 from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from mcap.reader import make_reader
 
-from roboglot import runtime
 from roboglot.cli.control import running
 from roboglot.cli.recordings.record import _show
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
@@ -29,11 +28,6 @@ from roboglot.testing.addresses import free_addresses
 from tests.narrowing import known
 
 ADDRESS = free_addresses(1)
-
-
-@pytest.fixture(autouse=True)
-def whole_closing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runtime, "CLOSE_SECONDS", 30.0)
 
 
 def config(data: Path, record: RecordConfig) -> Config:

@@ -18,9 +18,8 @@ from roboglot.recording.lines import Target, status_of
 from roboglot.recording.reader import BadRecording, Recording, read_recording
 from roboglot.recording.replaying import Replay
 from tests.recording.test_compare import session
-from tests.recording.test_playback import ADDRESS, SPEED, by_frames, by_rest, run, whole_closing
+from tests.recording.test_playback import ADDRESS, SPEED, by_frames, by_rest, run
 
-assert whole_closing  # a fixture for these tests, too
 URLS = {"slamware": f"slamware://{ADDRESS}", "visual": f"visual://{ADDRESS}", "robomaster": f"robomaster://{ADDRESS}"}
 
 

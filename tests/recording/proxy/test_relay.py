@@ -30,9 +30,8 @@ from roboglot.recording.reader import pair, read_recording
 from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
-from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run, whole_closing
+from tests.recording.test_playback import ADDRESS, PROGRAM, by_frames, by_rest, run
 
-assert whole_closing  # a fixture for these tests, too
 BETWEEN, ROBOT, OTHER = free_addresses(1), free_addresses(1), free_addresses(1)
 
 

@@ -24,8 +24,9 @@ from roboglot.protocols.robomaster.ports import pilot_port
 from roboglot.recording.lines import Answers, Line, TextLine
 
 if TYPE_CHECKING:
+    from roboglot.protocols.robot_doors import RobotDoors
     from roboglot.protocols.ros2.server import Ros2Door
-    from roboglot.runtime import RobotDoors, Runtime
+    from roboglot.runtime import Runtime
 
 
 class Ros2Line(Line):
