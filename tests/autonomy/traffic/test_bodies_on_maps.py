@@ -30,7 +30,7 @@ def walled(given: bool) -> EvidenceGrid:
 
 @pytest.mark.parametrize(("given", "size", "open_"), [(True, 20, True), (False, 20, False), (True, 30, False)])
 def test_body_in_a_door_is_no_wall(given: bool, size: int, open_: bool) -> None:
-    from roboglot.autonomy.traffic.doubtful import without_doubtful
+    from roboglot.autonomy.traffic.doubtful_things import without_doubtful
 
     grid = walled(given)
     grid.evidence[DOOR, 50 : 50 + size] = 300

@@ -9,7 +9,7 @@ import pytest
 
 from roboglot.autonomy.navigation.replanner import Replanner
 from roboglot.autonomy.navigation.route import Route
-from roboglot.autonomy.traffic.giving_way import FACED_MAX, Courtesy, chance
+from roboglot.autonomy.traffic.giving_way import FACED_MAX, GivingWay, chance
 from roboglot.model.geometry import Pose
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ async def test_looks_ahead_after_going_aside(tour: Tour, monkeypatch: pytest.Mon
             asked[name] += 1
             return asked[name] == (20 if name == "is_due" else 1)
 
-        monkeypatch.setattr(Courtesy, name, due)
+        monkeypatch.setattr(GivingWay, name, due)
 
     async def none_at_second(self: Replanner) -> Route | None:
         nonlocal plans

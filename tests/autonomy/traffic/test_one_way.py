@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from roboglot.autonomy.traffic.one_way import OneWay
+from roboglot.autonomy.traffic.one_way import OneWayStretches
 from roboglot.autonomy.traffic.right_of_way import Meeting, Way, announced_way, meetings
 from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Point, Pose
@@ -23,7 +23,7 @@ def west(start: float, *, metres: float = 6.0, speed: float = 0.5, outranks: boo
 
 
 def meeting(way: Way, narrow: NDArray[np.bool_] = CORRIDOR, seconds: float = 0.0) -> Meeting | None:
-    stretches = OneWay()
+    stretches = OneWayStretches()
     stretches.observe([way], 0.0)
     stretches.observe([Way(way.points, 0.0, RADIUS, way.outranks, way.name)] if seconds else [way], seconds)
     return stretches.meeting(EAST, lambda: narrow, 0.5, RADIUS, [way], seconds)

@@ -76,21 +76,21 @@ def among(robot: Robot, belief: Belief, *ways: Way) -> Traffic:
 
 def coming(name: str = "", *, x: float = 3.0, outranks: bool = False) -> Way:
     points = np.stack([np.arange(x, x - 3.0, -0.2), np.zeros(15)], axis=1)
-    return Way(points, 0.5, RADIUS, outranks, name, lively=True)
+    return Way(points, 0.5, RADIUS, outranks, name, under_way=True)
 
 
 @pytest.mark.world("empty")
 @pytest.mark.parametrize(("way", "meets"), [(coming("b", outranks=True), True), (coming(), True), (coming("b"), False)])
 def test_first_one_keeps_its_way(robot: Robot, belief: Belief, way: Way, *, meets: bool) -> None:
     traffic, path = among(robot, belief, way), np.stack([np.arange(0.0, 3.0, 0.05), np.zeros(60)], axis=1)
-    traffic.free(path, path, Pose(), 0.5, RADIUS)
-    assert traffic.meets == meets
+    traffic.free_distance(path, path, Pose(), 0.5, RADIUS)
+    assert traffic.meets_others == meets
     traffic.close()
 
 
 def straight(start: tuple[float, float], by: tuple[float, float], speed: float) -> Way:
     """A robot that goes on by steps of ``by`` m."""
-    return Way(np.array(start) + np.arange(15)[:, None] * np.array(by), speed, RADIUS, outranks=False, lively=True)
+    return Way(np.array(start) + np.arange(15)[:, None] * np.array(by), speed, RADIUS, outranks=False, under_way=True)
 
 
 @pytest.mark.world("empty")
@@ -106,7 +106,7 @@ def straight(start: tuple[float, float], by: tuple[float, float], speed: float) 
 )
 def test_time_until_others_leave_the_way(robot: Robot, belief: Belief, way: Way, seconds: float) -> None:
     traffic, path = among(robot, belief, way), np.stack([np.arange(0.0, 3.0, 0.05), np.zeros(60)], axis=1)
-    assert traffic.leaves(path) == pytest.approx(seconds, abs=0.6)
+    assert traffic.seconds_until_clear(path) == pytest.approx(seconds, abs=0.6)
     traffic.close()
 
 
@@ -119,8 +119,8 @@ def test_one_of_two_in_a_corridor_backs_out(robot: Robot, belief: Belief, here: 
     for y in (-0.5, 0.5):
         evidence[int((y - corner.y) / RESOLUTION), columns] = 500
     traffic, other = among(robot, belief, coming(x=here + 0.8)), among(robot, belief, coming(x=here))
-    assert traffic.backs_out(Pose(here)) == (here < 2.1)
-    assert other.backs_out(Pose(here + 0.8)) == (here > 2.1)
+    assert traffic.should_back_out(Pose(here)) == (here < 2.1)
+    assert other.should_back_out(Pose(here + 0.8)) == (here > 2.1)
     traffic.close()
     other.close()
 

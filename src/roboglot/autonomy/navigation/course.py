@@ -106,7 +106,7 @@ class Course:
                 obstacles=obstacles,
                 things=things,
                 straight=straight,
-                shunned=self.traffic.shunned() if obstacles else (),
+                shunned=self.traffic.ways_to_avoid() if obstacles else (),
             ),
         )
         return await computed(self.robot.clock, task.solve)

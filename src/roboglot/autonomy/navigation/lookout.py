@@ -77,8 +77,8 @@ class Lookout:
         points = np.concatenate((points, low)) if len(low) else points
         self._scan_at = event.stamp
         self._traffic.observe(points, pose, event.stamp)
-        self._planner.forget_soon(self._traffic.moving, event.stamp)
-        self._planner.forget(self._traffic.far(pose))
+        self._planner.forget_soon(self._traffic.moving_places, event.stamp)
+        self._planner.forget(self._traffic.far_places(pose))
         if self.follower:
             beside = self._planner.low_around(pose, self._tuning.horizon, event.stamp)
             self._look_ahead(self.follower, pose, points, beside)
@@ -117,12 +117,12 @@ class Lookout:
     ) -> None:
         """Stop for moving objects and robots with right of way, and announce this robot's route."""
         traffic = self._traffic
-        way = follower.route.ahead(pose, *aim, ANNOUNCED_MAX) if traffic.asks_for_way else path
-        free = follower.along + traffic.free(path, way, pose, follower.speed, self._planner.radius)
+        way = follower.route.ahead(pose, *aim, ANNOUNCED_MAX) if traffic.needs_whole_way else path
+        free = follower.along + traffic.free_distance(path, way, pose, follower.speed, self._planner.radius)
         follower.stop_at = min(follower.stop_at, free)
         traffic.follow(way)
 
     @property
     def meets(self) -> bool:
         """True if another robot or object is about to cross the route, or has right of way."""
-        return self._traffic.meets
+        return self._traffic.meets_others

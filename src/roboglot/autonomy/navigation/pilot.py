@@ -18,7 +18,7 @@ from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.lookout import Lookout
 from roboglot.autonomy.navigation.patience import Patience
 from roboglot.autonomy.navigation.replanner import Replanner
-from roboglot.autonomy.traffic.giving_way import Courtesy
+from roboglot.autonomy.traffic.giving_way import GivingWay
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationFeedback
@@ -64,7 +64,7 @@ class Pilot:
         self._publish, self._stage, self._reported_at = report, "", -math.inf
         self._lookout = Lookout(course, planner, action)
         self._replanner = Replanner(course, planner, goal, journey, self._lookout)
-        self._courtesy = Courtesy(course, self._lookout, action)
+        self._giving_way = GivingWay(course, self._lookout, action)
         patience = self._tuning.patience_for(goal.options.tracks)
         self._patience = Patience(self._clock, self._belief, self._tuning, patience)
         self._top = course.top_speed(goal.options)
@@ -116,8 +116,8 @@ class Pilot:
                 self._robot.events.publish(PathBlocked(stamp=self._clock.time(), action=self._action))
             self._journey.waits(self._robot, self._action)
             self._report("waiting", Path(), 0.0)
-            if self._courtesy.is_due_without_route():
-                left += await self._courtesy.go_aside(self._top)
+            if self._giving_way.is_due_without_route():
+                left += await self._giving_way.go_aside(self._top)
             await self._clock.sleep(FIRST_ROUTE_PERIOD)
 
     async def _follow(self, follower: Follower) -> State:
@@ -152,12 +152,12 @@ class Pilot:
         if waiting:
             self._journey.waits(self._robot, self._action)
         self._report_progress(follower, pose, "waiting" if waiting else "driving")
-        return State.GIVING_WAY if self._courtesy.is_due(follower) else State.FOLLOWING
+        return State.GIVING_WAY if self._giving_way.is_due(follower) else State.FOLLOWING
 
     async def _give_way(self, follower: Follower) -> State:
         """Move aside, wait there, and set out again."""
         self._report("waiting", Path(), 0.0)
-        aside = await self._courtesy.give_way(follower)
+        aside = await self._giving_way.give_way(follower)
         self._replanner.begin_again(follower)
         follower.take(await self._first_route(follower.left + aside))
         self._lookout.follower = follower  # the robot may have given way again meanwhile, along another route

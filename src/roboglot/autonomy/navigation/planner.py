@@ -18,7 +18,7 @@ from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import RESOLUTION, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
-from roboglot.autonomy.traffic.doubtful import without_doubtful, without_gone
+from roboglot.autonomy.traffic.doubtful_things import without_doubtful, without_gone
 from roboglot.autonomy.traffic.waiting_place import shun, waiting_place
 from roboglot.kernels.distance import distances
 from roboglot.kernels.obstacles import free_way

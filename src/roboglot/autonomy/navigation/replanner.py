@@ -169,7 +169,7 @@ class Replanner:
             return False
         around = lookout.blocked and route.length > follower.left + tuning.around
         self._count(detour, around=around)
-        if around and not self._course.traffic.is_closed_by_others(lookout.blocked_place):
+        if around and not self._course.traffic.is_blocked_by_others(lookout.blocked_place):
             self._check_goal(self._goal.points[self.passed(follower)])
         self._first += follower.passed
         follower.take(route)
@@ -182,16 +182,16 @@ class Replanner:
         """Return the time until others are expected to have left the way ahead, s; inf: they stand or come along it."""
         carrot, beyond = follower.carrot()
         path = follower.route.ahead(self._course.belief.pose, carrot, beyond, self._tuning.horizon)
-        return self._course.traffic.leaves(path)
+        return self._course.traffic.seconds_until_clear(path)
 
     def _bears(self, follower: Follower, more: float, cost: float) -> float:
         """Return the time to wait before an obstacle until a way ``more`` m and ``cost`` s longer is taken, s."""
         tuning, traffic, place = self._tuning, self._course.traffic, self._lookout.blocked_place
-        if traffic.is_closed_by_others(place, moving=True) and self._leaves(follower) < cost:
+        if traffic.is_blocked_by_others(place, moving=True) and self._leaves(follower) < cost:
             return tuning.others_after
         if more <= tuning.detour:
             return 0.0
-        if not traffic.is_closed_by_others(place):
+        if not traffic.is_blocked_by_others(place):
             return tuning.detour_after
         return max(tuning.detour_after, min(tuning.others_after, more / tuning.others_pace))
 

@@ -22,7 +22,7 @@ from roboglot.model.geometry import STILL
 if TYPE_CHECKING:
     from roboglot.autonomy.navigation.route import Route
 
-STANDS = 0.05  # m/s
+STANDS = 0.05  # m/s, or rad/s, up to which a robot stands
 RULED_AFTER = 0.6  # s of standing in the way of a robot that goes first: a plan may lead around it meanwhile
 FACED_AFTER, FACED_MORE = 3.0, 4.0  # s of standing face to face; the second is scaled by the robot's name
 BACKS_OUT_AFTER = 1.0  # … in a narrow place, for the one with the shorter way back
@@ -30,15 +30,15 @@ FACED_MAX = 10  # moves aside per drive for an object that may not want to pass
 ASIDE_MAX = 40  # per drive
 GO_SECONDS, STUCK_SECONDS = 10.0, 2.0
 WAIT_MIN, WAIT_MAX = 0.6, 12.0  # s in the waiting place
-LOOK = 0.2  # s
-THERE = 0.08  # m
+LOOK = 0.2  # s between two looks at the others while it waits
+THERE = 0.08  # m from the waiting place
 OLD_WAY = 2.5  # m of its route that must be free before it continues
 
 Points = NDArray[np.float64]
 
 
-class Courtesy:
-    """Courtesy of one drive: decides when to give way, and does so."""
+class GivingWay:
+    """Right of way of others during one drive: decides when to give way, and does so."""
 
     def __init__(self, course: Course, lookout: Lookout, action: Action) -> None:
         self._course, self._lookout, self._action = course, lookout, action
@@ -73,7 +73,7 @@ class Courtesy:
             return False
         if now - self._faced_since > FACED_AFTER + FACED_MORE * chance(self._robot.id, self._faced):
             return True
-        return now - self._faced_since > BACKS_OUT_AFTER and self._traffic.backs_out(self._course.belief.pose)
+        return now - self._faced_since > BACKS_OUT_AFTER and self._traffic.should_back_out(self._course.belief.pose)
 
     async def give_way(self, follower: Follower) -> float:
         """Move aside, and wait until the way is free, or for a while; return the metres driven."""
@@ -84,11 +84,11 @@ class Courtesy:
             aside = await self.go_aside(follower.top)
             follower.halt()
             if ruled:
-                await self._wait(path, WAIT_MIN, WAIT_MAX, ruled)
+                least, most = WAIT_MIN, WAIT_MAX
             else:
-                await self._wait(
-                    path, WAIT_MIN + FACED_MORE * chance(self._robot.id, self._faced), FACED_AFTER + FACED_MORE, ruled
-                )
+                least = WAIT_MIN + FACED_MORE * chance(self._robot.id, self._faced)
+                most = FACED_AFTER + FACED_MORE
+            await self._wait(path, least, most, ruled)
         finally:
             self._lookout.follower = follower
         return aside
@@ -99,7 +99,7 @@ class Courtesy:
         ruled = self._ruled_since < math.inf
         self._asides += 1
         self._faced += not ruled
-        ways = traffic.to_leave() if ruled else [*traffic.to_leave(), *traffic.face_to_face(pose)]
+        ways = traffic.ways_to_clear() if ruled else [*traffic.ways_to_clear(), *traffic.ways_of_faced(pose)]
         self._ruled_since = self._faced_since = math.inf
         traffic.giving_way = True
         self._lookout.follower = None

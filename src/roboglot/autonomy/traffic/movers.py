@@ -45,7 +45,7 @@ class Mover:
     vy: float = 0.0
     heading: float = 0.0  # rad: direction of the last motion
     moved_at: float = -math.inf  # s: time of the last motion
-    came: float = 0.0  # m: the farthest that it was from its first place
+    travelled: float = 0.0  # m: its largest distance from its first place
     _first: Point | None = None
     _seen: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=KEPT))
 
@@ -64,7 +64,7 @@ class Mover:
         self._seen.append((stamp, x, y))
         self.x, self.y, self.stamp = x, y, stamp
         self._first = self._first or self.point
-        self.came = max(self.came, self._first.distance_to(self.point))
+        self.travelled = max(self.travelled, self._first.distance_to(self.point))
         if len(self._seen) < 3:
             return
         middle = sum(stamp for stamp, _, _ in self._seen) / len(self._seen)

@@ -25,8 +25,8 @@ GIVEN_UP = 4.0  # s after which one that stands in it counts no more
 Points = NDArray[np.float64]
 
 
-class OneWay:
-    """Watches which of the others move."""
+class OneWayStretches:
+    """Narrow stretches that must stay free, found with the times at which the others were last seen moving."""
 
     def __init__(self) -> None:
         self._moved: dict[str, float] = {}  # time at which each was last seen moving, s

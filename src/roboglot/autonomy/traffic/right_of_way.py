@@ -46,7 +46,7 @@ class Way:
     radius: float
     outranks: bool  # whether it goes first by rule
     name: str = ""
-    lively: bool = False  # whether it is under way, although it may stand at present
+    under_way: bool = False  # although it may stand at present
 
     @property
     def seconds(self) -> Points:
@@ -80,20 +80,20 @@ def rank(announcement: Announcement) -> tuple[bool, int, str]:
     return not announcement.inside, -announcement.priority, announcement.robot
 
 
-def announced_way(other: Announcement, mine: Announcement, *, lively: bool = True) -> Way:
+def announced_way(other: Announcement, mine: Announcement, *, under_way: bool = True) -> Way:
     """Return the way that another robot announced, without what it passed since it planned that."""
     away = [other.pose.distance_to(point) for point in other.way[:PASSED]]
     ahead = other.way[away.index(min(away)) + 1 :] if away else ()
     points = [(other.pose.x, other.pose.y), *((point.x, point.y) for point in ahead)]
     outranks = rank(other) < rank(mine)
-    return Way(np.array(points), other.speed, other.radius, outranks, other.robot, lively)
+    return Way(np.array(points), other.speed, other.radius, outranks, other.robot, under_way)
 
 
-def expected_way(mover: Mover, *, lively: bool = True) -> Way:
+def expected_way(mover: Mover, *, under_way: bool) -> Way:
     """Return a mover's way, straight on."""
     speed = mover.speed
     points = straight_on(mover, speed * SIGHT + STEP if speed > 0.0 else STEP)
-    return Way(points, speed, mover.radius, outranks=False, lively=lively)
+    return Way(points, speed, mover.radius, outranks=False, under_way=under_way)
 
 
 def straight_on(mover: Mover, far: float) -> Points:
@@ -110,7 +110,7 @@ def straight_on(mover: Mover, far: float) -> Points:
 def through_narrow(mover: Mover, points: Points, narrow: NDArray[np.bool_]) -> Way:
     """Return the way of a mover in a narrow place: along ``points`` (straight on) out of it, with right of way."""
     end = int(np.argmin([*narrow, False])) + OUT
-    return Way(points[:end], mover.speed, mover.radius, outranks=True, lively=True)
+    return Way(points[:end], mover.speed, mover.radius, outranks=True, under_way=True)
 
 
 def shifted(way: Way) -> Points:

@@ -15,7 +15,8 @@ from roboglot.autonomy.navigation.route import SPACING
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.traffic.announcer import Announcer
-from roboglot.autonomy.traffic.one_way import OneWay
+from roboglot.autonomy.traffic.narrow_places import BETWEEN, NarrowPlaces
+from roboglot.autonomy.traffic.one_way import OneWayStretches
 from roboglot.autonomy.traffic.right_of_way import (
     ALIKE,
     CLEAR,
@@ -31,7 +32,6 @@ from roboglot.autonomy.traffic.right_of_way import (
     straight_on,
     through_narrow,
 )
-from roboglot.autonomy.traffic.tight import BETWEEN, Tight
 from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
@@ -44,15 +44,15 @@ SAME = 0.6  # m between the sighting and the announcement of the same robot
 BEFORE_NARROW = 0.6  # m in front of a narrow place where the robot waits: one that comes out has room to turn
 FACING = 0.27 + 0.5  # m between a hull and the centre of the object in front of it
 AROUND = 4.0  # m within which other robots may be the obstacle
-CAME = 1.0  # m from its first place from which a thing has moved: more than any is wide
-PARKED = 60.0  # s after its last motion for which what moved, still in sight, does not become part of the map
-LIVELY = 8.0  # s after its last motion for which a robot counts as under way
+TRAVELLED_MIN = 1.0  # m from its first place that prove a thing to move: more than any is wide
+PARKED = 60.0  # s after its last motion for which a thing in sight stays off the map
+UNDER_WAY_FOR = 8.0  # s after its last motion for which a robot counts as under way
 FAR = 3.0  # m at which such robots will have left before the robot arrives
 PROVEN = 0.4  # s for which a thing must be seen to go first: ghosts of walls, in a turn, last shorter
 STOPPED = 5.0  # s after which a robot standing in a narrow place may reverse, too
 SOON = 4.0  # s in which the robot will have left the first metres of its route
-GOES = 0.2  # m/s of a robot that leaves its place
-IN_IT = 0.9  # m between the centre of such a robot and the place that it blocks
+LEAVING_SPEED = 0.2  # m/s of a robot that leaves its place
+BLOCKED_WITHIN = 0.9  # m between the centre of such a robot and the place that it blocks
 TRAIL = 20  # places that were passed
 TRAIL_STEP = 0.2  # m between two of them
 
@@ -66,13 +66,13 @@ class Traffic:
         self._robot, self._belief = robot, belief
         self._announcer = Announcer(robot, belief)
         self._tracker: MoverTracker | None = None  # set once something drives: it needs the kernels
-        self._tight = Tight(robot.clock, belief)
+        self._narrow_places = NarrowPlaces(robot.clock, belief)
         self._ways: list[Way] = []
-        self._one_way = OneWay()
-        self._went: dict[str, float] = {}  # time of the last announced route by robot, s
+        self._one_way = OneWayStretches()
+        self._way_announced_at: dict[str, float] = {}  # time of the last announced route by robot, s
         self._trail: deque[Point] = deque(maxlen=TRAIL)
         self.meeting: Meeting | None = None  # with a robot that goes first
-        self.meets = False  # whether another robot is about to enter the route
+        self.meets_others = False  # whether another robot is about to enter the route
         self.giving_way = False  # the robot has to leave: no rule holds it up
 
     def close(self) -> None:
@@ -86,7 +86,7 @@ class Traffic:
         if not self._trail or self._trail[-1].distance_to(pose) > TRAIL_STEP:
             self._trail.append(pose.point)
         heard = self._announcer.heard(stamp)
-        movers = [*self._watch().observe(echoes, self._belief.map, pose, stamp)]
+        movers = [*self._mover_tracker().observe(echoes, self._belief.map, pose, stamp)]
         if heard:
             movers = [one for one in movers if not any(one.point.distance_to(other.pose) < SAME for other in heard)]
         self._announcer.watch((m.x, m.y, m.radius, m.speed) for m in movers if _is_passing(m, self._belief.map, stamp))
@@ -95,27 +95,28 @@ class Traffic:
         self._ways = []
         if heard:
             mine = self._announcer.announcement(stamp)
-            self._ways = [announced_way(other, mine, lively=self._goes(other)) for other in heard]
-        self._went = {other.robot: self._went[other.robot] for other in heard if other.robot in self._went}
-        self._ways += [_expected(self._tight, mover, pose, stamp, inside) for mover in movers]
+            self._ways = [announced_way(other, mine, under_way=self._is_under_way(other)) for other in heard]
+        present = {other.robot for other in heard}
+        self._way_announced_at = {name: at for name, at in self._way_announced_at.items() if name in present}
+        self._ways += [_expected(self._narrow_places, mover, pose, stamp, inside) for mover in movers]
         self._one_way.observe(self._ways, stamp)
 
     def _is_inside(self, pose: Pose, heard: list[Announcement], movers: list[Mover], stamp: float) -> bool:
         """True if the robot is in a narrow place, and there are others."""
-        if not heard and not any(stamp - mover.moved_at <= LIVELY for mover in movers):
+        if not heard and not any(stamp - mover.moved_at <= UNDER_WAY_FOR for mover in movers):
             return False
         behind = [(point.x, point.y) for point in self._trail]
         ahead = self._announcer.way[: round(BETWEEN / STEP)].tolist()
         line = np.array([(pose.x, pose.y), *behind, (pose.x, pose.y), *ahead])
-        return bool(self._tight.along(line, STEP, skipped=1)[len(behind)])
+        return bool(self._narrow_places.along(line, STEP, skipped=1)[len(behind)])
 
-    def _goes(self, other: Announcement) -> bool:
+    def _is_under_way(self, other: Announcement) -> bool:
         """True if another robot announces a way, or did so a moment ago."""
         if other.way:
-            self._went[other.robot] = other.stamp
-        return other.stamp - self._went.get(other.robot, -math.inf) <= LIVELY
+            self._way_announced_at[other.robot] = other.stamp
+        return other.stamp - self._way_announced_at.get(other.robot, -math.inf) <= UNDER_WAY_FOR
 
-    def _watch(self) -> MoverTracker:
+    def _mover_tracker(self) -> MoverTracker:
         if self._tracker is None:
             from roboglot.autonomy.traffic.movers import MoverTracker
 
@@ -123,20 +124,20 @@ class Traffic:
         return self._tracker
 
     @property
-    def moving(self) -> list[Point]:
+    def moving_places(self) -> list[Point]:
         """Current places of moving robots and things, and of those with a route."""
         return [Point(*way.points[0].tolist()) for way in self._ways if len(way.points) >= 2]
 
-    def far(self, pose: Pose) -> list[Point]:
+    def far_places(self, pose: Pose) -> list[Point]:
         """Return the places of others that will have left before the robot gets there."""
-        return [Point(*way.points[0].tolist()) for way in self._ways if way.lively and not way.is_within(FAR, pose)]
+        return [Point(*way.points[0].tolist()) for way in self._ways if way.under_way and not way.is_within(FAR, pose)]
 
-    def is_closed_by_others(self, place: Point, *, moving: bool = False) -> bool:
+    def is_blocked_by_others(self, place: Point, *, moving: bool = False) -> bool:
         """True if another robot that is under way is there, and will leave; ``moving``: only if it does so now."""
-        here, least = Pose(place.x, place.y), GOES if moving else 0.0
-        return any(way.lively and way.speed >= least and way.is_within(IN_IT, here) for way in self._ways)
+        here, least = Pose(place.x, place.y), LEAVING_SPEED if moving else 0.0
+        return any(way.under_way and way.speed >= least and way.is_within(BLOCKED_WITHIN, here) for way in self._ways)
 
-    def leaves(self, path: Points) -> float:
+    def seconds_until_clear(self, path: Points) -> float:
         """Return the time until all others are expected to have left ``path`` (dense), s; inf: one will not."""
         from roboglot.kernels.distance import directions  # it needs Numba
 
@@ -147,7 +148,7 @@ class Traffic:
             on = np.flatnonzero(close.any(axis=0))
             if not len(on):
                 continue
-            if way.speed < GOES or len(way.points) < 2:
+            if way.speed < LEAVING_SPEED or len(way.points) < 2:
                 return math.inf
             last = int(on[-1])
             beside = int(way.distances(mine)[:, last].argmin())
@@ -160,31 +161,32 @@ class Traffic:
 
     def is_among_others(self, pose: Pose) -> bool:
         """True if other robots or things that are under way are near."""
-        return any(way.lively and way.is_within(AROUND, pose) for way in self._ways)
+        return any(way.under_way and way.is_within(AROUND, pose) for way in self._ways)
 
     @property
-    def asks_for_way(self) -> bool:
-        """True if more than the next metres of the robot's way matter: there are others, or they listen."""
+    def needs_whole_way(self) -> bool:
+        """True if more than the robot's next metres matter: there are others, or they listen."""
         return bool(self._ways or self._announcer.frame)
 
-    def free(self, path: Points, way: Points, pose: Pose, speed: float, radius: float) -> float:
+    def free_distance(self, path: Points, way: Points, pose: Pose, speed: float, radius: float) -> float:
         """Return the distance along ``path`` (dense) free of movers and of others' right of way, m; inf: all.
 
         ``way`` (dense): the path and its continuation.
         """
         if not self._ways:
-            self.meeting, self.meets = None, False
+            self.meeting, self.meets_others = None, False
             return math.inf
         free = free_of_movers(path, pose, radius, self._ways)
         found = [] if self.giving_way else list(meetings(path, speed, radius, self._ways))
-        self.meets = any(meeting.way.outranks or not meeting.way.name for meeting in found)
+        self.meets_others = any(meeting.way.outranks or not meeting.way.name for meeting in found)
         ruled = [meeting for meeting in found if meeting.way.outranks]
         self.meeting = min(ruled, key=lambda meeting: meeting.along, default=None)
-        if self.meeting is None and not self.giving_way and not self._tight.holds(pose.point, Point(*way[0].tolist())):
-            now = self._robot.clock.time()
-            self.meeting = self._one_way.meeting(way, lambda: self._tight.along(way), speed, radius, self._ways, now)
+        if self.meeting is None and not self.giving_way:
+            places, now = self._narrow_places, self._robot.clock.time()
+            if not places.contains(pose.point, Point(*way[0].tolist())):
+                self.meeting = self._one_way.meeting(way, lambda: places.along(way), speed, radius, self._ways, now)
         if self.meeting is not None:
-            self.meets, free = True, min(free, self._before_narrow(way, self.meeting, radius))
+            self.meets_others, free = True, min(free, self._before_narrow(way, self.meeting, radius))
         return free
 
     def _before_narrow(self, path: Points, meeting: Meeting, radius: float) -> float:
@@ -192,7 +194,7 @@ class Traffic:
 
         In the other's way only where the robot is in it already.
         """
-        narrow = self._tight.along(path)
+        narrow = self._narrow_places.along(path)
         last = min(int(meeting.along / SPACING), len(narrow) - 1)
         if narrow[0] or not narrow[last]:
             return meeting.along
@@ -202,7 +204,7 @@ class Traffic:
         clear = np.flatnonzero(away >= radius + meeting.way.radius + CLEAR)
         return float(clear[-1] if len(clear) else entry) * SPACING
 
-    def shunned(self) -> list[tuple[Points, float]]:
+    def ways_to_avoid(self) -> list[tuple[Points, float]]:
         """Return ways to avoid, with their distances (m): of robots with right of way or without announcements."""
         mine = self._robot.description.radius
         return [
@@ -211,7 +213,7 @@ class Traffic:
             if len(way.points) >= 2 and (way.outranks or not way.name)
         ]
 
-    def to_leave(self) -> list[tuple[Points, float]]:
+    def ways_to_clear(self) -> list[tuple[Points, float]]:
         """Return the ways that a robot giving way must leave clear, with their distances (m)."""
         mine = self._robot.description.radius
         return [(way.points, mine + way.radius + 2 * CLEAR) for way in self._ways if way.outranks or not way.name]
@@ -228,7 +230,8 @@ class Traffic:
         """True if all that go first drive past ``pose``, or none does."""
         here = np.array([(pose.x, pose.y)])
         return not any(
-            len(points) >= 2 and bool((np.hypot(*(points - here).T) < reach).any()) for points, reach in self.to_leave()
+            len(points) >= 2 and bool((np.hypot(*(points - here).T) < reach).any())
+            for points, reach in self.ways_to_clear()
         )
 
     def is_faced(self, pose: Pose) -> bool:
@@ -236,7 +239,7 @@ class Traffic:
         reach = self._robot.description.radius + FACING
         return any(way.is_within(reach, pose) for way in self._ways)
 
-    def backs_out(self, pose: Pose) -> bool:
+    def should_back_out(self, pose: Pose) -> bool:
         """True if the way back out of a narrow place is shorter for this robot than for one that announces nothing.
 
         Both can see that, so they agree without words; straight on counts.
@@ -249,13 +252,13 @@ class Traffic:
         back = (here - there) / max(float(np.hypot(*(here - there))), 1e-6)
         steps = np.arange(0.0, THROUGH, STEP)[:, None]
         line = np.concatenate([[here], (here + steps * back)[::-1], there - steps * back])
-        narrow = self._tight.along(line, STEP, skipped=1)
+        narrow = self._narrow_places.along(line, STEP, skipped=1)
         mine, others = narrow[: len(steps)][::-1], narrow[len(steps) :]
         if not (mine[0] and others[0]):
             return False
         return int(np.argmin([*mine, False])) < int(np.argmin([*others, False]))
 
-    def face_to_face(self, pose: Pose) -> list[tuple[Points, float]]:
+    def ways_of_faced(self, pose: Pose) -> list[tuple[Points, float]]:
         """Return the way that robots close by may need: where this one came from, with its distance (m)."""
         mine, trail = self._robot.description.radius, [(point.x, point.y) for point in self._trail]
         near = [tuple(way.points[0].tolist()) for way in self._ways if way.is_within(mine + FACING, pose)]
@@ -276,7 +279,7 @@ class Traffic:
             return
         end = round(ANNOUNCED / SPACING)
         if self._ways and end < len(path):
-            narrow = self._tight.along(path)
+            narrow = self._narrow_places.along(path)
             while end < len(narrow) and narrow[end]:
                 end += 1
         if self.meeting is not None:
@@ -285,7 +288,7 @@ class Traffic:
 
     def rest(self) -> None:
         """Announce that the robot has no goal."""
-        self._announcer.way, self.meeting, self.meets = np.empty((0, 2)), None, False
+        self._announcer.way, self.meeting, self.meets_others = np.empty((0, 2)), None, False
         self._announcer.watch(())
 
 
@@ -294,7 +297,7 @@ def _is_passing(mover: Mover, grid: EvidenceGrid, stamp: float) -> bool:
 
     What shows another side of itself to a robot that drives around it seems to move, too, but not as far.
     """
-    if stamp - mover.moved_at > PARKED or mover.came < CAME:
+    if stamp - mover.moved_at > PARKED or mover.travelled < TRAVELLED_MIN:
         return False
     row = math.floor(mover.y / RESOLUTION) - grid.first_row
     column = math.floor(mover.x / RESOLUTION) - grid.first_column
@@ -302,11 +305,11 @@ def _is_passing(mover: Mover, grid: EvidenceGrid, stamp: float) -> bool:
     return within and bool(grid.evidence[row, column] < 0)
 
 
-def _expected(tight: Tight, mover: Mover, pose: Pose, stamp: float, inside: Callable[[], bool]) -> Way:
+def _expected(narrow_places: NarrowPlaces, mover: Mover, pose: Pose, stamp: float, inside: Callable[[], bool]) -> Way:
     """Return the way of a robot that announces none: it goes first if only it is in a narrow place."""
     stood, proven = stamp - mover.moved_at, stamp - mover.since >= PROVEN
-    if proven and stood <= STOPPED and tight.holds(pose.point, mover.point) and not inside():
+    if proven and stood <= STOPPED and narrow_places.contains(pose.point, mover.point) and not inside():
         points = straight_on(mover, THROUGH)
-        narrow = tight.along(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
+        narrow = narrow_places.along(np.concatenate([[(pose.x, pose.y)], points]), STEP, skipped=1)
         return through_narrow(mover, points, narrow)
-    return expected_way(mover, lively=stood <= LIVELY)
+    return expected_way(mover, under_way=stood <= UNDER_WAY_FOR)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION
-from roboglot.autonomy.traffic.narrow_places import narrow
+from roboglot.autonomy.traffic.narrow_finder import narrow
 from roboglot.kernels.distance import distances
 from roboglot.kernels.search import ways_from
 from roboglot.model.geometry import Point

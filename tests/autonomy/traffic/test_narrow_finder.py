@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
-from roboglot.autonomy.traffic.narrow_places import NarrowPlaces, narrow
+from roboglot.autonomy.traffic.narrow_finder import NarrowFinder, narrow
 from roboglot.kernels.distance import join
 
 
@@ -21,11 +21,11 @@ def test_pieces_are_as_the_whole(shape: tuple[int, int]) -> None:
     inside = [0 <= row < shape[0] and 0 <= column < shape[1] for column, row in cells]
     expected = [ok and bool(whole[row, column]) for ok, (column, row) in zip(inside, cells, strict=True)]
     assert 0 < sum(expected) < sum(inside)
-    assert NarrowPlaces().at(grid, points, 0.0).tolist() == expected
+    assert NarrowFinder().at(grid, points, 0.0).tolist() == expected
 
 
 def test_maps_count_as_a_moment_ago() -> None:
-    grid, places = EvidenceGrid(), NarrowPlaces()
+    grid, places = EvidenceGrid(), NarrowFinder()
     grid.evidence = np.full((60, 200), -5, np.int16)
     here, there = np.array([(2.0, 1.5)]), np.array([(2.0, 1.5), (3.5, 1.5)])
     assert not places.at(grid, here, 0.0).any()
