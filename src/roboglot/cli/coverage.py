@@ -74,16 +74,22 @@ def page(measured: dict[str, Coverage]) -> str:
         "answer with the protocol's own error.",
     ]
     for name, coverage in measured.items():
-        lines += ["", f"## {name}: {len(coverage.done)} of {len(coverage.rows)}", ""]
-        lines += ["| chapter | whole | missing |", "|---|---|---|"]
-        for chapter in dict.fromkeys(row.chapter for row in coverage.rows):
-            keys = [row.key for row in coverage.rows if row.chapter == chapter]
-            missing = [key for key in keys if key not in coverage.done]
-            listed = ", ".join(f"`{key}`" for key in missing if key not in coverage.partly)
-            lines.append(f"| {chapter} | {len(keys) - len(missing)}/{len(keys)} | {listed} |")
-        if coverage.partly:
-            lines += ["", "In part:", ""]
-            lines += [f"- `{key}`: {why}" for key, why in coverage.partly.items()]
-        for note in coverage.notes:
-            lines += ["", note]
+        lines += _section(name, coverage)
     return "\n".join(lines) + "\n"
+
+
+def _section(name: str, coverage: Coverage) -> list[str]:
+    """Return the lines about one protocol."""
+    lines = ["", f"## {name}: {len(coverage.done)} of {len(coverage.rows)}", ""]
+    lines += ["| chapter | whole | missing |", "|---|---|---|"]
+    for chapter in dict.fromkeys(row.chapter for row in coverage.rows):
+        keys = [row.key for row in coverage.rows if row.chapter == chapter]
+        missing = [key for key in keys if key not in coverage.done]
+        listed = ", ".join(f"`{key}`" for key in missing if key not in coverage.partly)
+        lines.append(f"| {chapter} | {len(keys) - len(missing)}/{len(keys)} | {listed} |")
+    if coverage.partly:
+        lines += ["", "In part:", ""]
+        lines += [f"- `{key}`: {why}" for key, why in coverage.partly.items()]
+    for note in coverage.notes:
+        lines += ["", note]
+    return lines

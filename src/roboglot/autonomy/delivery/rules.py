@@ -57,23 +57,33 @@ def check_requests(
     """Raise Refused, NotFound or InvalidGoal if any of the requests cannot be accepted."""
     taken = {box: order.number for order in open_orders for box in order.request.boxes}
     for request in requests:
-        if policy.work_mode is WorkMode.DISPATCH and not request.remote:
-            raise Refused("in this work mode only remote orders are accepted")
-        if policy.work_mode is WorkMode.RECYCLE and request.kind is not OrderKind.RECYCLE and not request.remote:
-            raise Refused("in this work mode the robot only collects dishes")
-        if len(request.stops) > STOPS_MAX or len(request.boxes) > BOXES_MAX:
-            raise InvalidGoal(f"at most {STOPS_MAX} stops and {BOXES_MAX} boxes")
-        for name in (*request.stops, request.target):
-            place_named(robot, name)
-        if request.kind in (OrderKind.TAKEOUT, OrderKind.STATION) and not request.boxes:
-            raise InvalidGoal("a takeout needs a box")
-        if request.kind is OrderKind.STATION and not request.stops:
-            raise InvalidGoal("the first stop is the cabinet")
+        _check_mode(policy.work_mode, request)
+        _check_stops(robot, request)
         for box in request.boxes:
             _check_box(robot, box)
             if box in taken:
                 raise Refused(f"box {box.box} belongs to order {taken[box]}")
             taken[box] = request.target
+
+
+def _check_mode(mode: WorkMode, request: OrderRequest) -> None:
+    if request.remote:
+        return
+    if mode is WorkMode.DISPATCH:
+        raise Refused("in this work mode only remote orders are accepted")
+    if mode is WorkMode.RECYCLE and request.kind is not OrderKind.RECYCLE:
+        raise Refused("in this work mode the robot only collects dishes")
+
+
+def _check_stops(robot: Robot, request: OrderRequest) -> None:
+    if len(request.stops) > STOPS_MAX or len(request.boxes) > BOXES_MAX:
+        raise InvalidGoal(f"at most {STOPS_MAX} stops and {BOXES_MAX} boxes")
+    for name in (*request.stops, request.target):
+        place_named(robot, name)
+    if request.kind in (OrderKind.TAKEOUT, OrderKind.STATION) and not request.boxes:
+        raise InvalidGoal("a takeout needs a box")
+    if request.kind is OrderKind.STATION and not request.stops:
+        raise InvalidGoal("the first stop is the cabinet")
 
 
 def _check_box(robot: Robot, choice: BoxChoice) -> None:

@@ -6,6 +6,7 @@ import math
 from collections import deque
 from collections.abc import AsyncIterator
 from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
+from typing import NamedTuple
 
 from roboglot.autonomy.docking.mark_finder import between_strips, find_board, find_shelf
 from roboglot.autonomy.navigation.base_actions import PERIOD
@@ -30,6 +31,13 @@ SENSES: dict[Mark, type[Vision | Reflectors | Lidar]] = {
     Mark.BOARD: Lidar,
     Mark.SHELF: Lidar,
 }
+
+
+class Sighting(NamedTuple):
+    """A mark's pose in base_link at ``stamp``, s."""
+
+    stamp: float
+    pose: Pose
 
 
 class MarkWatch:
@@ -94,34 +102,41 @@ class MarkWatch:
         """Return a new sighting, in odom; None: there is none."""
         reading = self._robot[Odometry].reading
         self._trail.append((reading.stamp, reading.pose))
-        stamp, seen = self._sighting()
-        if seen is None or stamp <= self._seen_at:
+        sighting = self._sighting()
+        if sighting is None or sighting.stamp <= self._seen_at:
             return None
-        self._seen_at = stamp
+        self._seen_at = stamp = sighting.stamp
         _, here = min(self._trail, key=lambda step: abs(step[0] - stamp))
-        return here.compose(seen)
+        return here.compose(sighting.pose)
 
-    def _sighting(self) -> tuple[float, Pose | None]:
-        """Return stamp and pose of the newest sighting, in base_link at that stamp."""
-        robot, goal = self._robot, self._goal
-        match goal.mark:
+    def _sighting(self) -> Sighting | None:
+        """Return the newest sighting; None if there is none."""
+        match self._goal.mark:
             case Mark.PRINTED:
-                tags = robot[Vision].tags.latest
-                seen = [tag for tag in tags.seen if not goal.texts or tag.text in goal.texts] if tags else []
-                return (tags.stamp, seen[0].pose) if tags and seen else (0.0, None)
+                return self._printed()
             case Mark.REFLECTORS:
-                strips = robot[Reflectors].detector.latest
-                ahead = [strip for strip in strips.seen if strip.place.x > 0.0] if strips else []
-                if strips is None or len(ahead) < goal.strips:
-                    return 0.0, None
-                return strips.stamp, between_strips(tuple(ahead[: goal.strips]))
-        scan = robot[Lidar].scan
+                return self._reflectors()
+        scan = self._robot[Lidar].scan
         if scan is None:
-            return 0.0, None
+            return None
         points = self._reader.read(scan).points
-        if goal.mark is Mark.BOARD:
-            return scan.stamp, find_board(points)
-        if (shelf := find_shelf(points)) is None:
-            return 0.0, None
-        self.reach = shelf[1]
-        return scan.stamp, shelf[0]
+        if self._goal.mark is Mark.BOARD:
+            board = find_board(points)
+            return None if board is None else Sighting(scan.stamp, board)
+        shelf = find_shelf(points)
+        if shelf is None:
+            return None
+        pose, self.reach = shelf
+        return Sighting(scan.stamp, pose)
+
+    def _printed(self) -> Sighting | None:
+        tags, texts = self._robot[Vision].tags.latest, self._goal.texts
+        seen = [tag for tag in tags.seen if not texts or tag.text in texts] if tags else []
+        return Sighting(tags.stamp, seen[0].pose) if tags and seen else None
+
+    def _reflectors(self) -> Sighting | None:
+        strips, wanted = self._robot[Reflectors].detector.latest, self._goal.strips
+        ahead = [strip for strip in strips.seen if strip.place.x > 0.0] if strips else []
+        if strips is None or len(ahead) < wanted:
+            return None
+        return Sighting(strips.stamp, between_strips(tuple(ahead[:wanted])))

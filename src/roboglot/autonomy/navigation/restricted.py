@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
 
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.actions import Action
@@ -44,26 +45,37 @@ class RestrictedAreas:
         if not drawn.areas and not radio.claims and self._held is None:
             return  # most maps have none
         areas = {_name(area): area for area in drawn.areas_of(AreaKind.RESTRICTED) if area.robots_max}
-        pose, ahead = self._belief.pose, self._ahead()
-        full: str | None = None
-        for name, area in areas.items():
-            if any(area.contains(place) for place in ahead):
-                if name in radio.claims or radio.others(name) < (area.robots_max or 0):
-                    self._entering[name] = event.stamp + SOON
-                else:
-                    full = name
-        if self._held is None and full is not None:
-            self._hold(full)
-        elif self._held is not None:
+        full = self._enter(areas, event.stamp)
+        if self._held is not None:
             self._wait(areas, event.stamp)
-        radius = self._robot.description.radius
-        inside = {name for name, area in areas.items() if _touches(area, pose, radius)}
-        entering = self._entering.items()
-        self._entering = {name: until for name, until in entering if until > event.stamp and name not in inside}
-        others = {name for name in radio.claims if not name.startswith(AREA)}  # such as a ticket for the lift
-        claims = inside | self._entering.keys() | others
+        elif full is not None:
+            self._hold(full)
+        claims = self._claims(areas, event.stamp)
         if claims != radio.claims:
             radio.claim(claims)
+
+    def _enter(self, areas: Mapping[str, Area], now: float) -> str | None:
+        """Claim the areas ahead that have room; return the name of one that has none."""
+        radio, ahead = self._robot[TrafficRadio], self._ahead()
+        full: str | None = None
+        for name, area in areas.items():
+            if not any(area.contains(place) for place in ahead):
+                continue
+            if name in radio.claims or radio.others(name) < (area.robots_max or 0):
+                self._entering[name] = now + SOON
+            else:
+                full = name
+        return full
+
+    def _claims(self, areas: Mapping[str, Area], now: float) -> AbstractSet[str]:
+        """Return the areas that the robot is in or about to enter, and what else it claims."""
+        pose, radius = self._belief.pose, self._robot.description.radius
+        inside = {name for name, area in areas.items() if _touches(area, pose, radius)}
+        entering = self._entering.items()
+        self._entering = {name: until for name, until in entering if until > now and name not in inside}
+        claimed = self._robot[TrafficRadio].claims
+        others = {name for name in claimed if not name.startswith(AREA)}  # such as a ticket for the lift
+        return inside | self._entering.keys() | others
 
     def _hold(self, name: str) -> None:
         """Pause the driving action, unless it is manual or paused already."""

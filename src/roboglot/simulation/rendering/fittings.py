@@ -49,38 +49,50 @@ Make = Callable[[], Mesh]
 
 def fittings(robot: Robot, hull: Hull) -> Iterator[Make]:
     """Yield functions that make the robot's fittings in their present state. Quick: meshes are made later."""
-    body, belly = hull.body, hull.belly
-    gimbal_colours: tuple[Colour, ...] = ()
+    yield from _lamps(robot, hull)
+    yield from _legs(robot, hull)
+    gimbal, arm = hull.body.get(GimbalSection), hull.body.get(ArmSection)
+    if gimbal and Gimbal in robot:
+        yield _gimbal_of(robot, hull, gimbal)
+    if arm and Arm in robot:
+        yield _arm_of(robot, hull, arm)
+
+
+def _lamps(robot: Robot, hull: Hull) -> Iterator[Make]:
+    """Yield the zones that are lit, but for those on the gimbal."""
+    if Light not in robot:
+        return
+    light, body = robot[Light], hull.body
+    for zone in light.zones:
+        if zone in PLACES and (mean := _mean(light.lamps(zone))) != DARKNESS:
+            yield partial(_lamp, zone, mean, body.hull.radius, round(hull.belly, 3), body.hull.torso_height)
+
+
+def _legs(robot: Robot, hull: Hull) -> Iterator[Make]:
+    base = hull.body.base
+    for foot in robot[Legs].feet.values() if hull.body.walks and Legs in robot else ():
+        x, y, z = round(foot.position.x, 2), round(foot.position.y, 2), round(foot.position.z, 2)
+        hip = math.copysign(base.wheel_base / 2, x), math.copysign(base.track / 2, y), round(hull.belly, 2)
+        yield partial(_leg, hip, (x, y, z))
+
+
+def _gimbal_of(robot: Robot, hull: Hull, gimbal: GimbalSection) -> Make:
+    colours: tuple[Colour, ...] = ()
     if Light in robot:
         light = robot[Light]
-        for zone in light.zones:
-            on_gimbal = zone.startswith("gimbal")
-            if not on_gimbal and zone not in PLACES:
-                continue
-            mean = _mean(light.lamps(zone))
-            if on_gimbal:
-                gimbal_colours += (mean,)
-            elif mean != DARKNESS:
-                yield partial(_lamp, zone, mean, body.hull.radius, round(belly, 3), body.hull.torso_height)
-    if body.walks and Legs in robot:
-        for foot in robot[Legs].feet.values():
-            x, y, z = round(foot.position.x, 2), round(foot.position.y, 2), round(foot.position.z, 2)
-            hip = math.copysign(body.base.wheel_base / 2, x), math.copysign(body.base.track / 2, y), round(belly, 2)
-            yield partial(_leg, hip, (x, y, z))
-    gimbal, blaster = body.get(GimbalSection), body.get(BlasterSection)
-    if gimbal and Gimbal in robot:
-        angles = robot[Gimbal].angles
-        at = (gimbal.forward, 0.0, round(belly, 3) + gimbal.above_belly)
-        muzzle = blaster.muzzle if blaster else 0.0
-        yield partial(_gimbal, at, round(angles.pitch, 2), round(angles.yaw, 2), muzzle, gimbal_colours)
-    arm, gripper = body.get(ArmSection), body.get(GripperSection)
-    if arm and Arm in robot:
-        end = robot[Arm].position
-        shoulder = (arm.forward, round(belly, 3) + arm.above_belly)
-        reach = arm.radius
-        opening = robot[Gripper].opening if Gripper in robot else 0.0
-        fingers = gripper.fingers if gripper else 0.0
-        yield partial(_arm, shoulder, (round(end.x, 3), round(end.z, 3)), reach, round(opening, 3), fingers)
+        colours = tuple(_mean(light.lamps(zone)) for zone in light.zones if zone.startswith("gimbal"))
+    blaster, angles = hull.body.get(BlasterSection), robot[Gimbal].angles
+    at = (gimbal.forward, 0.0, round(hull.belly, 3) + gimbal.above_belly)
+    muzzle = blaster.muzzle if blaster else 0.0
+    return partial(_gimbal, at, round(angles.pitch, 2), round(angles.yaw, 2), muzzle, colours)
+
+
+def _arm_of(robot: Robot, hull: Hull, arm: ArmSection) -> Make:
+    gripper, end = hull.body.get(GripperSection), robot[Arm].position
+    shoulder = (arm.forward, round(hull.belly, 3) + arm.above_belly)
+    opening = robot[Gripper].opening if Gripper in robot else 0.0
+    fingers = gripper.fingers if gripper else 0.0
+    return partial(_arm, shoulder, (round(end.x, 3), round(end.z, 3)), arm.radius, round(opening, 3), fingers)
 
 
 def _mean(lamps: Sequence[Colour]) -> Colour:
