@@ -182,27 +182,11 @@ def _initialiser(owner: type, *, frozen: bool) -> Callable[..., object]:
     by_name: list[str] = []
     lines: list[str] = []
     for field in dataclasses.fields(owner):
-        name = value = field.name
-        made = field.default_factory is not dataclasses.MISSING
-        if made:
-            known[f"_make_{name}"] = field.default_factory
-            value = f"_make_{name}() if {name} is _factory else {name}" if field.init else f"_make_{name}()"
-        elif field.default is not dataclasses.MISSING:
-            known[f"_default_{name}"] = field.default
-            value = name if field.init else f"_default_{name}"
-        elif not field.init:
-            continue
+        default, value = _default(field, known)
         if field.init:
-            default = "=_factory" if made else f"=_default_{name}" if f"_default_{name}" in known else ""
-            (by_name if field.kw_only else in_order).append(name + default)
-        slot = getattr(owner, name, None)
-        if not frozen:
-            lines.append(f"self.{name} = {value}")
-        elif isinstance(slot, MemberDescriptorType):
-            known[f"_set_{name}"] = slot.__set__
-            lines.append(f"_set_{name}(self, {value})")
-        else:
-            lines.append(f"_set(self, {name!r}, {value})")
+            (by_name if field.kw_only else in_order).append(field.name + default)
+        if value:
+            lines.append(_assignment(owner, field.name, value, known) if frozen else f"self.{field.name} = {value}")
     if hasattr(owner, "__post_init__"):
         lines.append("self.__post_init__()")
     parameters = ", ".join(["self", *in_order, *(["*", *by_name] if by_name else [])])
@@ -214,3 +198,28 @@ def _initialiser(owner: type, *, frozen: bool) -> Callable[..., object]:
     method.__annotations__ = {field.name: field.type for field in dataclasses.fields(owner) if field.init}
     method.__annotations__["return"] = None
     return method
+
+
+def _default(field: dataclasses.Field[object], known: dict[str, object]) -> tuple[str, str]:
+    """Return a field's default in the parameters, and the expression for its value; "" for none.
+
+    Names that they use are added to ``known``.
+    """
+    name = field.name
+    if field.default_factory is not dataclasses.MISSING:
+        known[f"_make_{name}"] = field.default_factory
+        made = f"_make_{name}()"
+        return "=_factory", f"{made} if {name} is _factory else {name}" if field.init else made
+    if field.default is not dataclasses.MISSING:
+        known[f"_default_{name}"] = field.default
+        return f"=_default_{name}", name if field.init else f"_default_{name}"
+    return "", name if field.init else ""
+
+
+def _assignment(owner: type, name: str, value: str, known: dict[str, object]) -> str:
+    """Return the statement that sets a field of a frozen class; a descriptor that it uses is added to ``known``."""
+    slot = getattr(owner, name, None)
+    if isinstance(slot, MemberDescriptorType):
+        known[f"_set_{name}"] = slot.__set__
+        return f"_set_{name}(self, {value})"
+    return f"_set(self, {name!r}, {value})"

@@ -80,23 +80,8 @@ class _Scan:
 
 def read_rawlog(path: Path) -> DriveLog:
     """Read the file at ``path``. Raises BadDriveLog."""
-    data, unread = _unpacked(path), Counter[str]()
-    scans: list[_Scan] = []
-    stamped: list[tuple[float, Pose]] = []
-    pose, moved = ORIGIN, False
-    for found in HEADER.finditer(data):
-        name = found[1].decode()
-        try:
-            if name == SCAN:
-                scans.append(_scan(data, found.start(), pose if moved else None))
-            elif name == ODOMETRY:
-                stamped.append(_odometry(data, found.start()))
-            else:
-                pose, moved = pose.compose(_movement(data, found.end())), True
-        except (ValueError, struct.error) as error:
-            unread[f"{name}: {error}"] += 1
-        if len(scans) > SCANS_MAX:
-            raise BadDriveLog(f"{path.name}: more than {SCANS_MAX} scans")
+    unread = Counter[str]()
+    scans, stamped = _objects(_unpacked(path), path.name, unread)
     if not scans:
         raise BadDriveLog(f"{path.name}: no readable {SCAN}")
     label, _ = Counter(scan.label for scan in scans).most_common(1)[0]
@@ -104,6 +89,30 @@ def read_rawlog(path: Path) -> DriveLog:
     chosen = [scan for scan in scans if scan.label == label]
     recorded = _joined(chosen, stamped) if stamped else [RecordedScan(s.scan, s.odometry or ORIGIN) for s in chosen]
     return DriveLog(path.stem, recorded, dict(unread))
+
+
+def _objects(data: bytes, name: str, unread: Counter[str]) -> tuple[list[_Scan], list[tuple[float, Pose]]]:
+    """Return the scans, and the odometry with its stamps; what cannot be read is counted in ``unread``.
+
+    Raises BadDriveLog.
+    """
+    scans: list[_Scan] = []
+    stamped: list[tuple[float, Pose]] = []
+    pose, moved = ORIGIN, False
+    for found in HEADER.finditer(data):
+        kind = found[1].decode()
+        try:
+            if kind == SCAN:
+                scans.append(_scan(data, found.start(), pose if moved else None))
+            elif kind == ODOMETRY:
+                stamped.append(_odometry(data, found.start()))
+            else:
+                pose, moved = pose.compose(_movement(data, found.end())), True
+        except (ValueError, struct.error) as error:
+            unread[f"{kind}: {error}"] += 1
+        if len(scans) > SCANS_MAX:
+            raise BadDriveLog(f"{name}: more than {SCANS_MAX} scans")
+    return scans, stamped
 
 
 def _unpacked(path: Path) -> bytes:

@@ -107,11 +107,10 @@ class Reel:
             sought = {place for place in topics if place not in found or found[place].at < self._ends[number]}
             if not sought:
                 break
-            if sought & self._chunks[number].topics:
-                for shot in self._read(self._chunks[number]):
-                    if shot.at <= at and shot.topic in sought:
-                        known = found.get(shot.topic)
-                        found[shot.topic] = shot if known is None or known.at <= shot.at else known
+            chunk = self._chunks[number]
+            for shot in self._read(chunk) if sought & chunk.topics else ():
+                if shot.at <= at and shot.topic in sought and shot.at >= found.get(shot.topic, shot).at:
+                    found[shot.topic] = shot
         return sorted(found.values(), key=_time)
 
     # -- files --
@@ -139,14 +138,17 @@ class Reel:
         for record in stream(path, file, chunks=True):
             if isinstance(record, Chunk):
                 with suppress(BadRecording):  # what cannot be read here is skipped there, too
-                    inside = unpacked(path, record)
-                    schemas |= {schema.id: schema for schema in inside if isinstance(schema, Schema)}
-                    channels = [channel for channel in inside if isinstance(channel, Channel)]
-                    places |= self._places([new for new in channels if new.id not in places], schemas)
-                    heard = {message.channel_id for message in inside if isinstance(message, Message)}
+                    heard = self._heard_in(unpacked(path, record), schemas, places)
                     if topics := frozenset(places[channel] for channel in heard if channel in places):
                         yield _Chunk(record.message_start_time, record.message_end_time, part, offset, topics)
             offset = file.tell()
+
+    def _heard_in(self, records: Sequence[object], schemas: dict[int, Schema], places: dict[int, int]) -> set[int]:
+        """Return the channels with messages among a chunk's records; new ``schemas`` and ``places`` are added."""
+        schemas |= {record.id: record for record in records if isinstance(record, Schema)}
+        channels = [record for record in records if isinstance(record, Channel)]
+        places |= self._places([new for new in channels if new.id not in places], schemas)
+        return {record.channel_id for record in records if isinstance(record, Message)}
 
     def _places(self, channels: Collection[Channel], schemas: Mapping[int, Schema]) -> dict[int, int]:
         """Return the indices of these channels in ``topics``; new topics are added."""

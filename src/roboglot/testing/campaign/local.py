@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -52,12 +53,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
     running: list[_Running] = []
 
     def start(trial: Trial, attempt: int) -> None:
-        ear, mouth = context.Pipe(duplex=False)
-        scratch = tempfile.mkdtemp(prefix="roboglot-trial-")
-        process = context.Process(target=_play, args=(trial, leave(trial), scratch, mouth), daemon=False)
-        process.start()
-        mouth.close()
-        running.append(_Running(trial, attempt, process, ear, _now() + seconds_max, scratch))
+        running.append(_start(context, trial, attempt, leave(trial), seconds_max))
 
     with interruptions() as interrupted:
         try:
@@ -66,9 +62,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
                     start(trial, 1)
                 if not running:
                     return
-                nearest = min(one.deadline for one in running)
-                wait([interrupted, *(one.ear for one in running)], max(0.0, nearest - _now()))
-                for one in [each for each in running if each.ear.poll() or each.deadline <= _now()]:
+                for one in _done(running, interrupted):
                     running.remove(one)
                     result = _result(one, seconds_max)
                     if result.outcome is Outcome.CRASHED and one.attempt < ATTEMPTS_MAX:
@@ -81,6 +75,23 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
             for one in running:
                 _end(one)
     raise KeyboardInterrupt
+
+
+def _start(context: ForkServerContext, trial: Trial, attempt: int, folder: Path | None, seconds_max: float) -> _Running:
+    """Start a trial in its own process."""
+    ear, mouth = context.Pipe(duplex=False)
+    scratch = tempfile.mkdtemp(prefix="roboglot-trial-")
+    process = context.Process(target=_play, args=(trial, folder, scratch, mouth), daemon=False)
+    process.start()
+    mouth.close()
+    return _Running(trial, attempt, process, ear, _now() + seconds_max, scratch)
+
+
+def _done(running: list[_Running], interrupted: Connection) -> list[_Running]:
+    """Wait until a trial ends, is late, or is interrupted; return those that have ended or are late."""
+    nearest = min(one.deadline for one in running)
+    wait([interrupted, *(one.ear for one in running)], max(0.0, nearest - _now()))
+    return [one for one in running if one.ear.poll() or one.deadline <= _now()]
 
 
 def _start_fork_server() -> None:
