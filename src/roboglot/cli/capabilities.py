@@ -138,15 +138,19 @@ def _chapters(door: DoorType, columns: list[RobotKind]) -> list[str]:
 
 def _refusals(door: DoorType, drivers: list[RobotKind]) -> list[str]:
     """Return a row for each group of requests that all drivers' robots refuse for lack of the same components."""
-    needs, rows = {str(op.key): op.needs for op in door.table()}, door.contracts[0].rows()
+    needs = {str(op.key): op.needs for op in door.table()}
     alike: dict[tuple[str, ...], list[str]] = {}
-    for row in rows:
-        if row.key in needs:
-            lacks = tuple(", ".join(_names(needs[row.key] - kind.components)) for kind in drivers)
-            if any(lacks):
-                name = row.key.removeprefix("cyberdog.") if door.name == "visual" else row.name
-                alike.setdefault(lacks, []).append(f"`{name}`")
-    return [_row(" ".join(names), [f"no {lack}" if lack else "" for lack in lacks]) for lacks, names in alike.items()]
+    for row in door.contracts[0].rows():
+        if row.key not in needs:
+            continue
+        lacks = tuple(", ".join(_names(needs[row.key] - kind.components)) for kind in drivers)
+        name = row.key.removeprefix("cyberdog.") if door.name == "visual" else row.name
+        alike.setdefault(lacks, []).append(f"`{name}`")
+    return [
+        _row(" ".join(names), [f"no {lack}" if lack else "" for lack in lacks])
+        for lacks, names in alike.items()
+        if any(lacks)
+    ]
 
 
 def _partly(door: DoorType) -> list[str]:

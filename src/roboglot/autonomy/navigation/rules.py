@@ -118,15 +118,7 @@ def layers(
     lines = drawn.lines_of(LineKind.TRACK) if tracks is not Tracks.FREE else ()
     if not (drawn.areas or drawn.lines_of(LineKind.WALL) or lines):
         return None
-    extra: NDArray[np.float32] | None = None
-    if lines:
-        extra = np.where(
-            frame.beside(lines, TRACK_HALF), 0.0, np.inf if tracks is Tracks.STRICT else OFF_TRACK_COST
-        ).astype(np.float32)
-        if tracks is Tracks.STRICT:
-            for point in (start, *goals):
-                entry = min(ENTRY, _distance(lines, point) + ENTRY_SLACK)
-                extra[frame.near(point, entry) & np.isinf(extra)] = ENTRY_COST
+    extra = _off_tracks(lines, frame, (start, *goals), strict=tracks is Tracks.STRICT) if lines else None
     closed = frame.beside(drawn.lines_of(LineKind.WALL), WALL_HALF)
     for area in _kept_out_of(drawn):
         if area.contains(start):
@@ -136,6 +128,18 @@ def layers(
         elif area.kind is not AreaKind.ELEVATOR or not any(map(area.contains, goals)):
             closed |= frame.inside(area)
     return Layers(closed, extra, _speeds(drawn, frame))
+
+
+def _off_tracks(
+    lines: tuple[Line, ...], frame: GridFrame, points: tuple[Point, ...], *, strict: bool
+) -> NDArray[np.float32]:
+    """Return the extra cost off the tracks; ``strict``: only the ways between them and ``points`` leave them."""
+    off = np.inf if strict else OFF_TRACK_COST
+    cost: NDArray[np.float32] = np.where(frame.beside(lines, TRACK_HALF), 0.0, off).astype(np.float32)
+    for point in points if strict else ():
+        entry = min(ENTRY, _distance(lines, point) + ENTRY_SLACK)
+        cost[frame.near(point, entry) & np.isinf(cost)] = ENTRY_COST
+    return cost
 
 
 def _distance(lines: tuple[Line, ...], point: Point) -> float:

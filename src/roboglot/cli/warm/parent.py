@@ -90,18 +90,22 @@ class WarmParent:
             elif time.monotonic() - idle_since >= IDLE:
                 self._stop_listening()
                 continue
-            with contextlib.suppress(BlockingIOError):
-                os.read(self._wake, 4096)
-            for descriptor in ready & self._callers.keys():
-                if not self._forward_signals(descriptor):
-                    poll.unregister(descriptor)
-                    self._let_go(descriptor)
-            for descriptor in self._reap():
-                poll.unregister(descriptor)
-                self._callers.pop(descriptor)[1].close()
-            self._kill_late()
+            self._look_after(poll, ready)
             if self._listening is not None and self._listening.fileno() in ready:
                 self._accept(poll)
+
+    def _look_after(self, poll: select.poll, ready: set[int]) -> None:
+        """Forward signals of the callers in ``ready`` to their commands; report commands that have ended."""
+        with contextlib.suppress(BlockingIOError):
+            os.read(self._wake, 4096)
+        for descriptor in ready & self._callers.keys():
+            if not self._forward_signals(descriptor):
+                poll.unregister(descriptor)
+                self._let_go(descriptor)
+        for descriptor in self._reap():
+            poll.unregister(descriptor)
+            self._callers.pop(descriptor)[1].close()
+        self._kill_late()
 
     def _accept(self, poll: select.poll) -> None:
         assert self._listening is not None

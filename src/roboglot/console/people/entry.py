@@ -32,24 +32,27 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
 
     Raises Unknown.
     """
-    address, who = address_of(scope), ""
+    address, cookie, who = address_of(scope), cookie_of(scope), ""
     shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
-    session = None if shown else sessions.find(cookie_of(scope))
+    session = None if shown else sessions.find(cookie)
     if session is not None:
-        cookie = cookie_of(scope)
         session_lasts.set(lambda: sessions.find(cookie) is not None)
-    proof = Proof(ProofKind.HTTP, shown) if shown else session.proof if session is not None else NO_PROOF
-    admission = admission_of(desk)
-    if admission is not None:
-        known = admission.cached_identity(address, proof)
+    if (admission := admission_of(desk)) is not None:
+        proof = Proof(ProofKind.HTTP, shown) if shown else session.proof if session is not None else NO_PROOF
         try:
-            who = known if known is not None else await admission.admit(address, proof)
+            who = await _identity(admission, address, proof)
         except LockedOut:
             raise
         except Unknown:
             if session is not None:  # a session replaces earlier proofs
-                await sessions.end(cookie_of(scope))
+                await sessions.end(cookie)
             raise
-    named = who if shown and admission is not None else session.name if session is not None else ""
+    named = session.name if session is not None else who if shown else ""
     set_client(f"{CLIENT} {named or address.rpartition(':')[0]}".strip(), address, who)
     return named
+
+
+async def _identity(admission: Admission, address: str, proof: Proof) -> str:
+    """Return the name that a proof proves. Raises Unknown."""
+    known = admission.cached_identity(address, proof)
+    return known if known is not None else await admission.admit(address, proof)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import builtins
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from roboglot.programs.language.problems import Problem, ProblemKind
 from roboglot.spelling import nearest
@@ -61,8 +61,8 @@ class Names:
 def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
     """Yield problems for undefined names and for misspelt parts of dotted names (``cyberdog.motion.trun``)."""
     bound = set(_bound(tree))
-    roots = names.roots
-    known = bound | BUILTINS | names.plain | roots | {"time", "__name__"}
+    known = bound | BUILTINS | names.plain | names.roots | {"time", "__name__"}
+    roots = names.roots - bound
     branches = {prefix for name in names.dotted for prefix in _prefixes(name)}
     for node in ast.walk(tree):
         match node:
@@ -70,13 +70,19 @@ def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
                 yield _unknown(node, name, "", known)
             case ast.Attribute():
                 chain = _chain(node)
-                # Report only the misspelt last part: the shorter chains inside this one are visited on their own.
-                if chain and chain[0] in roots and chain[0] not in bound:
-                    owner, part = ".".join(chain[:-1]), chain[-1]
-                    path = f"{owner}.{part}"
-                    if owner in branches and path not in branches and path not in names.dotted:
-                        siblings = [name[len(owner) + 1 :] for name in names.dotted if name.startswith(f"{owner}.")]
-                        yield _unknown(node, part, owner, (name.partition(".")[0] for name in siblings))
+                if chain and chain[0] in roots:
+                    yield from _misspelt(node, chain, names.dotted, branches)
+
+
+def _misspelt(
+    node: ast.Attribute, chain: Sequence[str], dotted: frozenset[str], branches: set[str]
+) -> Iterator[Problem]:
+    """Yield the problem if only the last part of a dotted name is unknown: shorter chains are visited on their own."""
+    owner, part = ".".join(chain[:-1]), chain[-1]
+    path = f"{owner}.{part}"
+    if owner in branches and path not in branches and path not in dotted:
+        siblings = [name[len(owner) + 1 :] for name in dotted if name.startswith(f"{owner}.")]
+        yield _unknown(node, part, owner, (name.partition(".")[0] for name in siblings))
 
 
 def free_names(tree: ast.Module) -> frozenset[str]:

@@ -222,13 +222,16 @@ def _seen(words: Sequence[str]) -> Iterator[Telemetry]:
         size = POINTS_PER_LINE * 4 if kind == "line" else 5 if kind in WITH_INFO else 4
         if not kind or not 0 <= count <= TARGETS_MAX or len(rest) < count * size:
             raise ValueError("not what an AI push looks like")
-        targets = [[number_of(rest.pop()) for _ in range(size)] for _ in range(count)]
-        if kind == "line":
-            yield LinesSeen(tuple(tuple(LinePoint(*t[at : at + 4]) for at in range(0, size, 4)) for t in targets))
-        elif kind in WITH_INFO:
-            yield TargetsSeen(kind, tuple(_target(t[1:], int(t[0])) for t in targets))
-        else:
-            yield TargetsSeen(kind, tuple(_target(t) for t in targets))
+        yield _objects(kind, [[number_of(rest.pop()) for _ in range(size)] for _ in range(count)])
+
+
+def _objects(kind: str, seen: Sequence[Sequence[float]]) -> Telemetry:
+    """Return the objects of one kind from the numbers of each."""
+    if kind == "line":
+        return LinesSeen(tuple(tuple(LinePoint(*t[at : at + 4]) for at in range(0, len(t), 4)) for t in seen))
+    if kind in WITH_INFO:
+        return TargetsSeen(kind, tuple(_target(t[1:], int(t[0])) for t in seen))
+    return TargetsSeen(kind, tuple(_target(t) for t in seen))
 
 
 def _target(box: Sequence[float], info: int | None = None) -> Target:

@@ -36,6 +36,7 @@ class Stretch:
 
 
 SweptPart = tuple[Stretch, ...]  # one stretch of each of its lanes, in order
+Run = tuple[int, int]  # first place of a lane that is open, and the first one that is not
 
 
 def parts(area: Area, floor: NDArray[np.bool_], frame: GridFrame, width: float) -> list[SweptPart]:
@@ -46,28 +47,36 @@ def parts(area: Area, floor: NDArray[np.bool_], frame: GridFrame, width: float) 
     ux, uy = (area.end.x - area.start.x) / length, (area.end.y - area.start.y) / length
     count = min(LANES_MAX, max(1, math.ceil(2 * area.half_width / width)))
     along = np.arange(0.0, length + RESOLUTION / 2, RESOLUTION / 2)
-    growing: dict[tuple[int, int], list[Stretch]] = {}
+    growing: dict[Run, list[Stretch]] = {}  # the parts that reach the lane before, by its runs
     found: list[list[Stretch]] = []
     for lane in range(count):
         beside = area.half_width * (2.0 * (lane + 0.5) / count - 1.0)
-        x0, y0 = area.start.x - uy * beside, area.start.y + ux * beside
-        runs = _runs(_sampled(floor, frame, x0 + ux * along, y0 + uy * along))
-        next_growing: dict[tuple[int, int], list[Stretch]] = {}
+        x, y = area.start.x - uy * beside + ux * along, area.start.y + ux * beside + uy * along
+        runs = _runs(_sampled(floor, frame, x, y))
+        before, growing = growing, {}
         for run in runs:
-            if (run[1] - run[0]) * RESOLUTION / 2 < STRETCH_MIN:
+            first, end = run
+            if (end - first) * RESOLUTION / 2 < STRETCH_MIN:
                 continue
-            ends = [Point(x0 + ux * along[k], y0 + uy * along[k]) for k in (run[0], run[1] - 1)]
-            stretch = Stretch(*ends)
-            before = [old for old in growing if old[0] < run[1] and run[0] < old[1]]
-            if len(before) == 1 and sum(before[0][0] < r[1] and r[0] < before[0][1] for r in runs) == 1:
-                part = growing[before[0]]
-                part.append(stretch)
-            else:
-                part = [stretch]
+            part = _continued(run, runs, before)
+            if part is None:
+                part = []
                 found.append(part)
-            next_growing[run] = part
-        growing = next_growing
+            part.append(Stretch(Point(x[first], y[first]), Point(x[end - 1], y[end - 1])))
+            growing[run] = part
     return [tuple(part) for part in found]
+
+
+def _continued(run: Run, runs: list[Run], growing: dict[Run, list[Stretch]]) -> list[Stretch] | None:
+    """Return the part that a lane's ``run`` continues; None if parts split or join there, or none is beside it."""
+    beside = [old for old in growing if _overlap(old, run)]
+    if len(beside) == 1 and sum(_overlap(beside[0], other) for other in runs) == 1:
+        return growing[beside[0]]
+    return None
+
+
+def _overlap(one: Run, other: Run) -> bool:
+    return one[0] < other[1] and other[0] < one[1]
 
 
 def open_stretches(lane: Stretch, floor: NDArray[np.bool_], frame: GridFrame) -> list[Stretch]:
@@ -91,7 +100,7 @@ def _sampled(
     return is_open
 
 
-def _runs(is_open: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(is_open: NDArray[np.bool_]) -> list[Run]:
     """Return [begin, end) of all runs of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_open, [False]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

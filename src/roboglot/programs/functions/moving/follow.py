@@ -62,15 +62,13 @@ class FollowedMember:
                 if seen is None and who is None:
                     left -= clock.time() - began
                 elif (seen is not None and seen != who) or self._walk is None:
-                    who = seen if seen is not None else who
+                    who = who if seen is None else seen
                     self._walk = skill.follow(who, distance=distance, source=self._session.source)
                 elif self._walk.status.ended:
                     why, lost = await self._ended(self._walk)
-                    left, who, self._walk = (
-                        (GIVE_UP_AFTER - SKILL_SEARCHES if lost else GIVE_UP_AFTER),
-                        (None if lost else who),
-                        None,
-                    )
+                    left, self._walk = GIVE_UP_AFTER, None
+                    if lost:
+                        left, who = GIVE_UP_AFTER - SKILL_SEARCHES, None
         self._session.states["follow"] = state(StateCode.FAIL, why or f"{name} is out of sight")
         self._task, self.name = None, ""
 

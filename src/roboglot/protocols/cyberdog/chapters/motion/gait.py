@@ -238,16 +238,11 @@ class Gaits:
         """Return the code with which ``carry_out`` would refuse; None if it would not."""
         if refusal := refusal_of(self._robot, motion):
             return refusal
-        if motion not in KNOWN or (motion in ON_LEGS and Legs not in self._robot):
-            return MotionCode.UNSUPPORTED
-        if motion in SEEING and not sees(self._robot):
+        if not _is_supported(self._robot, motion):
             return MotionCode.UNSUPPORTED
         if motion in STATES:
             return MotionCode.BANNED
-        given, free = request.seconds > 0, motion == Motion.USER_GAIT or (motion in POSES and not POSES[motion][1])
-        if not 0 <= request.seconds <= DURATION_MAX or (not free and given == (motion in FIXED_TIME)):
-            return MotionCode.PARAMETERS
-        if _asks_too_much(motion, request):
+        if not _lasts_as_allowed(motion, request.seconds) or _asks_too_much(motion, request):
             return MotionCode.PARAMETERS
         if motion in PRESETS or (motion in USERS and not self._robot[Legs].choreography.steps):
             return MotionCode.NO_SEQUENCE
@@ -267,6 +262,19 @@ class Gaits:
         if action is not None:
             self._last, self._performing = motion, action
         return action
+
+
+def _is_supported(robot: Robot, motion: int) -> bool:
+    """True if the robot has what the motion needs."""
+    return motion in KNOWN and (motion not in ON_LEGS or Legs in robot) and (motion not in SEEING or sees(robot))
+
+
+def _lasts_as_allowed(motion: int, seconds: float) -> bool:
+    """True if a duration is given where the motion needs one, and only there."""
+    if not 0 <= seconds <= DURATION_MAX:
+        return False
+    either = motion == Motion.USER_GAIT or (motion in POSES and not POSES[motion][1])
+    return either or (seconds > 0) != (motion in FIXED_TIME)
 
 
 def _asks_too_much(motion: int, request: MotionRequest) -> bool:

@@ -143,13 +143,17 @@ def _versions(context: Context) -> dict[str, object]:
 
 def _motor_temperatures(context: Context) -> dict[str, object]:
     """Return temperatures, Celsius, four legs per joint. Real robots send text with two decimals, or a word."""
-    warm = dict(context.robot[Motors].temperatures) if Motors in context.robot else {}
-    legs = {joint: [warm.get(f"{leg} {name}") for leg in LEGS] for joint, name in JOINTS.items()}
-    if context.profile is Profile.SPEC:
-        return {joint: [None if celsius is None else round(celsius, 2) for celsius in legs[joint]] for joint in legs}
-    if Motors not in context.robot:
+    known, real = Motors in context.robot, context.profile is not Profile.SPEC
+    if real and not known:
         return dict.fromkeys(JOINTS, "unavalible")
-    return {joint: ["unkown" if celsius is None else f"{celsius:.2f}" for celsius in legs[joint]] for joint in legs}
+    warm = dict(context.robot[Motors].temperatures) if known else {}
+
+    def shown(celsius: float | None) -> object:
+        if celsius is None:
+            return "unkown" if real else None
+        return f"{celsius:.2f}" if real else round(celsius, 2)
+
+    return {joint: [shown(warm.get(f"{leg} {name}")) for leg in LEGS] for joint, name in JOINTS.items()}
 
 
 NX = "nx"
