@@ -1,4 +1,4 @@
-"""Read from a handler's source which components of the model it asks its robot for: ``robot[Base]`` and its like.
+"""Components of the model that a handler's source asks its robot for: ``robot[Base]`` and the like.
 
 Follows the functions of the handler's door, and methods and properties whose name only one class there has.
 ``X in robot`` makes X optional, for then the handler knows what to do without.
@@ -24,7 +24,7 @@ SHARED = "roboglot.protocols.ros_commands"  # by doors
 
 
 def used_by(handler: Callable[..., Any]) -> frozenset[type[Component]]:
-    """The interfaces without which ``handler`` cannot do its work."""
+    """Return the components without which ``handler`` cannot do its work."""
     required: set[type[Component]] = set()
     optional: set[type[Component]] = set()
     seen: set[FunctionType] = set()
@@ -64,7 +64,7 @@ def _component(name: str, function: FunctionType) -> Iterator[type[Component]]:
 
 
 def _calls(node: ast.AST, function: FunctionType) -> Iterator[Any]:
-    """Functions of the same package, or shared by doors, that are called, or handed on to be called."""
+    """Yield functions of the same package, or shared by doors, that are called, or handed on to be called."""
     names, package = function.__globals__, _package_of(function)
     found: Any = None
     match node:
@@ -86,7 +86,7 @@ def _package_of(function: FunctionType) -> str:
 
 
 def _is_of_component(value: ast.expr, function: FunctionType) -> bool:
-    """Return whether it is something that a component gave: ``robot[Odometry].reading``."""
+    """True if ``value`` comes from a component, such as ``robot[Odometry].reading``."""
     while True:
         match value:
             case ast.Attribute(value=inner) | ast.Call(func=inner):
@@ -98,7 +98,7 @@ def _is_of_component(value: ast.expr, function: FunctionType) -> bool:
 
 
 def _is_of_package(value: ast.expr, function: FunctionType, package: str) -> bool:
-    """Return whether it is ``self``, or a part of a parameter whose class takes it from the package."""
+    """True if ``value`` is ``self``, or a part of a parameter whose class takes it from the package."""
     match value:
         case ast.Name(id="self"):
             return True
@@ -111,7 +111,7 @@ def _is_of_package(value: ast.expr, function: FunctionType, package: str) -> boo
 
 @cache
 def _methods(package: str) -> dict[str, FunctionType | property]:
-    """Methods and properties of the package's classes by name, those whose name is there once."""
+    """Return methods and properties of the package's classes by name, if only one class has the name."""
     for module in pkgutil.walk_packages(getattr(sys.modules[package], "__path__", ()), f"{package}."):
         importlib.import_module(module.name)
     classes = {

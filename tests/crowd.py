@@ -1,6 +1,6 @@
-"""Seeded crowds of mixed bodies: some stand, some navigate, some are driven by hand as clients do. Judged by the truth.
+"""Seeded crowds of mixed bodies: some stand, some navigate, some are driven by hand. Judged by the truth.
 
-Shared by the benchmark and the tests.
+Used by tests and benchmarks.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ GOAL = 0.2  # m from the goal within which a drive has succeeded
 
 @dataclass
 class Walker:
-    """One robot of the crowd, the command it got, and where it began to stand."""
+    """One robot of the crowd, its command, and the place at which it came to rest."""
 
     robot: Robot
     role: str
@@ -54,7 +54,7 @@ class Walker:
     reported_lost: bool = False  # it reported a doubt about its place
 
     def listen(self) -> None:
-        """Hear what it says of itself."""
+        """Count its reports: of contacts, and of doubts about its place."""
         events = self.robot.events
         events.listen(BumperPressed, self.count)
         events.listen(RobotDisplaced, self._note_lost)
@@ -64,7 +64,7 @@ class Walker:
         self.reported_lost = True
 
     def count(self, _: BumperPressed) -> None:
-        """It touches something."""
+        """Count a contact."""
         self.presses += 1
 
 
@@ -83,7 +83,7 @@ class Outcome:
 
 
 async def leave(seed: int, seconds: float) -> Outcome:
-    """Have ten robots of all bodies leave one corridor at once, no matter who stands in whose way."""
+    """Have ten robots of all bodies leave one corridor at once, though they block one another."""
     clock, database = LockstepClock(), Database(":memory:")
     starts = [StartConfig(0.8 + 0.7 * n, 2.6 if n % 2 else 3.4) for n in range(10)]
     configs = [RobotConfig(f"r{n}", BODIES[(n + seed) % len(BODIES)], start=at) for n, at in enumerate(starts)]
@@ -111,7 +111,7 @@ async def leave(seed: int, seconds: float) -> Outcome:
 
 
 def _send(walker: Walker, goal: Pose, here: Pose) -> None:
-    """Out of the corridor: by the map where it has one, blindly ahead where not."""
+    """Send a robot out of the corridor: by its map if it has one, else blindly ahead."""
     robot = walker.robot
     try:
         if walker.role == "navigates":
@@ -125,7 +125,7 @@ def _send(walker: Walker, goal: Pose, here: Pose) -> None:
 
 
 async def crowd(seed: int, seconds: float = 20.0) -> Outcome:
-    """Have a crowd live for ``seconds`` of robot time."""
+    """Give a crowd commands for ``seconds`` of robot time."""
     dice, clock, database = random.Random(seed), LockstepClock(), Database(":memory:")
     bodies = [dice.choice(BODIES) for _ in range(dice.randint(3, 6))]
     places = zip(bodies, _places(dice, len(bodies)), strict=False)
@@ -168,7 +168,7 @@ def _walker(fleet: Fleet, robot: Robot, dice: random.Random) -> Walker:
 
 
 def _go(fleet: Fleet, walker: Walker, dice: random.Random) -> None:
-    """Give it a new command."""
+    """Give a robot a new command."""
     robot = walker.robot
     walker.goal = None
     try:
@@ -191,7 +191,7 @@ def _go(fleet: Fleet, walker: Walker, dice: random.Random) -> None:
 
 
 def _look(fleet: Fleet, walker: Walker) -> None:
-    """Remember how far it was displaced while it stood."""
+    """Measure how far a standing robot has been displaced."""
     robot, pose = walker.robot, fleet.world.truth.pose_of(walker.robot.id)
     velocity, walker.before, before = robot[Base].velocity, pose, walker.before
     moving = robot.actions.running(BASE) or velocity.speed > 0.005 or abs(velocity.yaw) > 0.01

@@ -1,4 +1,4 @@
-"""Switches a robot's bumper off, for tests of what wheels do that push on."""
+"""Switches a robot's bumper off, for tests of wheels that go on pushing."""
 
 from __future__ import annotations
 

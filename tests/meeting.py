@@ -1,7 +1,7 @@
-"""Ten mixed robots that share a building: where each is sent, how long that takes, how often hulls touch.
+"""Ten mixed robots that share a building: their goals, the time they take, and contacts of their hulls.
 
-Judged by the truth; the robots have the building's map, their lidars, and their radios where they have one. Shared by
-the benchmark and the tests.
+Judged by the truth; the robots have the building's map, their lidars, and radios, if their bodies have one. Used by
+tests and benchmarks.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Touch:
-    """Two hulls that met: when (s), whose, and where they were."""
+    """Contact of two hulls: its time (s), the robots' names, and an account of their poses and speeds."""
 
     time: float
     names: tuple[str, str]
@@ -68,7 +68,7 @@ class Touch:
 
 @dataclass
 class Drive:
-    """One robot's way to its goals."""
+    """Progress of one robot to its goals."""
 
     name: str
     goals: tuple[Pose, ...]
@@ -81,7 +81,7 @@ class Drive:
     _since: float = 0.0
 
     def watch(self, pose: Pose, now: float) -> None:
-        """Note how long it has stayed where it is."""
+        """Measure how long the robot has stayed at one place."""
         if pose.distance_to(self._place) > STAYS:
             self._place, self._since = pose, now
         self.stood = max(self.stood, now - self._since)
@@ -99,7 +99,7 @@ class Outcome:
 
 
 def scenario(seed: int, robots: int = ROBOTS, world: str = "") -> Scenario:
-    """The one with this seed."""
+    """Return the scenario of a seed."""
     dice, world = random.Random(seed), world or WORLDS[seed % len(WORLDS)]
     bodies = [BODIES[n % len(BODIES)] for n in range(robots)]
     dice.shuffle(bodies)
@@ -128,7 +128,7 @@ def _in_person(free: Places, pose: Pose) -> bool:
 
 @asynccontextmanager
 async def opened(world: str, robots: Sequence[RobotConfig], seed: int) -> AsyncIterator[tuple[Fleet, LockstepClock]]:
-    """The robots in the world without those of its people that walk."""
+    """Yield the robots, in the world without its walking people, and their clock."""
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet(world, robots, clock=clock, seed=seed, database=database)
     if world == "office":
@@ -144,7 +144,7 @@ async def opened(world: str, robots: Sequence[RobotConfig], seed: int) -> AsyncI
 
 
 async def survey(world: str) -> OccupancyGrid:
-    """The map of a building's lowest floor, in the world's frame, as a careful survey leaves it."""
+    """Return a careful survey's map of a building's lowest floor, in the world's frame."""
     from roboglot.autonomy.slam.painting import paint  # needs the kernels
 
     async with opened(world, [RobotConfig("surveyor")], 1) as (fleet, clock):
@@ -166,7 +166,7 @@ async def survey(world: str) -> OccupancyGrid:
 
 
 async def meet(scene: Scenario, grid: OccupancyGrid | None, alone: int | None = None) -> Outcome:
-    """Have all robots of a scenario drive, or ``alone`` that one, with the building's map or each with its own."""
+    """Play a scenario, with the building's map or each robot's own. ``alone``: the number of the only robot."""
     numbers = range(len(scene.bodies)) if alone is None else [alone]
     configs = [RobotConfig(f"r{n}", scene.bodies[n], start=StartConfig(*_numbers(scene.starts[n]))) for n in numbers]
     outcome = Outcome(scene.seed)
@@ -175,7 +175,7 @@ async def meet(scene: Scenario, grid: OccupancyGrid | None, alone: int | None = 
         frames = {drive.name: _give_map(fleet, drive.name, grid) for drive in drives}
         await clock.advance(1.0)
         begun, touching = clock.time(), frozenset[tuple[str, str]]()
-        while clock.time() - begun < SECONDS_MAX and sum(_goes(fleet, drive, frames, begun) for drive in drives):
+        while clock.time() - begun < SECONDS_MAX and sum(_drive_on(fleet, drive, frames, begun) for drive in drives):
             await clock.advance(LOOK)
             now = frozenset(_touching(fleet))
             outcome.touches += [Touch(clock.time() - begun, pair, _account(fleet, pair)) for pair in now - touching]
@@ -194,7 +194,7 @@ def _numbers(pose: Pose) -> tuple[float, float, float]:
 
 
 def _give_map(fleet: Fleet, name: str, grid: OccupancyGrid | None) -> Pose:
-    """The map's origin in the world."""
+    """Give a robot the building's map, if there is one; return its map's origin in the world."""
     pose, robot = fleet.world.truth.pose_of(name), fleet.robots[name]
     if grid is None:
         return pose.compose(robot[Localization].pose.inverse())
@@ -202,8 +202,8 @@ def _give_map(fleet: Fleet, name: str, grid: OccupancyGrid | None) -> Pose:
     return Pose()
 
 
-def _goes(fleet: Fleet, drive: Drive, frames: dict[str, Pose], begun: float) -> bool:
-    """Send it to its next goal when it is at one; False when it is at the last, or gave up."""
+def _drive_on(fleet: Fleet, drive: Drive, frames: dict[str, Pose], begun: float) -> bool:
+    """Send a robot to its next goal once it is at one; return False if it is at the last one or has given up."""
     robot = fleet.robots[drive.name]
     if drive.action is not None:
         if not drive.action.status.ended:

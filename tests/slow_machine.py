@@ -1,4 +1,4 @@
-"""A machine whose time passes only when it waits, or computes as slowly as a test says: slow in the same way anywhere.
+"""Machine whose time passes only while it waits or computes, as slowly as a test says: the same on any machine.
 
 Robots on it have a real clock, not a lockstep one; nothing depends on the machine that the test runs on.
 """
@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 class Hours:
-    """Real time that passes only by hand."""
+    """Real time that passes only when a test sets it."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 1000.0
@@ -29,7 +29,7 @@ class Hours:
 
 
 class SlowMachine:
-    """``tick``, ``plan``: real seconds that a tick of a world takes, and a thread's job beside it.
+    """Machine on which a tick of a world takes ``tick`` real seconds, and a thread's job ``plan``.
 
     Time is the real machine's until ``begin``, since kernels are loaded by threads.
     """
@@ -46,7 +46,7 @@ class SlowMachine:
         return time.monotonic() if self._now is None else self._now
 
     def begin(self) -> None:
-        """Be slow from now on."""
+        """Slow down from now on."""
         self._now = time.monotonic()
         tick = World._tick
 

@@ -1,4 +1,4 @@
-"""Statements of a parsed file, for tests that read sources: a tenth of the nodes that ``ast.walk`` goes through."""
+"""Statements of source files, for tests that read them: a tenth of the nodes that ``ast.walk`` visits."""
 
 from __future__ import annotations
 

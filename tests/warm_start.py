@@ -55,7 +55,7 @@ _signature = inspect.signature(_execute_cold)
 
 
 class WarmParent:
-    """The process that forks, started when it is needed first; ``line``: to one that runs."""
+    """Process that forks, started at the first use. ``line``: a socket to one that runs already."""
 
     def __init__(self, line: socket.socket | None = None) -> None:
         self._lock = threading.Lock()
@@ -63,7 +63,7 @@ class WarmParent:
         self._libc = ctypes.CDLL(None, use_errno=True)
 
     def start(self, wish: dict[str, Any], descriptors: list[int]) -> int:
-        """Return the number of a new process that is our child. Raises OSError."""
+        """Return the process id of a new child. Raises OSError."""
         with self._lock:
             line = self._line or self._open()
             self._line = line
@@ -103,7 +103,7 @@ def install() -> None:
 
 
 def _execute(process: Any, *arguments: Any, **named: Any) -> None:
-    """Do what ``Popen`` does with these arguments of its own."""
+    """Start a process in place of ``Popen._execute_child``, with its arguments."""
     wanted = _signature.bind(process, *arguments, **named).arguments
     if not _is_warm(wanted):
         _execute_cold(process, *arguments, **named)
@@ -137,7 +137,7 @@ def _is_warm(wanted: Mapping[str, Any]) -> bool:
 
 
 def _is_ours(words: list[Any]) -> bool:
-    """Return whether this command needs what the process that forks has loaded."""
+    """True if the command needs the modules that the forking process has loaded."""
     match words:
         case [sys.executable, "-m", str(module), *_]:
             return module == "roboglot" or module.startswith("tests.")
@@ -175,7 +175,7 @@ def serve(line: socket.socket) -> None:
 
 
 def _become(wish: Any, descriptors: list[int]) -> NoReturn:
-    """Become the wanted process, in the fork."""
+    """Become the requested process; called in the fork."""
     from roboglot.cli.warm.parent import become
 
     end_with(wish["parent"])
@@ -186,7 +186,7 @@ def _become(wish: Any, descriptors: list[int]) -> NoReturn:
 
 
 def _run(words: list[str], folder: str) -> None:
-    """Do what Python does with these words after its own name."""
+    """Run the words of a command line that follow Python's own name."""
     match words:
         case ["-m", "roboglot", *arguments]:
             package = importlib.import_module("roboglot")

@@ -32,7 +32,7 @@ from roboglot.operations import Right
 from roboglot.runtime import Runtime
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from tests.access.bad_line import BadLine
+from tests.access.lossy_device import LossyDevice
 
 ROBOT, HERE, PORT = "127.0.98.1", "127.0.98.2", 50090
 SPEED = 0.5  # m/s
@@ -50,7 +50,7 @@ class Scene:
     """A robot, and what lies between it and its client."""
 
     robot: Robot
-    line: BadLine
+    line: LossyDevice
     connect: asyncio.subprocess.Process
     reader: asyncio.StreamReader
     writer: asyncio.StreamWriter
@@ -63,7 +63,7 @@ class Scene:
 
 @contextlib.asynccontextmanager
 async def scene(body: str, delay: float = 0.0, loss: float = 0.0) -> AsyncIterator[Scene]:
-    with tempfile.TemporaryDirectory() as folder, BadLine(delay=delay, loss=loss) as line:
+    with tempfile.TemporaryDirectory() as folder, LossyDevice(delay=delay, loss=loss) as line:
         data = Path(folder) / "data"
         store = open_store(data)
         token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])

@@ -26,8 +26,8 @@ from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
-from tests.access.bad_line import BadLine
-from tests.access.line import bad_line
+from tests.access.lossy_device import LossyDevice
+from tests.access.lossy_proxy import lossy_proxy
 from tests.access.matrix import ADDRESS, frame_states
 from tests.protocols.robomaster.clients.test_robomasterpy import TOUR, check, listen
 
@@ -41,7 +41,7 @@ async def behind_a_bad_line(folder: Path, body: str, world: str) -> AsyncIterato
     token = store.add_machine("cell", [Grant("a", frozenset({Right.PROGRAM, Right.EDIT}))])
     store.close()
     base = load_config(None, {"data": str(folder), "world": world, "lockstep": True})
-    line = made_line()
+    line = made_device()
     access = AccessConfig(on=True, local=False, gateway=f"{line.near if line else '127.0.0.1'}:0")
     runtime = Runtime(replace(base, robots=(RobotConfig("a", body, ADDRESS),), access=access))
     await runtime.start()
@@ -64,24 +64,24 @@ async def behind_a_bad_line(folder: Path, body: str, world: str) -> AsyncIterato
             await runtime.close()
 
 
-def made_line() -> BadLine | None:
-    """A line below TCP; None: this process may make none."""
+def made_device() -> LossyDevice | None:
+    """Return a lossy device; None if this process may not make one."""
     try:
-        return BadLine()
+        return LossyDevice()
     except OSError:
         return None
 
 
 @contextlib.asynccontextmanager
-async def led_to(port: int, line: BadLine | None) -> AsyncIterator[tuple[str, int]]:
+async def led_to(port: int, device: LossyDevice | None) -> AsyncIterator[tuple[str, int]]:
     """Yield the address at which the bad line lies between here and ``port``."""
-    if line is None:
-        async with bad_line(port) as relayed:
+    if device is None:
+        async with lossy_proxy(port) as relayed:
             yield "127.0.0.1", relayed
     else:
-        with line:
-            yield line.far, port
-        assert line.lost > 0
+        with device:
+            yield device.far, port
+        assert device.lost > 0
 
 
 async def pass_time(clock: LockstepClock) -> None:

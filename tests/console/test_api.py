@@ -40,7 +40,7 @@ from roboglot.protocols.door import Endpoint
 from roboglot.runtime import Runtime
 from roboglot.simulation.world.world_files import load_world
 from tests.console.conftest import ADDRESS, Shown
-from tests.protocols.held import held, until
+from tests.protocols.held_fairness import held, until
 
 
 async def test_a_new_map_is_more_than_the_marker() -> None:

@@ -1,4 +1,4 @@
-"""Steps of the tests of bad links: what they do to a robot behind one, and see of it."""
+"""Steps of the tests of bad links: commands to a robot behind one, and checks of what it does."""
 
 import asyncio
 from collections.abc import Callable

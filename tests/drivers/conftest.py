@@ -26,9 +26,9 @@ from roboglot.storage.database import Database
 from roboglot.testing import Forward
 from tests.drivers import bad_link
 from tests.drivers.bad_link import Connect
-from tests.drivers.chain import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
-from tests.drivers.pace import settle
+from tests.drivers.clients import EP_ADDRESS, Drive, Open, OpenRest, TextClient, Until, ep_config, url_of
 from tests.drivers.rig import Rig, rig, time_passes
+from tests.drivers.settling import settle
 
 Profile = Literal["spec", "fw60", "fw70"]
 

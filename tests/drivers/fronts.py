@@ -34,7 +34,7 @@ from roboglot.testing.addresses import free_addresses
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.slamware.chapters.motion import AngleOptions, Direction, MoveByOptions, MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
-from tests.drivers.chain import TextClient
+from tests.drivers.clients import TextClient
 
 ADDRESS = free_addresses(1)
 SIDE, SPEED = 0.4, 0.3  # m, m/s

@@ -21,9 +21,9 @@ from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 from roboglot.testing.addresses import free_port
-from tests.drivers.chain import EP_ADDRESS
+from tests.drivers.clients import EP_ADDRESS
 from tests.drivers.link_proxy import Fault, Proxy, UdpProxy
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 from tests.narrowing import known, of_kind
 
 Door = SlamwareDoor | RoboMasterDoor | CyberDogDoor
@@ -31,7 +31,7 @@ HOST = "127.0.0.1"
 
 
 class Rig:
-    """``url`` is what a driver is given; ``fault`` acts on the link, ``restart`` on the robot."""
+    """One robot, its door, and the relays in between. ``url``: for a driver; ``fault``: of the link."""
 
     def __init__(self, back: str, robot: Robot, folder: Path) -> None:
         self.back, self.url, self.fault = back, "", Fault()
@@ -42,7 +42,7 @@ class Rig:
         self._door: Door | None = None
 
     async def open(self) -> None:
-        """Relays, then the door."""
+        """Open the relays, then the door."""
         clock, robot_at = self._robot.clock, EP_ADDRESS if self.back == "robomaster" else HOST
         if self.back == "robomaster":
             await self._reported.start()
@@ -68,7 +68,7 @@ class Rig:
                 self.url = f"cyberdog://{HOST}:{port}?certs={self._folder / 'driver'}&app={driver_port}"
 
     async def start(self) -> None:
-        """The robot's end."""
+        """Open the robot's door."""
         control, event, video, audio = self._ports
         match self.back:
             case "slamware":
@@ -82,7 +82,7 @@ class Rig:
         await self._door.start()
 
     async def stop(self) -> None:
-        """Stop as a robot that is switched off; its connections close."""
+        """Close the door and its connections, as if the robot were switched off."""
         if self._door:
             await self._door.close()
             self._door = None
@@ -93,12 +93,12 @@ class Rig:
         export_client(self._folder / "cyberdog", self._folder / "driver")
 
     def lose_certificates(self) -> None:
-        """The dog makes new ones when it starts."""
+        """Delete the dog's certificates; it makes new ones at its start."""
         shutil.rmtree(self._folder / "cyberdog")
 
     @asynccontextmanager
     async def second_app(self) -> AsyncIterator[CyberDogClient]:
-        """Another app of the dog, past the relays."""
+        """Yield another app of the dog, connected past the relays."""
         proof = Certificates.load(self._folder / "driver")
         port = self._ports[0]
         async with CyberDogClient(HOST, proof, port=port, app_port=free_port(), clock=self._robot.clock) as app:
@@ -119,7 +119,7 @@ class Rig:
 
 @asynccontextmanager
 async def rig(back: str, robot: Robot, folder: Path) -> AsyncIterator[Rig]:
-    """An open one."""
+    """Yield an open rig."""
     async with AsyncExitStack() as stack:
         made = Rig(back, robot, folder)
         stack.push_async_callback(made.close)
@@ -129,7 +129,7 @@ async def rig(back: str, robot: Robot, folder: Path) -> AsyncIterator[Rig]:
 
 @asynccontextmanager
 async def time_passes(forward: Forward, *, step: float = 0.02, threads: bool = True) -> AsyncIterator[None]:
-    """Robot time passes by itself, ``step`` s after the other; waits for ``threads``, which keep no robot time."""
+    """Let robot time pass in steps of ``step`` s. ``threads``: wait after each for threads that keep no robot time."""
     over = False
 
     async def pass_time() -> None:
@@ -146,5 +146,5 @@ async def time_passes(forward: Forward, *, step: float = 0.02, threads: bool = T
 
 
 def cut_session(base: Base) -> None:
-    """Break the driver's connection to an EP, as a lost Wi-Fi does."""
+    """Break the driver's connection to an EP, as losing Wi-Fi does."""
     known(known(of_kind(base, RoboMasterBase)._client._link)._transport).abort()

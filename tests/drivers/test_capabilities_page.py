@@ -22,7 +22,7 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.slamware.table import TABLE as REQUESTS
 from roboglot.recording.lines import REFUSALS
 from roboglot.testing import Forward
-from tests.drivers.chain import Drive, Open
+from tests.drivers.clients import Drive, Open
 from tests.drivers.rig import rig, time_passes
 from tests.protocols.slamware import generated
 from tests.protocols.slamware.generated import Generator

@@ -19,7 +19,7 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 from roboglot.wire.slamware.chapters.artifact import Line, LineUsage
 from roboglot.wire.slamware.geometry import Point as GPoint
-from tests.drivers.chain import Drive, OpenRest, Until
+from tests.drivers.clients import Drive, OpenRest, Until
 
 pytestmark = pytest.mark.world("office")
 

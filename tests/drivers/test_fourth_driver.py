@@ -26,7 +26,7 @@ from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
-from tests.drivers.chain import Drive, Until
+from tests.drivers.clients import Drive, Until
 
 
 class CartBase(LinkedBase):

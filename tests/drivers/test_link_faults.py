@@ -40,7 +40,7 @@ from tests.drivers.bad_link import (
     succeeds_slowly,
     until,
 )
-from tests.drivers.chain import Open, OpenRest
+from tests.drivers.clients import Open, OpenRest
 from tests.drivers.rig import Rig
 
 pytestmark = pytest.mark.world("office")

@@ -25,7 +25,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.wire.slamware.chapters.motion import AngleOptions
 from tests.drivers.bad_link import SPEED, Connect, cut, drives, healed, stands, succeeds, until
-from tests.drivers.chain import Open, OpenRest
+from tests.drivers.clients import Open, OpenRest
 from tests.drivers.rig import Rig
 
 pytestmark = pytest.mark.world("office")

@@ -20,7 +20,7 @@ from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 from roboglot.testing.addresses import free_port
-from tests.drivers.chain import EP_ADDRESS, Drive, ep_config, url_of
+from tests.drivers.clients import EP_ADDRESS, Drive, ep_config, url_of
 from tests.drivers.fronts import Front, front
 from tests.drivers.rig import time_passes
 

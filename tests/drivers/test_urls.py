@@ -20,7 +20,7 @@ from roboglot.protocols.slamware.chapters.system.system import device_id
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 
 def test_a_robot_is_given_by_body_or_url() -> None:

@@ -23,7 +23,7 @@ from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 LOOK = 0.1  # s between two looks
 GRACE = 0.5  # s after the last action in which a part may come to rest

@@ -1,4 +1,4 @@
-"""A lockstep session with all inputs: six protocols, a dog's app, hands, the console's desk."""
+"""Lockstep session with every kind of input: six protocols, a dog's app, hands, the console's desk."""
 
 from __future__ import annotations
 

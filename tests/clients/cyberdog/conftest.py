@@ -15,7 +15,7 @@ from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.testing import Forward
 from roboglot.testing.addresses import free_addresses, free_port
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 ADDRESS = free_addresses(1)
 

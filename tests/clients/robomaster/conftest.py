@@ -10,7 +10,7 @@ from roboglot.clients.robomaster.client import Ports, RoboMasterClient
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing.addresses import free_port
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 ADDRESS = "127.0.0.9"
 Run = Callable[[Awaitable[Any]], Awaitable[Any]]

@@ -24,7 +24,7 @@ from roboglot.wire.robomaster.telemetry import (
     LinesSeen,
     TargetsSeen,
 )
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 from tests.narrowing import of_kind
 
 ADDRESS = "127.0.0.9"

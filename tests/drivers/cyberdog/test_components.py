@@ -40,7 +40,7 @@ from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
 from roboglot.testing import Forward
 from roboglot.testing.addresses import free_port
-from tests.drivers.chain import Drive
+from tests.drivers.clients import Drive
 from tests.drivers.rig import time_passes
 
 pytestmark = pytest.mark.world("empty", body="cyberdog2")

@@ -51,8 +51,8 @@ from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 from roboglot.testing.addresses import free_port
-from tests.drivers.chain import Drive, Open, Until
-from tests.drivers.pace import settle
+from tests.drivers.clients import Drive, Open, Until
+from tests.drivers.settling import settle
 
 pytestmark = pytest.mark.world("office", body="cyberdog2")
 STEP = 0.02  # robot s

@@ -29,7 +29,7 @@ from roboglot.simulation.components.interaction.armor import SimulatedArmor
 from roboglot.simulation.components.sensing.camera import SimulatedCamera
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.drivers.chain import Open, Script
+from tests.drivers.clients import Open, Script
 from tests.drivers.rig import cut_session
 from tests.narrowing import of_kind
 

@@ -33,7 +33,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.chapters.motion import AngleOptions, Direction, MoveByOptions
-from tests.drivers.chain import OpenRest
+from tests.drivers.clients import OpenRest
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 

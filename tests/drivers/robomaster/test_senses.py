@@ -24,9 +24,9 @@ from roboglot.model.robot import Robot
 from roboglot.model.sound import claps, tone
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.drivers.chain import Open, Until
-from tests.drivers.pace import settle
+from tests.drivers.clients import Open, Until
 from tests.drivers.rig import cut_session
+from tests.drivers.settling import settle
 
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 

@@ -27,7 +27,7 @@ from roboglot.simulation.components.logistics.cargo import SimulatedCargo
 from roboglot.simulation.components.logistics.jack import SimulatedJack
 from roboglot.simulation.components.motion.emergency_stop import SimulatedEmergencyStop
 from roboglot.testing import Forward
-from tests.drivers.chain import Drive, OpenRest, Until
+from tests.drivers.clients import Drive, OpenRest, Until
 from tests.narrowing import of_kind
 
 pytestmark = pytest.mark.world("empty", body="hermes")

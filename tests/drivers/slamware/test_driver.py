@@ -45,7 +45,7 @@ from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.testing import Forward, assert_pose
 from roboglot.wire.slamware.chapters.motion import AngleOptions
-from tests.drivers.chain import Open, OpenRest, Script, Until
+from tests.drivers.clients import Open, OpenRest, Script, Until
 from tests.narrowing import of_kind
 
 

@@ -11,7 +11,7 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.robot import Robot
-from tests.drivers.chain import Until
+from tests.drivers.clients import Until
 
 Ask = Callable[[SlamwareClient], Awaitable[object]]
 pytestmark = pytest.mark.world("empty", body="hermes")

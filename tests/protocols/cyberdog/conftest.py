@@ -21,7 +21,7 @@ from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 from roboglot.testing import Forward
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 from tests.protocols.cyberdog.phone import ADDRESS, PATIENCE, App, Client, Messages, Pems
 
 

@@ -18,7 +18,7 @@ import roboglot.wire.cyberdog.proto as proto
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.testing import Forward
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 ADDRESS = "127.0.0.17"
 PHONE = "127.0.0.1"  # apparent address of clients on this machine

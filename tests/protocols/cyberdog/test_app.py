@@ -25,7 +25,7 @@ from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 from roboglot.wire.cyberdog.proto.cyberdog_app_pb2 import Ticks
 from roboglot.wire.visual.relay import FrontEnd
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, context_of, until
 
 Passing = Callable[[Callable[[], object]], Awaitable[None]]

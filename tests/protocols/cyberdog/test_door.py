@@ -20,7 +20,7 @@ from roboglot.simulation.world.world import World
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import FileError
 from tests.protocols.cyberdog.phone import ADDRESS, Client, until
-from tests.protocols.held import held
+from tests.protocols.held_fairness import held
 
 
 @pytest.fixture

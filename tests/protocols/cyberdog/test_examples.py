@@ -8,7 +8,7 @@ import pytest
 
 from roboglot.protocols.cyberdog.table import pushes
 from roboglot.wire.contracts import contract
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 from tests.protocols.cyberdog.phone import Client, examples
 
 FILES = {4004}  # for getFile; the page has its own example

@@ -8,7 +8,7 @@ import pytest
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 # kind: robot time until it is reported, the self check's code, the state, the code of walking
 WORDS = {

@@ -16,7 +16,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Forbidden
 from roboglot.operations import Right
 from tests.protocols.foxglove.conftest import ADDRESS, PORT, Scene, Viewer
-from tests.protocols.held import held
+from tests.protocols.held_fairness import held
 
 FORWARD = {"linear": {"x": 0.3, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}}
 

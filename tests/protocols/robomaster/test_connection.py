@@ -15,7 +15,7 @@ from roboglot.protocols.robomaster import limits
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.protocols.robomaster.stops import stops
-from tests.protocols.held import held
+from tests.protocols.held_fairness import held
 from tests.protocols.robomaster.text_client import ADDRESS
 
 FLOOD = 50_000

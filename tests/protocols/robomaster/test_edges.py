@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from roboglot.wire.contracts import contract
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 PARSE_ERROR = "command format error: command parse error;"
 OK, FAIL = "ok;", "fail;"

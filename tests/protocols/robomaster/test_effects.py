@@ -17,7 +17,7 @@ from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.components.system.pwm import PwmPorts
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.sound import claps
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 OK, FAIL = "ok;", "fail;"
 FW70 = pytest.mark.parametrize("door", [{"profile": "fw70"}], indirect=True)

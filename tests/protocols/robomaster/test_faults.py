@@ -7,7 +7,7 @@ import pytest
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 
 REFUSED = {"emergency_stop", "brake_released"}
 

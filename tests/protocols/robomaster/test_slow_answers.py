@@ -4,7 +4,7 @@ import asyncio
 
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
-from tests.drivers.pace import late
+from tests.drivers.settling import late
 
 
 async def test_replies_come_late(client, world: World, clock: LockstepClock) -> None:

@@ -18,7 +18,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 from tests.protocols.robomaster.conftest import Connect
 from tests.protocols.robomaster.text_client import TextClient
 from tests.protocols.witness import Witness, seeds

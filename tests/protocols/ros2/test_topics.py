@@ -14,7 +14,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
 from roboglot.protocols.ros2.dispatch import MESSAGE_MAX
 from roboglot.protocols.ros2.server import PASSED_MAX, PENDING_MAX
-from tests.protocols.held import held
+from tests.protocols.held_fairness import held
 from tests.protocols.ros2.conftest import STORE, Opened, Peer, Scene
 
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"

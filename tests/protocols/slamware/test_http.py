@@ -20,7 +20,7 @@ from roboglot.protocols.slamware.routes import BEYOND, Routes
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.protocols.slamware.table import TABLE, implemented
 from roboglot.wire.contracts import contract
-from tests.protocols.held import held, until
+from tests.protocols.held_fairness import held, until
 
 ROWS = contract("slamware")
 ACTIONS = "/api/core/motion/v1/actions"

@@ -16,7 +16,7 @@ from roboglot.model.inputs.fairness import Fairness
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.http_connection import REPEATED_MAX, HttpConnection
 from roboglot.protocols.slamware.server import SlamwareDoor
-from tests.protocols.held import until
+from tests.protocols.held_fairness import until
 
 PATIENCE = 60.0  # s of real time
 API = "/api/core/artifact/v1/pois"

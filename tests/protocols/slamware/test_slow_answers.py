@@ -6,7 +6,7 @@ import httpx
 
 from roboglot.model.clock import LockstepClock
 from roboglot.simulation.world.world import World
-from tests.drivers.pace import late
+from tests.drivers.settling import late
 
 
 async def test_answers_come_late(client: httpx.AsyncClient, world: World, clock: LockstepClock) -> None:

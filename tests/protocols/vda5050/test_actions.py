@@ -14,7 +14,7 @@ from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.errors import NotFound
 from roboglot.model.tap import Direction
 from roboglot.protocols.vda5050.chapters.sensing import REPORTS, REPORTS_MAX
-from tests.protocols.held import held
+from tests.protocols.held_fairness import held
 from tests.protocols.vda5050.conftest import ADDRESS, Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
 

@@ -6,7 +6,7 @@ import json
 
 from roboglot.clients.visual import TextLink
 from roboglot.model.robot import Robot
-from tests.protocols.held import held, until
+from tests.protocols.held_fairness import held, until
 from tests.protocols.visual.test_websocket_door import address, door
 
 __all__ = ["address", "door"]

@@ -17,7 +17,7 @@ from roboglot.media.video import VideoStream
 from roboglot.protocols.cyberdog.chapters.camera import transmission as door_video
 from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.wire.ice import offer_loopback
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 from tests.protocols.cyberdog.phone import PATIENCE, App, Client, until
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")

@@ -13,7 +13,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.sound import claps
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.wire.contracts import contract
-from tests.drivers.pace import settle
+from tests.drivers.settling import settle
 from tests.protocols.robomaster.text_client import ADDRESS
 
 DOCS = Path(__file__).parents[4] / "docs/protocols"

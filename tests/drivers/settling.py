@@ -1,4 +1,4 @@
-"""Robot time that tests drive, beside threads that keep no robot time: gRPC's.
+"""Waiting for threads that keep no robot time, such as gRPC's, in tests that advance robot time.
 
 A test lets a step of robot time pass, then ``settle`` waits until the threads have done all that follows from it: at
 once on a quiet machine, for as long as it takes on a busy one.

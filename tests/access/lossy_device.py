@@ -1,8 +1,8 @@
-"""A bad line for real connections: packets are lost and delayed, and the kernel's TCP copes at both ends.
+"""Network device that loses and delays the packets of real connections; the kernel's TCP copes at both ends.
 
-The address ``far`` leads back to this machine, over that line: a network device (tun) hands every packet to
-a thread, which drops it or returns it later with both addresses exchanged. It needs no second network, only the
-right to create a device (Linux, CAP_NET_ADMIN).
+The address ``far`` leads back to this machine through the device (tun), which hands every packet to a thread; that
+drops it, or returns it later with both addresses exchanged. It needs no second network, only the right to create a
+device (Linux, CAP_NET_ADMIN).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _PLAIN_TUN = 0x1001  # IFF_TUN, IFF_NO_PI
 _UP = 0x41  # IFF_UP, IFF_RUNNING
 
 
-class BadLine:
+class LossyDevice:
     """Listen at ``near``, connect to ``far``. ``delay``: s, one way; ``loss``: probability per packet, 0 to 1.
 
     ``cut``: drop every packet; neither end gets an error. Raises OSError if no device can be created.
@@ -47,7 +47,7 @@ class BadLine:
             os.close(self._tun)
             raise
         self._over = False
-        self._thread = threading.Thread(target=self._carry, name="bad line", daemon=True)
+        self._thread = threading.Thread(target=self._carry, name="lossy device", daemon=True)
 
     def __enter__(self) -> Self:
         self._thread.start()

@@ -1,4 +1,4 @@
-"""Tools of the tests of drivers: a tiny text client, and types of fixtures."""
+"""Clients in front of a driven robot: a small text client, and the types of the fixtures that make clients."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EP_ADDRESS = free_addresses(1)
 
 
 class TextClient:
-    """A RoboMaster script, as far as it goes: sends text, reads up to the next ``;``."""
+    """Client of the text protocol: sends text, reads up to the next ``;``."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, patience: float = PATIENCE) -> None:
         self.reader, self.writer, self.patience = reader, writer, patience
@@ -46,7 +46,7 @@ class Script:
     forward: Forward
 
     async def done(self, text: str, patience: float = 40.0) -> str:
-        """Send a command whose answer takes robot time."""
+        """Return the answer to a command, which takes robot time."""
         asked = asyncio.ensure_future(self.client.ask(text))
         for _ in range(int(patience / 0.25)):
             await self.forward(seconds=0.25)
@@ -57,7 +57,7 @@ class Script:
 
 
 def ep_config() -> RoboMasterConfig:
-    """Free ports for all."""
+    """Return a configuration with free ports."""
     return RoboMasterConfig(
         control_port=0,
         event_port=0,
@@ -69,7 +69,7 @@ def ep_config() -> RoboMasterConfig:
 
 
 def url_of(door: RoboMasterDoor) -> str:
-    """URL, as the command line takes it."""
+    """Return the door's URL, as the command line takes it."""
     port = {e.label.removeprefix("RoboMaster "): e.address.rpartition(":")[2] for e in door.endpoints}
     return (
         f"robomaster://{EP_ADDRESS}:{port['text SDK']}?event={port['events']}&video={port['video']}"

@@ -1,4 +1,4 @@
-"""A fairness that lets every client wait while the test says so."""
+"""Fairness that makes every client wait while a test says so."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Held(Fairness):
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Wait, in real time, for what sockets bring about."""
+    """Wait, in real time, for a condition that sockets bring about."""
     async with asyncio.timeout(PATIENCE):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.002)
