@@ -235,7 +235,7 @@ def test_docs_are_not_wide() -> None:
 def walks() -> dict[str, list[tuple[str, str]]]:
     """The walks of the docs by their titles: files and functions in order."""
     page = (ROOT / "docs" / "architecture.md").read_text()
-    part = page[page.index("## Six requests") : page.index("## Truthfulness")]
+    part = page[page.index("## Seven requests") : page.index("## Truthfulness")]
     titles = {text.partition("\n")[0]: text for text in part.split("\n### ")[1:]}
     return {title: re.findall(r"`([\w/]+\.py): (\w+)`", text) for title, text in titles.items()}
 
