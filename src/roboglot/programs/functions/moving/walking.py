@@ -86,17 +86,9 @@ def _declare_walk(name: str, motion: int, gait: Gait) -> None:
         duration: float = 1.0,
     ) -> Record:
         """Walk (m/s; z in degrees/s, left positive) for ``distance`` m, else for ``duration`` s."""
-        wrong = outside(
-            x_velocity=x_velocity,
-            y_velocity=y_velocity,
-            z_velocity=z_velocity,
-            front_leg_lift=front_leg_lift,
-            back_leg_lift=back_leg_lift,
-            distance=distance,
-            walk_duration=duration,
-        )
-        twist, lift = Twist(x_velocity, y_velocity, math.radians(z_velocity)), FootLift(front_leg_lift, back_leg_lift)
-        return await servo(session, motion, _walk(session, gait, twist, distance, duration, lift), wrong)
+        velocity = {"x_velocity": x_velocity, "y_velocity": y_velocity, "z_velocity": z_velocity}
+        lift = FootLift(front_leg_lift, back_leg_lift)
+        return await _walk_in_gait(session, motion, gait, velocity, lift, distance, duration)
 
 
 def _declare_jump(name: str, motion: int, gait: Gait) -> None:
@@ -112,24 +104,36 @@ def _declare_jump(name: str, motion: int, gait: Gait) -> None:
         duration: float = 1.0,
     ) -> Record:
         """Walk in jumps (m/s; z in degrees/s, left positive) for ``distance`` m, else for ``duration`` s."""
-        wrong = outside(
-            x_jump_velocity=x_jump_velocity,
-            y_jump_velocity=y_jump_velocity,
-            z_jump_velocity=z_jump_velocity,
-            front_leg_lift=front_leg_lift,
-            back_leg_lift=back_leg_lift,
-            distance=distance,
-            walk_duration=duration,
-        )
-        twist = Twist(x_jump_velocity, y_jump_velocity, math.radians(z_jump_velocity))
+        velocity = {
+            "x_jump_velocity": x_jump_velocity,
+            "y_jump_velocity": y_jump_velocity,
+            "z_jump_velocity": z_jump_velocity,
+        }
         lift = FootLift(front_leg_lift, back_leg_lift)
-        return await servo(session, motion, _walk(session, gait, twist, distance, duration, lift), wrong)
+        return await _walk_in_gait(session, motion, gait, velocity, lift, distance, duration)
 
 
 for _name, _of in WALKS.items():
     _declare_walk(_name, *_of)
 for _name, _of in JUMPS.items():
     _declare_jump(_name, *_of)
+
+
+async def _walk_in_gait(
+    session: Session,
+    motion: int,
+    gait: Gait,
+    velocity: dict[str, float],
+    lift: FootLift,
+    distance: float,
+    duration: float,
+) -> Record:
+    """Walk unless a parameter is wrong. ``velocity``: ahead and to the left (m/s), turning (degrees/s), by name."""
+    lifts = {"front_leg_lift": lift.front, "back_leg_lift": lift.rear}
+    wrong = outside(**velocity, **lifts, distance=distance, walk_duration=duration)
+    x, y, turn_rate = velocity.values()
+    walk = _walk(session, gait, Twist(x, y, math.radians(turn_rate)), distance, duration, lift)
+    return await servo(session, motion, walk, wrong)
 
 
 async def _walk(
