@@ -30,25 +30,29 @@ def main() -> None:
     claims = Claims()
     for path in sorted(item for item in Path(folder).iterdir() if item.is_file() and item.suffix != ".md"):
         try:
-            recording = read_drive_log(path)
+            measure(path, claims)
         except BadDriveLog as error:
             print(f"skipped: {error}")
-            continue
-        drive = map_recording(recording)
-        truth = {item.scan.stamp: item.reference for item in recording.scans if item.reference is not None}
-        pairs = [(p.stamp, p.pose, truth[p.stamp]) for p in drive.trajectory if p.stamp in truth]
-        print(
-            f"{path.name:24} {len(recording.scans):5} scans, {drive.count(LoopClosed)} loops, "
-            f"{drive.count(LocalizationLost)} times lost, quality {statistics.median(drive.qualities):.2f}, "
-            f"{1000 * statistics.median(drive.seconds):.2f} ms a scan"
-        )
-        if not pairs:
-            continue
-        errors = relation_errors([(s, p) for s, p, _ in pairs], neighbour_relations([(s, t) for s, _, t in pairs]))
-        print(f"{'':24} {errors.count} relations: {errors.shift:.3f} m")
-        ate = absolute_error([p for _, p, _ in pairs], [t for *_, t in pairs])
-        claims.at_most(f"ATE of {path.stem}", ate, LIMITS.get(path.stem, float("inf")), "m")
     claims.finish()
+
+
+def measure(path: Path, claims: Claims) -> None:
+    """Map one log; print how well that went, with claims if the log has reference poses. Raises BadDriveLog."""
+    recording = read_drive_log(path)
+    drive = map_recording(recording)
+    print(
+        f"{path.name:24} {len(recording.scans):5} scans, {drive.count(LoopClosed)} loops, "
+        f"{drive.count(LocalizationLost)} times lost, quality {statistics.median(drive.qualities):.2f}, "
+        f"{1000 * statistics.median(drive.seconds):.2f} ms a scan"
+    )
+    truth = {item.scan.stamp: item.reference for item in recording.scans if item.reference is not None}
+    pairs = [(p.stamp, p.pose, truth[p.stamp]) for p in drive.trajectory if p.stamp in truth]
+    if not pairs:
+        return
+    errors = relation_errors([(s, p) for s, p, _ in pairs], neighbour_relations([(s, t) for s, _, t in pairs]))
+    print(f"{'':24} {errors.count} relations: {errors.shift:.3f} m")
+    ate = absolute_error([p for _, p, _ in pairs], [t for *_, t in pairs])
+    claims.at_most(f"ATE of {path.stem}", ate, LIMITS.get(path.stem, float("inf")), "m")
 
 
 if __name__ == "__main__":

@@ -167,6 +167,18 @@ def test_mistake_in_a_manifest_is_found(right: str, wrong: str) -> None:
         manifest(text.replace(right, wrong))
 
 
+def check_containers(pod: PodSpec) -> None:
+    """Containers have all volumes, resources for good, and secrets from Kubernetes only."""
+    volumes = {volume.name for volume in pod.volumes}
+    for container in pod.containers:
+        assert {mount.name for mount in container.volume_mounts} == volumes
+        assert not volumes or pod.security_context.fs_group == USER, "the volume is root's"
+        assert container.resources.requests == container.resources.limits, "it may be evicted"
+        secret = [variable for variable in container.env if re.search("DATABASE|REGISTRY|TOKEN", variable.name)]
+        assert all(variable.value_from and not variable.value for variable in secret)
+        assert {"RAY_USAGE_STATS_ENABLED"} <= {variable.name for variable in container.env}
+
+
 @pytest.mark.parametrize("name", ["fleet.yaml", "campaign.yaml"])
 def test_manifest_has_only_known_fields_and_locked_ray(name: str) -> None:
     document = manifest((KUBERAY / name).read_text())
@@ -178,14 +190,7 @@ def test_manifest_has_only_known_fields_and_locked_ray(name: str) -> None:
     assert cluster.ray_version == locked[1]
     assert cluster.head_group_spec.ray_start_params.num_cpus == "0"
     for group in (cluster.head_group_spec, *cluster.worker_group_specs):
-        volumes = {volume.name for volume in group.template.spec.volumes}
-        for container in group.template.spec.containers:
-            assert {mount.name for mount in container.volume_mounts} == volumes
-            assert not volumes or group.template.spec.security_context.fs_group == USER, "the volume is root's"
-            assert container.resources.requests == container.resources.limits, "it may be evicted"
-            secret = [variable for variable in container.env if re.search("DATABASE|REGISTRY|TOKEN", variable.name)]
-            assert all(variable.value_from and not variable.value for variable in secret)
-            assert {"RAY_USAGE_STATS_ENABLED"} <= {variable.name for variable in container.env}
+        check_containers(group.template.spec)
     if isinstance(document, RayJob):
         from typer import Typer
         from typer.main import get_command

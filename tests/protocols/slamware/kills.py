@@ -36,11 +36,11 @@ State = dict[str, int]
 
 
 class Refused(Exception):
-    """An answer that is no success."""
+    """An answer other than success."""
 
 
 def serve(data: Path, ready: Connection) -> None:
-    """The robot: until it is killed."""
+    """Run the robot until it is killed."""
     from roboglot.config import RobotConfig
     from roboglot.fleet import build_fleet
     from roboglot.model.clock import RealClock
@@ -62,7 +62,7 @@ def serve(data: Path, ready: Connection) -> None:
 
 @contextlib.contextmanager
 def running(data: Path) -> Iterator[tuple[ForkServerProcess, int]]:
-    """The robot's process, and the port of its door; dead at the end."""
+    """Yield the robot's process and the port of its door; the process is dead afterwards."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(PRELOADED)
     here, there = context.Pipe(duplex=False)
@@ -80,7 +80,7 @@ def running(data: Path) -> Iterator[tuple[ForkServerProcess, int]]:
 
 
 class Client:
-    """One with one connection: ``client(method, path, body)`` answers JSON, or None for an empty answer."""
+    """Client with one connection: ``client(method, path, body)`` returns the answer's JSON, None if it is empty."""
 
     def __init__(self, port: int) -> None:
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
@@ -104,7 +104,7 @@ def tagged(entries: list[Any]) -> State:
 
 @dataclass(slots=True)
 class Writer:
-    """One client: what it was answered, what it just asked for, and how it asks. A value of 0 means: not there."""
+    """One client: the answers that it got, its last request, and how it asks. A value of 0 means: not there."""
 
     keys: list[str] = field(default_factory=lambda: [f"k{number}" for number in range(KEYS)])
     known: State = field(default_factory=dict)
@@ -132,7 +132,7 @@ class Writer:
                 pass
 
     def go_on(self, ask: Client, chance: random.Random) -> bool:
-        """One write; whether it was answered."""
+        """Write once; return whether that was answered."""
         self.flying = key, value = self.choose(chance)
         try:
             self.write(ask, key, value)
@@ -295,7 +295,7 @@ class Maps(Writer):
 
 
 def run(kills: int, seed: int, folder: Path) -> list[str]:
-    """Kill the robot so often; what was not as it had been acknowledged."""
+    """Kill the robot ``kills`` times; return what was not stored as it had been acknowledged."""
     chance, problems, began = random.Random(seed), list[str](), time.monotonic()
     tasks = Tasks()
     writers = [Places(), Walls(), Areas(), Docks(), tasks, Settings(), Maps()]
