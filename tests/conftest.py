@@ -74,7 +74,7 @@ PROCESSES = (
     "shards",
 )  # folders that contain some
 WORLDS = {"world", "robot", "fleet", "door", "client", "engine", "screen"}
-BUILDS_A_WORLD = re.compile(r"\b(?:World|build_fleet|Runtime|RobotServer|serving)\(")
+BUILDS_A_WORLD = re.compile(r"\b(?:World|build_fleet|Runtime|lockstep_runtime|RobotServer|serving)\(")
 STARTS_A_PROCESS = re.compile(r"\b(?:subprocess\.|create_subprocess_|multiprocessing\.|Engine\(|Popen\()")
 HELPERS = re.compile(r"^from (tests\.[\w.]+) import", re.MULTILINE)
 

@@ -14,11 +14,10 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from roboglot.config import load_config
 from roboglot.model.clock import LockstepClock
-from roboglot.protocols import DOORS, sections
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
+from tests.protocols.lockstep import lockstep_runtime
 
 ADDRESS = free_addresses(1)
 PORT = 8765
@@ -138,20 +137,11 @@ Opened = Callable[..., Awaitable[Scene]]
 
 @pytest.fixture
 async def opened(tmp_path: Path) -> AsyncIterator[Opened]:
-    """Open a robot; what its configuration says beside."""
+    """Open a robot; ``more``: further keys of its configuration."""
     scenes: list[Scene] = []
 
     async def open(**more: Any) -> Scene:
-        values: dict[str, Any] = {
-            "data": str(tmp_path / "data"),
-            "world": "empty",
-            "lockstep": True,
-            "robots": [{"name": "a", "body": "universal", "address": ADDRESS}],
-            "console": {"enabled": False},
-        }
-        doors = tuple(door for door in DOORS if door.name in ("foxglove", "slamware"))
-        runtime = Runtime(load_config(None, values | more, sections()), doors)
-        await runtime.start()
+        runtime = await lockstep_runtime(tmp_path / "data", ADDRESS, "foxglove", "slamware", **more)
         scenes.append(Scene(runtime))
         return scenes[-1]
 

@@ -17,11 +17,10 @@ import zenoh
 import zenoh.ext
 from rosbags.typesys import Stores, get_typestore
 
-from roboglot.config import load_config
 from roboglot.model.clock import LockstepClock
-from roboglot.protocols import DOORS, sections
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
+from tests.protocols.lockstep import lockstep_runtime
 
 ADDRESS, PORT = free_addresses(1), 7447
 PATIENCE = 60.0  # real s
@@ -98,20 +97,11 @@ Opened = Callable[..., Awaitable[Scene]]
 
 @pytest.fixture
 async def opened(tmp_path: Path) -> AsyncIterator[Opened]:
-    """Open a robot; what its configuration says beside."""
+    """Open a robot; ``more``: further keys of its door's configuration."""
     scenes: list[Scene] = []
 
     async def open(**more: Any) -> Scene:
-        values: dict[str, Any] = {
-            "data": str(tmp_path / "data"),
-            "world": "empty",
-            "lockstep": True,
-            "robots": [{"name": "a", "body": "universal", "address": ADDRESS}],
-            "console": {"enabled": False},
-            "ros2": {"enabled": True} | more,
-        }
-        runtime = Runtime(load_config(None, values, sections()), tuple(door for door in DOORS if door.name == "ros2"))
-        await runtime.start()
+        runtime = await lockstep_runtime(tmp_path / "data", ADDRESS, "ros2", ros2={"enabled": True} | more)
         assert isinstance(runtime.clock, LockstepClock)
         scenes.append(Scene(runtime, await asyncio.to_thread(Peer, runtime.clock)))
         return scenes[-1]

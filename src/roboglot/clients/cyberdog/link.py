@@ -8,9 +8,10 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import re
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, Protocol
 
 import grpc
 
@@ -29,6 +30,15 @@ PUSH_MAX = 5_242_880  # bytes per message
 FOUND_PERIOD = 0.05  # s between two checks whether the robot has called
 CALLERS_MAX = 64  # connections whose robot is remembered
 IN_BAND = re.compile(r'"error_code"\s*:\s*([1-9]\d*)')
+
+Reply = Callable[[str | bytes, str], None]
+
+
+class Cancellable(Protocol):
+    """A call that can be cancelled."""
+
+    def cancel(self) -> bool:
+        """Cancel it; return False if it has ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,39 +178,44 @@ class DogLink:
     async def send(self, code: int, text: str) -> AsyncGenerator[tuple[int, str], None]:
         """Yield the answers to one request as (code, text) until the robot ends it. Raises LinkLost, BadAnswer."""
         call = self._robot().send(pb.SendRequest(nameCode=code, params=text))
-        line = self.line if self.line is not None and self.line.watched else None
-        began = 0.0 if line is None else line.request(str(int(code)), text)
-        try:
+        with self._exchange(call, code, text) as reply:
             async for answer in call:
                 if answer is None:
                     raise BadAnswer(f"{code}: the robot sent bytes that are no answer")
-                if line is not None:
+                if reply is not None:
                     found = IN_BAND.search(answer.data)
-                    refusal = f"error_code {found[1]}" if found else ""
-                    line.reply(str(int(code)), answer.data, refusal or "ok", refusal, began)
+                    reply(answer.data, f"error_code {found[1]}" if found else "")
                 yield answer.nameCode, answer.data
-        except grpc.aio.AioRpcError as error:
-            if line is not None:
-                line.reply(str(int(code)), b"", LOST, error.details() or error.code().name, began)
-            raise _lost(error) from None
-        finally:
-            call.cancel()
 
     async def fetch(self, code: int, text: str) -> AsyncGenerator[pb.FileChunk, None]:
         """Yield the chunks of a file. Raises LinkLost, BadAnswer."""
         call = self._robot().fetch(pb.SendRequest(nameCode=code, params=text))
-        line = self.line if self.line is not None and self.line.watched else None
-        began = 0.0 if line is None else line.request(str(int(code)), text)
-        try:
+        with self._exchange(call, code, text) as reply:
             async for chunk in call:
                 if chunk is None:
                     raise BadAnswer(f"{code}: the robot sent bytes that are no part of a file")
-                if line is not None:
-                    line.reply(str(int(code)), chunk.SerializeToString(), "ok", "", began)
+                if reply is not None:
+                    reply(chunk.SerializeToString(), "")
                 yield chunk
+
+    @contextmanager
+    def _exchange(self, call: Cancellable, code: int, text: str) -> Iterator[Reply | None]:
+        """Yield the function that reports a reply, with its refusal, to the tap; None if nothing watches.
+
+        Translates gRPC's errors, and cancels the call in the end.
+        """
+        line, key = self.line if self.line is not None and self.line.watched else None, str(int(code))
+        began = 0.0 if line is None else line.request(key, text)
+
+        def reply(data: str | bytes, refusal: str) -> None:
+            assert line is not None
+            line.reply(key, data, refusal or "ok", refusal, began)
+
+        try:
+            yield reply if line is not None else None
         except grpc.aio.AioRpcError as error:
             if line is not None:
-                line.reply(str(int(code)), b"", LOST, error.details() or error.code().name, began)
+                line.reply(key, b"", LOST, error.details() or error.code().name, began)
             raise _lost(error) from None
         finally:
             call.cancel()
