@@ -17,7 +17,7 @@ import sys
 import threading
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -31,6 +31,9 @@ from roboglot.hosting.process import end_in_any_case, prepare
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
 from roboglot.protocols.door import Option
+
+if TYPE_CHECKING:
+    from roboglot.runtime import Runtime
 
 STANDARD_INPUT = 0
 LINE_MAX = 64  # bytes per line of standard input in lockstep
@@ -203,42 +206,47 @@ async def _serve(config: Config, *, open_console: bool) -> int:
     try:
         runtime = Runtime(config)
     except (FolderInUse, ValueError, OSError) as error:
-        why = open_files.in_words() if open_files.ran_out(error) else in_words(error)
-        print(f"roboglot up: {why}", file=sys.stderr)
-        return 1
+        return _failed(open_files.in_words() if open_files.ran_out(error) else in_words(error))
     except sqlite3.Error as error:
-        print(f"roboglot up: the database in {config.data} can't be used: {error}", file=sys.stderr)
-        return 1
+        return _failed(f"the database in {config.data} can't be used: {error}")
     from roboglot.model.errors import RobotError
 
     try:
-        warn_if_open(config)
-        await runtime.start()
-        gc.enable()
-        page = runtime.console.address if runtime.console is not None and runtime.console.port else ""
-        announce(config, {name: doors.endpoints for name, doors in runtime.doors.items()}, page)
-        print("ready", flush=True)
-        if page and open_console:
-            import webbrowser
-
-            threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()  # it may wait for a browser
-        stepping = asyncio.ensure_future(_step(runtime.clock)) if isinstance(runtime.clock, LockstepClock) else None
-        await stop.wait()
-        end_in_any_case()
-        if stepping:
-            stepping.cancel()
+        await _run(runtime, stop, open_console=open_console)
     except OSError as error:
         taken = "; is another robot up? --address chooses another" if error.errno == errno.EADDRINUSE else ""
-        why = open_files.in_words() if open_files.ran_out(error) else f"{error.strerror or error}{taken}"
-        print(f"roboglot up: {why}", file=sys.stderr)
-        return 1
+        return _failed(open_files.in_words() if open_files.ran_out(error) else f"{error.strerror or error}{taken}")
     except RobotError as error:  # nothing can be recorded
-        print(f"roboglot up: {error}", file=sys.stderr)
-        return 1
+        return _failed(str(error))
     finally:
         gc.enable()
         await runtime.close()
     return 0
+
+
+async def _run(runtime: Runtime, stop: asyncio.Event, *, open_console: bool) -> None:
+    """Start the robots, announce that, and wait until ``stop`` is set."""
+    warn_if_open(runtime.config)
+    await runtime.start()
+    gc.enable()
+    page = runtime.console.address if runtime.console is not None and runtime.console.port else ""
+    announce(runtime.config, {name: doors.endpoints for name, doors in runtime.doors.items()}, page)
+    print("ready", flush=True)
+    if page and open_console:
+        import webbrowser
+
+        threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()  # it may wait for a browser
+    stepping = asyncio.ensure_future(_step(runtime.clock)) if isinstance(runtime.clock, LockstepClock) else None
+    await stop.wait()
+    end_in_any_case()
+    if stepping:
+        stepping.cancel()
+
+
+def _failed(why: str) -> int:
+    """Print why the program ends; return its exit status."""
+    print(f"roboglot up: {why}", file=sys.stderr)
+    return 1
 
 
 async def _step(clock: LockstepClock) -> None:

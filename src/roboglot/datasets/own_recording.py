@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
-from roboglot.datasets.track import Track
+from roboglot.datasets.track import Track, with_odometry
 from roboglot.extras import explaining
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.sensing import LaserScan
@@ -54,15 +54,12 @@ def read_own_recording(path: Path) -> DriveLog:
         raise BadDriveLog(f"{path.name}: no scans; a folder of rosbag2 is read by its folder")
     robot = max(sorted(scans), key=lambda name: len(scans[name]))
     unread.update({f"scans of {name}": len(found) for name, found in scans.items() if name != robot})
-    track, recorded = tracks.get(robot, Track()), []
+    track, mount = tracks.get(robot, Track()), mounts.get(robot, ORIGIN)
     reach = max((_farthest(message) for message in scans[robot]), default=0.0) or RANGE_MIN
-    for message in scans[robot]:
-        stamp = _seconds(message.timestamp)
-        odometry = track.at(stamp)
-        if odometry is None:
-            unread["scans without odometry"] += 1
-        else:
-            recorded.append(RecordedScan(_scan(message, stamp, reach, mounts.get(robot, ORIGIN)), odometry))
+    recorded = [
+        RecordedScan(_scan(message, stamp, reach, mount), odometry)
+        for message, stamp, odometry in with_odometry(scans[robot], _stamp_of, track, unread)
+    ]
     if not recorded:
         raise BadDriveLog(f"{path.name}: no scan of {robot} has odometry near its time")
     return DriveLog(path.stem, recorded, dict(unread))
@@ -121,6 +118,10 @@ def _scan(message: ScanMessage, stamp: float, reach: float, mount: Pose) -> Lase
     ranges.setflags(write=False)
     increment = (message.end_angle - message.start_angle) / max(1, len(ranges) - 1)
     return LaserScan(stamp, ranges, message.start_angle, increment, RANGE_MIN, reach + 1e-3, mount=mount)
+
+
+def _stamp_of(message: ScanMessage) -> float:
+    return _seconds(message.timestamp)
 
 
 def _seconds(stamp: Timestamp) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
-from roboglot.datasets.track import Track
+from roboglot.datasets.track import Track, with_odometry
 from roboglot.extras import explaining
 from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
@@ -133,16 +133,13 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
         else:
             for transform in message.transforms:
                 _take(transform, fixed, tf_wheels)
-    track, recorded = wheels if len(wheels) else tf_wheels, []
+    track = wheels if len(wheels) else tf_wheels
     if not len(track):
         raise BadDriveLog(f"{name}: no odometry: neither {ODOMETRY} nor tf from odom to base_link")
-    for message in scans:
-        stamp = _seconds(message.header.stamp)
-        odometry = track.at(stamp)
-        if odometry is None:
-            unread["scans without odometry"] += 1
-        else:
-            recorded.append(RecordedScan(_scan(message, stamp, _mount(fixed, message.header.frame_id)), odometry))
+    recorded = [
+        RecordedScan(_scan(message, stamp, _mount(fixed, message.header.frame_id)), odometry)
+        for message, stamp, odometry in with_odometry(scans, _stamp_of, track, unread)
+    ]
     if not recorded:
         raise BadDriveLog(f"{name}: no scan has odometry near its time")
     recorded.sort(key=lambda item: item.scan.stamp)
@@ -183,6 +180,10 @@ def _scan(message: ScanMessage, stamp: float, mount: Pose) -> LaserScan:
     increment = increment if 0.0 < increment < RAY_SECONDS_MAX else 0.0
     angles = float(message.angle_min), float(message.angle_increment)
     return LaserScan(stamp, ranges, *angles, least, most, mount=mount, time_increment=increment)
+
+
+def _stamp_of(message: ScanMessage) -> float:
+    return _seconds(message.header.stamp)
 
 
 def _seconds(stamp: Stamp) -> float:

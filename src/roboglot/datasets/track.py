@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
 
 from roboglot.model.geometry import Pose
 
 APART_MAX = 1.0  # s between a scan and its odometry
+T = TypeVar("T")
 
 
 class Track:
@@ -39,3 +43,16 @@ class Track:
         share = (stamp - begin) / (after - begin)
         step = pose.relative_to(first)
         return first.compose(Pose(share * step.x, share * step.y, share * step.yaw))
+
+
+def with_odometry(
+    messages: Iterable[T], stamp_of: Callable[[T], float], track: Track, unread: Counter[str]
+) -> Iterator[tuple[T, float, Pose]]:
+    """Yield scans with their stamp (s) and odometry; those without are counted in ``unread``."""
+    for message in messages:
+        stamp = stamp_of(message)
+        odometry = track.at(stamp)
+        if odometry is None:
+            unread["scans without odometry"] += 1
+        else:
+            yield message, stamp, odometry

@@ -265,18 +265,24 @@ def _read_records(path: Path, recording: Recording, *, first: bool) -> None:
             case Attachment():
                 recording.attachments[record.name] = record.data
             case Message() if channel is not None and schema is not None:
-                recording.topics[channel.topic] = recording.topics.get(channel.topic, 0) + 1
-                recording.first = min(recording.first or record.log_time, record.log_time)
-                recording.last = max(recording.last, record.log_time)
-                if schema.name == "roboglot.Input" and len(recording.inputs) < EXCHANGES_MAX:
-                    recording.inputs.append((len(recording.exchanges), decode_input(record.data)))
-                    recording.epoch = recording.epoch or record.log_time / 1e9 - recording.inputs[-1][1].stamp
-                if schema.name == "roboglot.Exchange" and len(recording.exchanges) < EXCHANGES_MAX:
-                    exchange = decode_exchange(record.data)
-                    recording.exchanges.append(exchange)
-                    recording.epoch = recording.epoch or record.log_time / 1e9 - exchange.stamp
+                _read_message(recording, record, channel.topic, schema.name)
             case Footer():
                 recording.whole = True
+
+
+def _read_message(recording: Recording, record: Message, topic: str, kind: str) -> None:
+    """Count a message; keep it if it is an input or an exchange."""
+    recording.topics[topic] = recording.topics.get(topic, 0) + 1
+    recording.first = min(recording.first or record.log_time, record.log_time)
+    recording.last = max(recording.last, record.log_time)
+    if kind == "roboglot.Input" and len(recording.inputs) < EXCHANGES_MAX:
+        taken = decode_input(record.data)
+        recording.inputs.append((len(recording.exchanges), taken))
+        recording.epoch = recording.epoch or record.log_time / 1e9 - taken.stamp
+    if kind == "roboglot.Exchange" and len(recording.exchanges) < EXCHANGES_MAX:
+        exchange = decode_exchange(record.data)
+        recording.exchanges.append(exchange)
+        recording.epoch = recording.epoch or record.log_time / 1e9 - exchange.stamp
 
 
 def read_messages(path: Path, *topics: str) -> Iterator[Record]:

@@ -38,14 +38,13 @@ def command(
     data: Data = None,
 ) -> None:
     """Show who moves each robot; take control of one, pass it on or release it."""
-    given = give is not None
-    if take + given + release > 1:
+    given: dict[Verb, bool] = {"take": take, "give": give is not None, "release": release}
+    verbs: list[Verb] = [verb for verb, is_given in given.items() if is_given]
+    if len(verbs) > 1:
         raise typer.BadParameter("give one of --take, --give and --release")
-    if (take or given or release) and not (robot or all_):
+    if (robot and all_) or (verbs and not robot and not all_):
         raise typer.BadParameter("name a robot, or give --all")
-    if robot and all_:
-        raise typer.BadParameter("name a robot, or give --all")
-    verb: Verb = "take" if take else "give" if given else "release" if release else "look"
+    verb: Verb = verbs[0] if verbs else "look"
     answer = send("lease", Request(verb, robot, give or "", all_), data)
     shown = [control for control in answer.robots if robot in ("", control.robot)]
     if not shown:

@@ -45,6 +45,7 @@ PENDING_MAX = 16  # messages of one page that are being answered
 LIGHT_EVERY = 0.02  # s: minimum between two highlighted blocks on a page
 DRAW_EVERY = 2.0  # s between two maps of a pupil's robot shown to the teacher
 WAITING_MAX = 2000  # messages queued for a slow page; beyond this the oldest insights are dropped
+KIND = "type", "task", "name"  # of messages of which only the newest is sent
 ASKED_MAX = 64  # unanswered inquiries of one page
 _BLOCK = re.compile(r'"block": \{"type": "(begin|end)"')
 _LIST = re.compile(r'\{"response": \{[^{}]*"id": "([^"\\]*)"')
@@ -158,12 +159,9 @@ class Session:
         if self._showed and message["type"] in ("joined", "elsewhere", "grid"):
             self._codes.give_back(self._showed)
             self._showed = ""
-        if message["type"] in ("variables", "grid", "map"):  # only the newest is sent
-            kind = [message.get(key) for key in ("type", "task", "name")]
-            same = (m for m in self._waiting if [m.get(key) for key in ("type", "task", "name")] == kind)
-            if (old := next(same, None)) is not None:
-                old.update(message)
-                return
+        if (old := self._replaced_by(message)) is not None:
+            old.update(message)
+            return
         if len(self._waiting) >= WAITING_MAX:
             seldom = next((m for m in self._waiting if m["type"] in ("reading", "variables", "log", "trial")), None)
             if seldom is None:
@@ -171,6 +169,13 @@ class Session:
             self._waiting.remove(seldom)
         self._waiting.append(message)
         self._due.set()
+
+    def _replaced_by(self, message: dict[str, object]) -> dict[str, object] | None:
+        """Return the waiting message that this one replaces, as only the newest of its kind is sent."""
+        if message["type"] not in ("variables", "grid", "map"):
+            return None
+        kind = [message.get(key) for key in KIND]
+        return next((waiting for waiting in self._waiting if [waiting.get(key) for key in KIND] == kind), None)
 
     # -- a front end of the frames --
 

@@ -78,21 +78,24 @@ class TelemetryPoller:
             log.warning("reading %s without scan and map: %s", self._link.address, NO_ARRAYS)
             self._absent |= ARRAYS
         for what, _, ask in self._parts:
-            if what in self._absent:
-                continue
-            try:
-                await ask()
-                self._note_answer(what)
-            except SlamwareRefused as refused:
-                if refused.code not in ABSENT:
-                    raise
-                if what not in self._met:  # else its part of the robot is still starting
-                    self._absent.add(what)
-            except BadAnswer as error:
-                if what not in self._optional:
-                    raise
-                log.warning("%s does not report its %s: %s", self._link.address, what, error)
+            if what not in self._absent:
+                await self._ask_first(what, ask)
+
+    async def _ask_first(self, what: str, ask: Callable[[], Awaitable[None]]) -> None:
+        """Ask for a topic, and note that it is absent if the robot lacks it."""
+        try:
+            await ask()
+            self._note_answer(what)
+        except SlamwareRefused as refused:
+            if refused.code not in ABSENT:
+                raise
+            if what not in self._met:  # else its part of the robot is still starting
                 self._absent.add(what)
+        except BadAnswer as error:
+            if what not in self._optional:
+                raise
+            log.warning("%s does not report its %s: %s", self._link.address, what, error)
+            self._absent.add(what)
 
     async def run(self) -> None:
         """Poll until the link breaks."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import calendar
 from datetime import UTC, date, datetime, time, timedelta, tzinfo
+from itertools import product
 
 from roboglot.task_conditions import Cycle, Moment, parse_cycle, parse_moment
 
@@ -48,15 +49,13 @@ def due_next(cycle: Cycle, after: float, zone: tzinfo) -> float | None:
     """
     if cycle.at_start:
         return None
-    start = datetime.fromtimestamp(after, zone).replace(tzinfo=None, second=0, microsecond=0)
-    day = start.date()
+    times = [time(hour, minute) for hour, minute in product(sorted(cycle.hours), sorted(cycle.minutes))]
+    day = datetime.fromtimestamp(after, zone).date()
     for _ in range(DAYS_AHEAD):
-        if _day_matches(cycle, day):
-            for hour in sorted(cycle.hours):
-                for minute in sorted(cycle.minutes):
-                    due = datetime.combine(day, time(hour, minute), zone).timestamp()
-                    if due > after:
-                        return due
+        for moment in times if _day_matches(cycle, day) else ():
+            due = datetime.combine(day, moment, zone).timestamp()
+            if due > after:
+                return due
         if day == date.max:
             return None
         day += timedelta(days=1)

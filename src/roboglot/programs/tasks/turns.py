@@ -26,12 +26,16 @@ class Turns:
         async with self._lock:
             with self._clock.holding():
                 while self.lost and not self.closed:
-                    try:
-                        if (task := await self._store.get(id := next(iter(self.lost)))) is not None:
-                            await self._runner.revive(task, self.lost[id])
-                    finally:
-                        del self.lost[id]
+                    await self._restore(next(iter(self.lost)))
                 yield
+
+    async def _restore(self, id: str) -> None:
+        """Restore an interrupted run, if its task is stored still."""
+        try:
+            if (task := await self._store.get(id)) is not None:
+                await self._runner.revive(task, self.lost[id])
+        finally:
+            del self.lost[id]
 
     async def restore(self) -> None:
         """Restore the interrupted runs."""

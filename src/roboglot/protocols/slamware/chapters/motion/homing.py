@@ -39,22 +39,23 @@ async def head_home(errand: Errand, wanted: GoHome) -> None:
     """Drive to the dock of this floor."""
     how = wanted.move_options or MoveOptions()
     robot = errand.robot
-    docking = robot[Docking]
-    if wanted.flags == "no_dock" or how.mode:
+    docking, stays_before = robot[Docking], wanted.flags == "no_dock"
+    if stays_before or how.mode:
         if DockContact in robot and robot[DockContact].docked:
             return
         await _to_landing(errand, docking.home, how)
-        if wanted.flags == "no_dock":
-            return
+    if stays_before:
+        return
     for tries_left in reversed(range(1 + (wanted.charging_retry_count or 0))):
         try:
             await errand.do(docking.dock(source=PART))
             return
         except DockNotFound:
-            if not tries_left:
-                if wanted.back_to_landing and docking.home is not None:
-                    await _to_landing(errand, docking.home, how)
-                raise
+            if tries_left:
+                continue
+            if wanted.back_to_landing and docking.home is not None:
+                await _to_landing(errand, docking.home, how)
+            raise
 
 
 async def _to_landing(errand: Errand, home: Pose | None, how: MoveOptions) -> None:
