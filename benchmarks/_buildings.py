@@ -82,7 +82,7 @@ class Building:
         return (cells + 0.5) * 0.05 + (grid.corner.x, grid.corner.y)
 
     async def survey(self, east: float = math.inf) -> EvidenceGrid:
-        """A map of all that can be reached without going farther ``east`` (m from the start)."""
+        """Return a map of all that can be reached without going farther ``east`` (m from the start)."""
         grid, reader, seen, yaw = EvidenceGrid(), ScanReader(), [(0.0, 0.0)], 0.0
         while True:
             with contextlib.suppress(Refused):  # a person sits there
@@ -102,7 +102,7 @@ class Building:
 
 @asynccontextmanager
 async def building(name: str, body: str = "universal", seed: int = 3) -> AsyncIterator[Building]:
-    """The named building, or the one of a world file, with a robot whose localization and mapping stand still."""
+    """Yield the named building, or the one of a world file, with a robot whose localization and mapping stand still."""
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet(BUILDINGS.get(name, name), [RobotConfig(body=body)], clock=clock, seed=seed, database=database)
     await fleet.start(wait=True)

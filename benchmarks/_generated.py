@@ -28,7 +28,7 @@ def _box(draw: np.random.Generator, x: float, y: float, most: float = 1.6) -> di
 
 
 def _wall(start: tuple[float, float], end: tuple[float, float], draw: np.random.Generator) -> dict[str, Any]:
-    """A wall with a door in a random place."""
+    """Return a wall with a door in a random place."""
     length = math.dist(start, end)
     at = round(float(draw.uniform(DOOR, length - DOOR)), 2)
     return {"from": list(start), "to": list(end), "doors": [{"at": at, "width": DOOR}]}

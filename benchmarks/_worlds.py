@@ -41,7 +41,7 @@ class Ends(NamedTuple):
 
 
 async def shard(number: int, count: int, seconds: float, ends: Ends) -> tuple[float, int, float]:
-    """One world, driven: its processor time (s), its scans, and how far the slowest robot drove (m)."""
+    """Drive one world; return its processor time (s), its scans, and how far the slowest robot drove (m)."""
     robots = await crowd(count, "universal", number, driving=True)
     began = robots.ways
     os.write(ends.ready, READY)

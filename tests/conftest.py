@@ -118,7 +118,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def _fixtures(item: pytest.Item) -> set[Callable[..., object]]:
-    """The functions of ours that make a test's fixtures."""
+    """Return the functions of ours that make a test's fixtures."""
     known = getattr(getattr(item, "_fixtureinfo", None), "name2fixturedefs", {})
     made_by = {definition.func for definitions in known.values() for definition in definitions}
     return {function for function in made_by if function.__module__.startswith("tests.")}

@@ -53,13 +53,13 @@ PAGES = sorted(p for p in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")] i
 
 @cache
 def tree_of(path: Path) -> ast.Module:
-    """A file, parsed once for all tests."""
+    """Return a file, parsed once for all tests."""
     return parsed(path)
 
 
 @cache
 def statements_of(path: Path) -> list[ast.AST]:
-    """A file's statements, found once for all tests."""
+    """Return a file's statements, found once for all tests."""
     return statements(tree_of(path))
 
 
@@ -233,7 +233,7 @@ def test_docs_are_not_wide() -> None:
 
 
 def walks() -> dict[str, list[tuple[str, str]]]:
-    """The walks of the docs by their titles: files and functions in order."""
+    """Return the walks of the docs by their titles: files and functions in order."""
     page = (ROOT / "docs" / "architecture.md").read_text()
     part = page[page.index("## Seven requests") : page.index("## Truthfulness")]
     titles = {text.partition("\n")[0]: text for text in part.split("\n### ")[1:]}
@@ -274,7 +274,7 @@ def test_walk_in_docs_is_way_through_the_code(walk: list[tuple[str, str]]) -> No
 
 
 def imports(path: Path, modules: Mapping[str, Path]) -> set[str]:
-    """The modules of ours that a file imports, those for its types included."""
+    """Return the modules of ours that a file imports, those for its types included."""
     found = set()
     for node in statements_of(path):
         if isinstance(node, ast.ImportFrom) and node.module:
@@ -295,7 +295,7 @@ def test_imports_go_round_in_no_circles() -> None:
 
 
 def _reach(graph: Mapping[str, set[str]], begin: set[str]) -> set[str]:
-    """Every module that can be reached from ``begin``."""
+    """Return every module that can be reached from ``begin``."""
     seen, todo = set[str](), [module for module in begin if module in graph]
     while todo:
         module = todo.pop()

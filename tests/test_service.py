@@ -52,12 +52,12 @@ NAMESPACES = {"cgroup": 0x02000000, "ipc": 0x08000000, "net": 0x40000000, "mnt":
 
 
 def setting(name: str) -> list[str]:
-    """The values of a setting, one for each line."""
+    """Return the values of a setting, one for each line."""
     return re.findall(rf"^{name}=(.*)$", UNIT.read_text(), re.MULTILINE)
 
 
 def group(name: str) -> set[str]:
-    """The system calls of systemd's group."""
+    """Return the system calls of systemd's group."""
     listed = subprocess.run(["systemd-analyze", "syscall-filter", name], capture_output=True, text=True, check=True)
     lines = map(str.strip, listed.stdout.splitlines()[1:])
     names = {line for line in lines if line and not line.startswith("#")}

@@ -33,7 +33,7 @@ VIEWS = {
 
 
 def place(clock: LockstepClock | RealClock) -> tuple[World, Robot]:
-    """The office with one robot."""
+    """Return the office with one robot."""
     world = World(load_world("office"), [RobotPlacement("a")], clock=clock)
     robot = Robot("a", world.description_of("a"), clock)
     world.equip(robot)

@@ -38,7 +38,7 @@ SECONDS = 10.0
 
 @contextlib.contextmanager
 def tunnel(token: str, settings: Path) -> Iterator[subprocess.Popen[str]]:
-    """The robot's ports at HERE."""
+    """Yield the robot's ports at HERE."""
     environment = {**os.environ, "ROBOGLOT_TOKEN": token, "XDG_CONFIG_HOME": str(settings)}
     command = [sys.executable, "-m", "roboglot", "connect", f"{ROBOT}:{GATEWAY}", "--address", HERE, "--once"]
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:

@@ -47,7 +47,7 @@ def processor() -> float:
 
 
 async def share(seconds: float) -> float:
-    """The share of a core that this program uses now; the median of five looks."""
+    """Return the share of a core that this program uses now; the median of five looks."""
     shares = []
     for _ in range(5):
         before = processor()

@@ -70,7 +70,7 @@ def call(stub: Any, what: tuple[int, object]) -> Any:
 
 
 async def finished(stub: Any, what: tuple[int, object]) -> str:
-    """The last answer."""
+    """Return the last answer."""
     last = ""
     async with asyncio.timeout(WAIT_MAX):
         async for answer in call(stub, what):
@@ -182,7 +182,7 @@ async def deaf_app(robot: ServedRobot, proof: Certificates, stub: Any, claims: C
 
 
 def at(number: int) -> str:
-    """The address of one of the hundred."""
+    """Return the address of one of the hundred."""
     return f"{CROWD}.{number + 1}"
 
 

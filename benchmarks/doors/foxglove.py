@@ -48,7 +48,7 @@ def processor() -> float:
 
 
 async def share(seconds: float) -> float:
-    """The share of a core that is used now."""
+    """Return the share of a core that is used now."""
     before, began = processor(), time.monotonic()
     await asyncio.sleep(seconds)
     return (processor() - before) / (time.monotonic() - began)

@@ -183,7 +183,7 @@ async def _row(name: str, host: str, query: str) -> tuple[float, float]:
 
 
 async def _in(network: str, script: str, *arguments: str) -> asyncio.subprocess.Process:
-    """A process in that network, once it says that it is ready."""
+    """Start a process in that network; return it once it says that it is ready."""
     process = await asyncio.create_subprocess_exec(
         "nsenter", "-t", network, "-n", sys.executable, "-c", script, *arguments, stdout=asyncio.subprocess.PIPE
     )

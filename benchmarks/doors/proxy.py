@@ -57,7 +57,7 @@ class Robot:
 
 
 async def opened(door: str, address: str, certificates: str) -> Line:
-    """A line to a door of the robot, or of the proxy."""
+    """Return a line to a door of the robot, or of the proxy."""
     line = LINES[door](address, Target(f"{door}://{address}").port, RealClock(), lambda _operation, _data: None)
     if isinstance(line, DogLine):
         line.options = {"certs": certificates}

@@ -41,7 +41,7 @@ while True:
 
 
 async def share(seconds: float) -> float:
-    """The share of a core that is used now."""
+    """Return the share of a core that is used now."""
     before, began = time.process_time(), time.monotonic()
     await asyncio.sleep(seconds)
     return (time.process_time() - before) / (time.monotonic() - began)

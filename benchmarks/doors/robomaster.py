@@ -64,7 +64,7 @@ def round_trips(connection: socket.socket, command: bytes) -> float:
 
 @contextlib.contextmanager
 def echo() -> Iterator[tuple[int, socket.socket]]:
-    """A process that answers and does nothing else, and a connection to it."""
+    """Yield a process that answers and does nothing else, and a connection to it."""
     with subprocess.Popen([sys.executable, "-c", ECHO], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout

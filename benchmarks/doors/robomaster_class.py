@@ -63,7 +63,7 @@ class Pupil:
 
 
 def name_of(index: int) -> str:
-    """The first is the one that ``roboglot up`` has by itself."""
+    """Return a robot's name; the first is the one that ``roboglot up`` has by itself."""
     return f"r{index}" if index else "a"
 
 

@@ -47,7 +47,7 @@ TROUBLE = re.compile(r"Traceback|internal error|ERROR|Exception|never awaited")
 
 
 def line(dice: random.Random) -> bytes:
-    """One command's text, from flawless to noise; without ``;``."""
+    """Return one command's text, from flawless to noise; without ``;``."""
     match dice.randrange(5):
         case 0:
             return dice.choice(SEEDS).encode()

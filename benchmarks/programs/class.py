@@ -37,7 +37,7 @@ MB = 1 << 20
 
 
 def memory(pid: int) -> float:
-    """A process's share of the machine's memory, MB."""
+    """Return a process's share of the machine's memory, MB."""
     for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
         if line.startswith("Pss:"):
             return int(line.split()[1]) / 1024

@@ -145,7 +145,7 @@ async def lines(frames: Frames) -> AsyncIterator[list[Line]]:
 
 
 def children(robot: ServedRobot) -> set[int]:
-    """The processes of programs: grandchildren of the server, by way of the zygote."""
+    """Return the processes of programs: grandchildren of the server, by way of the zygote."""
     parents: dict[int, list[int]] = {}
     for entry in Path("/proc").glob("[0-9]*"):
         try:

@@ -54,7 +54,7 @@ PATIENCE = 60.0
 
 
 def memory(pid: int) -> float:
-    """A process's share of the machine's memory, MB."""
+    """Return a process's share of the machine's memory, MB."""
     text = Path(f"/proc/{pid}/smaps_rollup").read_text()
     return next(int(line.split()[1]) / 1024 for line in text.splitlines() if line.startswith("Pss:"))
 

@@ -57,7 +57,7 @@ class Work:
 
 
 async def opened(browser: Any, url: str, work: list[float] | None = None) -> tuple[Any, float]:
-    """A new page and the milliseconds until a block can be taken; into ``work``, those that its thread worked."""
+    """Return a new page and the ms until a block can be taken; add those that its thread worked to ``work``."""
     page = await (await browser.new_context(viewport={"width": 1400, "height": 900})).new_page()
     meter = Work(page)
     before = await meter.so_far() if work is not None else 0.0

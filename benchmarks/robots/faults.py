@@ -226,7 +226,7 @@ class Fleet:
         return time.monotonic()
 
     def where(self, robot: str) -> str:
-        """The node that a robot was driven on last."""
+        """Return the node that a robot was driven on last."""
         return max((sight for sight in self.sights() if sight.robot == robot), key=lambda sight: sight.at).node
 
     def cut_connections(self) -> None:
@@ -241,7 +241,7 @@ class Fleet:
             file.write(seconds.to_bytes(8, sys.byteorder, signed=True))
 
     def stored(self) -> dict[str, set[str]]:
-        """The places that the database has of each robot."""
+        """Return the places that the database has of each robot."""
         with psycopg.connect(self.server.url, autocommit=True) as connection:
             places: dict[str, set[str]] = defaultdict(set)
             for robot, place in connection.execute("SELECT robot, id FROM place"):
@@ -277,7 +277,7 @@ def judge(claims: Claims, fleet: Fleet, name: str, began: float, ended: float) -
 
 
 def faults(fleet: Fleet) -> Iterator[tuple[str, Callable[[], float]]]:
-    """The faults by name; each returns when it has passed."""
+    """Yield the faults by name; each returns when it has passed."""
 
     def server_away() -> float:
         fleet.server.stop()
@@ -320,7 +320,7 @@ def faults(fleet: Fleet) -> Iterator[tuple[str, Callable[[], float]]]:
 
 @contextmanager
 def made() -> Iterator[Fleet]:
-    """The head's machine is this namespace."""
+    """Yield the fleet; the head's machine is this namespace."""
     binaries = binary_folder()
     if binaries is None:
         sys.exit("faults: no PostgreSQL server on this machine (Debian: apt-get install postgresql)")

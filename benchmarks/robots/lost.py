@@ -147,7 +147,7 @@ class Trial:
 
 
 def mapped(grid: OccupancyGrid) -> EvidenceGrid:
-    """The robot's map, to ask it for floor."""
+    """Return the robot's map, to ask it for floor."""
     return evidence_of(grid)
 
 
@@ -170,7 +170,7 @@ def doubled(grid: OccupancyGrid, truth: EvidenceGrid) -> int:
 
 
 async def tour(name: str, seed: int) -> Counter[str]:
-    """One building, driven through with ten events of each kind."""
+    """Drive through one building, with ten events of each kind; return the counts of verdicts."""
     async with building(name, seed=seed) as house:
         robot = house.fleet.robots["a"]
         floor = house.floor(await house.survey())

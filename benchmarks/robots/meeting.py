@@ -54,7 +54,7 @@ class Result:
 
 
 async def alone(scene: Scenario, grid: OccupancyGrid) -> dict[str, float]:
-    """The seconds that each of its robots takes when there is no other."""
+    """Return the seconds that each of its robots takes when there is no other."""
     seconds: dict[str, float] = {}
     for number in range(len(scene.bodies)):
         seconds |= (await meet(scene, grid, number)).seconds

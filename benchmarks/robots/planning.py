@@ -45,7 +45,7 @@ def office(seed: int) -> NDArray[np.float32]:
 
 
 def cost_of(cost: NDArray[np.float32], path: Path) -> float:
-    """The length of each step in cells times the mean cost of its cells."""
+    """Return the length of each step in cells times the mean cost of its cells."""
     steps = np.hypot(*np.diff(path, axis=0).T)
     along = cost[path[:, 0], path[:, 1]].astype(float)
     return float((steps * (along[1:] + along[:-1]) / 2).sum())

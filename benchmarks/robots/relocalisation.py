@@ -78,7 +78,7 @@ async def verdict(house: Building, grid: EvidenceGrid, scan: LaserScan, seconds:
 
 
 async def measure(name: str, count: int, seconds: list[float]) -> Counter[str]:
-    """The verdicts in one building, on the map of all of it and of its western half."""
+    """Return the verdicts in one building, on the map of all of it and of its western half."""
     verdicts = Counter[str]()
     async with building(name) as house:
         whole = await house.survey()

@@ -61,7 +61,7 @@ class Lap:
 
 
 def noisy_body(folder: Path, level: dict[str, float]) -> str:
-    """The universal body with other noise."""
+    """Return the universal body with other noise."""
     text = (BODIES / "universal.toml").read_text()
     for key, value in level.items():
         if key == "lidar":

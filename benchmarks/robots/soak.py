@@ -201,7 +201,7 @@ def measure() -> dict[str, float]:
 
 @contextlib.asynccontextmanager
 async def born(data: Path) -> AsyncIterator[Life]:
-    """A robot with all its doors, in lockstep, and its clients."""
+    """Yield a robot with all its doors, in lockstep, and its clients."""
     config = Config(
         "empty",
         (RobotConfig("a", "universal", ADDRESS),),

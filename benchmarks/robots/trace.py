@@ -105,7 +105,7 @@ def open_senses(fleet: Fleet) -> list[Viewer[Any]]:
 
 
 def state_of(fleet: Fleet, robot: Robot) -> bytes:
-    """The robot's place, measurements and beliefs."""
+    """Return the robot's place, measurements and beliefs."""
     values: list[object] = [(fleet.world.truth.pose_of(robot.id), robot[Imu].reading, robot[Battery].state)]
     values.append((robot[Network].signal, robot[Network].state))
     if Localization in robot:

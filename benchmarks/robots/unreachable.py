@@ -31,7 +31,7 @@ CELL = 0.05  # m
 
 
 def site(around: OccupancyGrid) -> OccupancyGrid:
-    """The room that the robot knows, amid free floor with a closed room on it."""
+    """Return the room that the robot knows, amid free floor with a closed room on it."""
     cells = np.full((SIDE, SIDE), -60, np.int8)
     origin = Point(around.origin.x - 100 * CELL, around.origin.y - 100 * CELL)
     cells[100 : 100 + around.height, 100 : 100 + around.width] = around.log_odds

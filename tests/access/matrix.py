@@ -66,7 +66,7 @@ class TextCaller:
         return cls(*await asyncio.open_connection(ADDRESS, 40923, local_addr=(address, 0)))
 
     async def ask(self, command: str) -> bytes:
-        """The answer; empty: the connection was closed."""
+        """Return the answer; empty: the connection was closed."""
         try:
             self._writer.write(f"{command};".encode())
             return await self._reader.readuntil(b";")
@@ -91,7 +91,7 @@ async def dog_answers(
 
 @asynccontextmanager
 async def app_of(folder: Path, name: str) -> AsyncIterator[GrpcAppStub]:
-    """The calls of the app with the certificate of ``name``."""
+    """Yield the calls of the app with the certificate of ``name``."""
     ca, certificate, key = (path.read_bytes() for path in export_app(folder, name, folder / f"app-{name}"))
     credentials = grpc.ssl_channel_credentials(ca, key, certificate)
     options = [("grpc.ssl_target_name_override", ROBOT_NAME)]
@@ -100,7 +100,7 @@ async def app_of(folder: Path, name: str) -> AsyncIterator[GrpcAppStub]:
 
 
 async def dog_file_errors(folder: Path, name: str, asked: list[tuple[int, dict[str, object]]]) -> list[int]:
-    """The error that ends each ``getFile``, for the app with the certificate of ``name``."""
+    """Return the error that ends each ``getFile``, for the app with the certificate of ``name``."""
     async with app_of(folder, name) as stub:
         errors = []
         for code, params in asked:
@@ -110,7 +110,7 @@ async def dog_file_errors(folder: Path, name: str, asked: list[tuple[int, dict[s
 
 
 async def open_frames(address: str) -> TextLink | None:
-    """A link of the frames from an address; None: it was refused."""
+    """Return a link of the frames from an address; None: it was refused."""
     try:
         connection = await connect(f"ws://{ADDRESS}:50053/programs", compression=None, local_addr=(address, 0))
     except InvalidStatus:

@@ -36,7 +36,7 @@ HERE = free_addresses(1)
 
 @contextlib.asynccontextmanager
 async def behind_a_bad_line(folder: Path, body: str, world: str) -> AsyncIterator[Runtime]:
-    """A robot at HERE, whose time passes a little faster than outside."""
+    """Yield a robot at HERE, whose time passes a little faster than outside."""
     store = open_store(folder)
     token = store.add_machine("cell", [Grant("a", frozenset({Right.PROGRAM, Right.EDIT}))])
     store.close()

@@ -177,7 +177,7 @@ async def test_fleet_control_does_what_its_right_allows(runtime: Runtime, reache
     messages = {"order", "instantActions"}  # sent unprompted; all others are actions within
 
     async def ask(caller: Caller) -> set[str]:
-        """The actions that were refused for want of a right."""
+        """Return the actions that were refused for want of a right."""
         await door._introduce(f"{caller.address}:1883")
         for name in messages:
             await answer(door._context, name, b"{}")
@@ -329,5 +329,5 @@ async def ask_everything(runtime: Runtime, caller: Caller, data: Path) -> None:
 
 
 def runtime_session(runtime: Runtime) -> Any:
-    """The text door's session of robot a."""
+    """Return the text door's session of robot a."""
     return next(door.context for door in runtime.doors["a"]._doors if isinstance(door, RoboMasterDoor))

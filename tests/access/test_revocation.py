@@ -34,7 +34,7 @@ LASTS = 3600.0  # s for which a right is given
 
 @asynccontextmanager
 async def by_rest(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
-    """A goal far away."""
+    """Yield a goal far away."""
     transport = httpx.AsyncHTTPTransport(local_address=DRIVER.address)
     go = {"action_name": "slamtec.agent.actions.MoveToAction", "options": {"target": {"x": 3.0, "y": 0.0}}}
     async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=transport) as client:
@@ -51,7 +51,7 @@ async def by_rest(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone
 
 @asynccontextmanager
 async def by_text(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
-    """A speed."""
+    """Yield a speed."""
     client = await TextCaller.open(DRIVER.address)
     assert [await client.ask(text) for text in ("command", "chassis speed x 0.3")] == [b"ok;", b"ok;"]
 
@@ -64,7 +64,7 @@ async def by_text(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone
 
 @asynccontextmanager
 async def by_gait(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
-    """A walk of the dog that takes a while."""
+    """Yield a walk of the dog that takes a while."""
     ca, certificate, key = (path.read_bytes() for path in export_app(data / "cyberdog", "drive", data / "phone"))
     credentials = grpc.ssl_channel_credentials(ca, key, certificate)
     options = [("grpc.ssl_target_name_override", ROBOT_NAME)]
@@ -87,7 +87,7 @@ async def by_gait(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone
 
 @asynccontextmanager
 async def by_program(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
-    """A program that never ends."""
+    """Yield a program that never ends."""
     link = await open_frames(PROGRAMMER.address)
     assert link is not None
     frame = {"type": "task", "operate": "debug", "target_id": ["debug"], "mode": "single", "condition": "now"}
@@ -107,7 +107,7 @@ async def by_program(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, G
 
 @asynccontextmanager
 async def by_hand(runtime: Runtime, data: Path) -> AsyncIterator[tuple[str, Gone]]:
-    """The console's pad, held."""
+    """Yield the console's pad, held."""
     assert runtime.console is not None
     await runtime.console.ready()
     async with connect(f"ws://127.0.0.1:{runtime.console.port}/live", local_addr=(DRIVER.address, 0)) as page:

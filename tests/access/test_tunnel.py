@@ -60,7 +60,7 @@ async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[
 
 @contextlib.asynccontextmanager
 async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a") -> AsyncIterator[list[int]]:
-    """The robot's ports at HERE, while inside."""
+    """Yield the robot's ports at HERE, while inside."""
     assert runtime._gateway is not None
     known = KnownGateways(folder / "gateways.json")
     link = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)

@@ -46,7 +46,7 @@ async def passing(shown: Shown) -> AsyncIterator[None]:
 
 
 async def call(client: Client, tool: str, **values: Any) -> Any:
-    """The tool's answer as plain values."""
+    """Return the tool's answer as plain values."""
     from mcp.types import TextContent
 
     answer = await client.call_tool(tool, values)
@@ -63,7 +63,7 @@ async def refusal(client: Client, tool: str, **values: Any) -> str:
 
 
 def tools(shown: Shown) -> Client:
-    """The protocol's own client of the tools over this console."""
+    """Return the protocol's own client of the tools over this console."""
     return tools_of(shown.url)
 
 

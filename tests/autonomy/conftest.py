@@ -54,7 +54,7 @@ class Tour:
         return self.robot[Navigation].navigate_to(goals, NavigationOptions(yaw=yaw, **options), source="test")
 
     def robot_finds_itself(self) -> Action:
-        """The robot after it was carried elsewhere."""
+        """Return the action by which a robot finds itself after it was carried elsewhere."""
         return self.robot[Localization].relocalize()
 
     async def until(self, condition: Callable[[], object], seconds: float = 120.0) -> None:
@@ -74,7 +74,7 @@ class Tour:
 
 @asynccontextmanager
 async def delivering(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    """The delivery robot, which has a lift radio, in the office, with a database."""
+    """Yield the delivery robot, which has a lift radio, in the office, with a database."""
     database = Database(":memory:")
     fleet = build_fleet("office", [RobotConfig(body="hermes")], clock=clock, seed=1, database=database)
     await fleet.start(wait=True)

@@ -17,7 +17,7 @@ WORLD = ("roboglot.simulation", "roboglot.fleet", "roboglot.testing", "mujoco")
 
 
 def imported_by(source: str) -> set[str]:
-    """The modules that ``source`` names in imports, wherever they stand; ``importlib`` counts as the world's."""
+    """Return the modules that ``source`` names in imports, wherever they stand; ``importlib`` counts as the world's."""
     names = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
@@ -41,7 +41,7 @@ def file_of(module: str) -> Path | None:
 
 
 def way_to_the_world(*sources: str) -> str | None:
-    """The first module of the world that is met from ``sources`` by imports of imports."""
+    """Return the first module of the world that is met from ``sources`` by imports of imports."""
     waiting, known = set().union(*map(imported_by, sources)), set[str]()
     while waiting:
         module = waiting.pop()

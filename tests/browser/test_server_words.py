@@ -24,7 +24,7 @@ LEARNT = """async () => {
 
 
 def filled(text: str, marks: list[str]) -> str:
-    """The sentence with these in its gaps."""
+    """Return the sentence with these in its gaps."""
     left = iter(marks)
     return re.sub(r"\{\d?\}", lambda gap: marks[int(gap[0][1:-1])] if gap[0] != "{}" else next(left), text)
 

@@ -37,7 +37,7 @@ async def worlds(tmp_path: Path) -> AsyncIterator[list[Shown]]:
 
 @asynccontextmanager
 async def pages(browser: Any, *addresses: str) -> AsyncIterator[list[Page]]:
-    """A page of the studio at each address, each in a browser of its own."""
+    """Yield a page of the studio at each address, each in a browser of its own."""
     contexts = [await browser.new_context(viewport={"width": 1400, "height": 900}) for _ in addresses]
     opened = []
     for context, address in zip(contexts, addresses, strict=True):

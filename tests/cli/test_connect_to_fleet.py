@@ -42,7 +42,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @contextlib.asynccontextmanager
 async def program(folder: Path, registry: str, address: str, token: str = "") -> AsyncIterator[tuple[Runtime, str]]:
-    """A program that runs robot a behind a gateway, and a token for it."""
+    """Yield a program that runs robot a behind a gateway, and a token for it."""
     store = open_store(folder)
     token = token or store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
     store.close()

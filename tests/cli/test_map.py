@@ -39,7 +39,7 @@ GRID = OccupancyGrid(CELLS, 0.05, Point(-1.25, 2.5))
 
 
 async def roboglot(*arguments: str, folder: Path | None = None) -> tuple[int, str]:
-    """A real ``roboglot map``; its exit code and what it said."""
+    """Run ``roboglot map``; return its exit code and its output."""
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "roboglot", "map", *arguments,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=folder, env=os.environ | {"COLUMNS": "200"},

@@ -45,7 +45,7 @@ def sentences(root: Path = ROOT) -> dict[str, str]:
 
 
 def _errors(trees: Mapping[str, ast.Module]) -> set[str]:
-    """The names of the classes below ``KINDS``."""
+    """Return the names of the classes below ``KINDS``."""
     bases: dict[str, set[str]] = {}
     for tree in trees.values():
         for node in statements(tree):
@@ -58,7 +58,7 @@ def _errors(trees: Mapping[str, ast.Module]) -> set[str]:
 
 
 def _name(node: ast.expr) -> str:
-    """The last word of what is called or derived from."""
+    """Return the last word of what is called or derived from."""
     match node:
         case ast.Name(id=name) | ast.Attribute(attr=name):
             return name

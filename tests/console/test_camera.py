@@ -25,7 +25,7 @@ PITCH = 1000  # Hz
 
 
 async def call(shown: Shown, *kinds: str) -> RTCPeerConnection:
-    """A page's end of a call for media of ``kinds``."""
+    """Return a page's end of a call for media of ``kinds``."""
     offer_loopback()
     peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
     for kind in kinds:

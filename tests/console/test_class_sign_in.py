@@ -43,7 +43,7 @@ async def signed(shown: Shown, **shows: str) -> tuple[int, dict[str, Any], str]:
 
 @asynccontextmanager
 async def paged(shown: Shown, cookie: str) -> AsyncIterator[Page]:
-    """The studio of who has this cookie."""
+    """Yield the studio's page of the client with this cookie."""
     url = shown.url.replace("http", "ws") + "/studio"
     async with connect(url, max_size=None, additional_headers={"Cookie": cookie}) as socket:
         made = Page(socket)

@@ -32,7 +32,7 @@ DOING = {"phase": "running", "lit": "walk", "program": "mine", "stars": 3}
 async def world(
     folder: Path, name: str, address: str, *, shared: bool = True, access: AccessConfig = OPEN
 ) -> AsyncIterator[Shown]:
-    """A world whose console shares the classroom of the fleet in ``folder``."""
+    """Yield a world whose console shares the classroom of the fleet in ``folder``."""
     base = load_config(None, {"data": str(folder / name), "world": "empty", "lockstep": True})
     robots = (RobotConfig("a", "universal", address),)
     config = replace(base, robots=robots, access=access, console=ConsoleConfig(port=0))
@@ -65,7 +65,7 @@ async def asked(page: Page, **wish: Any) -> None:
 
 
 async def grid(teacher: Page, **wanted: object) -> dict[str, Any]:
-    """The teacher's row of the last pupil once it shows this."""
+    """Return the teacher's row of the last pupil once it shows this."""
     found = await teacher.until(
         lambda m: m["type"] == "grid" and m["pupils"] and wanted.items() <= m["pupils"][-1].items()
     )

@@ -34,7 +34,7 @@ async def rehearsals() -> AsyncIterator[Rehearsals]:
 
 
 def _own(words: str) -> str:
-    """The words without what they quote of the mission."""
+    """Return the words without what they quote of the mission."""
     return re.sub("“[^”]*”", "“”", words)
 
 

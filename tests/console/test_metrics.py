@@ -139,7 +139,7 @@ async def test_a_collector_that_is_not_there_is_logged(shown: Shown, caplog: pyt
 
 @contextlib.contextmanager
 def collector(taken: list[tuple[str, str, bytes]]) -> Iterator[str]:
-    """The address of an HTTP server that keeps what is posted: path, content type, body."""
+    """Yield the address of an HTTP server that keeps what is posted: path, content type, body."""
 
     class Take(BaseHTTPRequestHandler):
         def do_POST(self) -> None:

@@ -75,7 +75,7 @@ def scan(stamp: float, count: int) -> Any:
 
 
 def bag(path: Path, plugin: StoragePlugin, *, by_tf: bool) -> Path:
-    """A drive along x at 0.5 m/s; odometry comes 20 ms before each scan."""
+    """Return a drive along x at 0.5 m/s; odometry comes 20 ms before each scan."""
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         tf = writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=STORE)
         wheels = writer.add_connection("/odom", "nav_msgs/msg/Odometry", typestore=STORE)

@@ -30,7 +30,7 @@ LANGUAGES = pytest.mark.parametrize(
 
 
 def first_call(page: str, language: str) -> str:
-    """The code below the heading "First call"."""
+    """Return the code below the heading "First call"."""
     text = (ROOT / "docs/protocols" / page).read_text()
     [section] = re.findall(r"^## First call.*?(?=^## )", text, re.MULTILINE | re.DOTALL)
     found = re.findall(rf"^```{language}\n(.*?)^```", section, re.MULTILINE | re.DOTALL)

@@ -27,7 +27,7 @@ def block_with(page: Path, words: str, language: str = "sh") -> str:
 
 
 def inline(page: Path, words: str) -> str:
-    """The command in the text that ends in ``words``."""
+    """Return the command in the text that ends in ``words``."""
     [found] = re.findall(rf"`([^`\n]*{re.escape(words)})`", page.read_text())
     return str(found)
 

@@ -237,7 +237,7 @@ class Blocks:
 
 @asynccontextmanager
 async def front(kind: str, robot: Robot, folder: Path, port: Callable[[], int]) -> AsyncIterator[Front]:
-    """A door of ``kind`` in front of ``robot``, and its client."""
+    """Yield a door of ``kind`` in front of ``robot``, and its client."""
     if kind == "slamware":
         door = SlamwareDoor(robot, ADDRESS, SlamwareConfig(port=0))
         await door.start()

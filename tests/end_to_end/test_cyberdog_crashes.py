@@ -27,7 +27,7 @@ MODULE = {"product": "l91", "device": "l91.NX", "module": "l91.NX.OTA",
 
 @asynccontextmanager
 async def talking(data: Path) -> AsyncIterator[tuple[ServedRobot, CyberDogClient]]:
-    """A robot on ``data``, and a client that it has found."""
+    """Yield a robot on ``data``, and a client that it has found."""
     port = free_port()
     arguments = ("--robot", "a=cyberdog2", "--world", "playground", "--app", f"127.0.0.1:{port}")
     with served(data, *arguments, address=ADDRESS) as robot:

@@ -15,13 +15,13 @@ from tests.narrowing import of_kind
 
 
 def decoded(data: bytes) -> list[int]:
-    """The numbers of the pictures in an Annex B stream, as a player reads it."""
+    """Return the numbers of the pictures in an Annex B stream, as a player reads it."""
     with av.open(io.BytesIO(data), mode="r", format="h264") as file:
         return [number_of(of_kind(frame, av.VideoFrame).to_ndarray()[:HEIGHT]) for frame in file.decode(video=0)]
 
 
 def units(data: bytes) -> list[int]:
-    """The types of the NAL units."""
+    """Return the types of the NAL units."""
     return [data[match.end()] & 31 for match in re.finditer(b"\x00\x00\x01", data)]
 
 

@@ -22,7 +22,7 @@ def fix_at(east: float, north: float, accuracy: float = 1.0) -> GpsReading:
 
 
 def seen(point: Point, north_is: float) -> GpsReading:
-    """The fix at a point of a map whose origin is at home and whose north is there."""
+    """Return the fix at a point of a map whose origin is at home and whose north is there."""
     c, s = math.cos(north_is), math.sin(north_is)
     return fix_at(east=point.x * s - point.y * c, north=point.x * c + point.y * s)
 

@@ -81,7 +81,7 @@ async def play(
 
 
 async def started(engine: Engine, source: str, limits: Limits | None = None) -> Run:
-    """A run that has printed its first word."""
+    """Return a run that has printed its first word."""
     run = await engine.start(source, PRELUDE, limits or Limits())
     assert isinstance(await anext(run), Output)
     return run
@@ -127,7 +127,7 @@ def children_of(pid: int) -> set[int]:
 
 
 def process_state(pid: int) -> str:
-    """The kernel's letter for a process, "" if there is none."""
+    """Return the kernel's letter for a process, "" if there is none."""
     try:
         with open(f"/proc/{pid}/stat") as file:
             return file.read().rpartition(")")[2].split()[0]

@@ -68,7 +68,7 @@ class Stage:
         self._clock = clock
 
     async def play(self, source: str, acts: Iterable[Act] = ()) -> Performance:
-        """A program from its start to its end; what it had begun is called off then."""
+        """Play a program from its start to its end; cancel what it has begun then."""
         played, start = Performance(), self._clock.time()
         coming = sorted(((start + after, act) for after, act in acts), key=lambda act: act[0])
         session = Session(self._robot, "t", played)

@@ -19,7 +19,7 @@ DOOR = pytest.mark.parametrize("door", DOORS, ids=lambda door: door.name)
 
 
 def module(door: DoorType, name: str) -> ModuleType:
-    """One module of a door's package."""
+    """Return one module of a door's package."""
     return importlib.import_module(f"roboglot.protocols.{door.name}.{name}")
 
 

@@ -48,13 +48,13 @@ class Script:
 
 
 def block(page: str, words: str, language: str = "sh") -> str:
-    """The one block of a page that has these words."""
+    """Return the one block of a page that has these words."""
     [found] = [block for block in blocks(DOCS / page, language) if words in block]
     return found
 
 
 def lines_of(page: str, words: str, *without: str) -> list[str]:
-    """The commands of a block of a page, its variables before each."""
+    """Return the commands of a block of a page, its variables before each."""
     found, variables = list[str](), ""
     for command in commands(block(page, words)):
         if command.partition("=")[0].isidentifier():
@@ -65,14 +65,14 @@ def lines_of(page: str, words: str, *without: str) -> list[str]:
 
 
 def first(door: str, language: str) -> Script:
-    """The first call of a door's page."""
+    """Return the first call of a door's page."""
     before = [CERTIFICATES] if door == DOG else []
     files = {f"first.{SUFFIX[language]}": first_call(f"{door}.md", language)}
     return Script(door, [*before, f"ANSWERS=3; {RUN[language]}"], files, needs=NEEDS[language])
 
 
 def program(name: str) -> Script:
-    """A block program of the examples, run by the command line."""
+    """Return a block program of the examples, run by the command line."""
     return Script(FRAMES, [f".venv/bin/roboglot program run examples/programs/{name}.py"], body="cyberdog2")
 
 

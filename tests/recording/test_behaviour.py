@@ -40,7 +40,7 @@ def session(scale: float = 1.0, offset: float = 0.0, period: float = 0.2, second
 
 
 def replies(change: Callable[[dict[str, Any]], object]) -> list[Exchange]:
-    """The session with its answers changed."""
+    """Return the session with its answers changed."""
     found = []
     for exchange in session():
         if exchange.direction is Direction.REPLY:

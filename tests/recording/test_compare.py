@@ -21,7 +21,7 @@ MUTATIONS, FOUND_MIN, ROUNDS = 500, 0.95, 7
 
 
 def session() -> list[Exchange]:
-    """A session of three protocols: polls, commands, pushes."""
+    """Return a session of three protocols: polls, commands, pushes."""
     found: list[Exchange] = []
 
     def ask(at: float, door: str, operation: str, request: str, reply: str, status: str, after: float) -> None:

@@ -55,7 +55,7 @@ async def run(folder: Path, body: str, record: str, script: Script, **doors: dic
 
 
 async def twice(folder: Path, script: Script, **doors: dict[str, object]) -> tuple[Any, Any]:
-    """The script's result with a simulated robot, and with its recording."""
+    """Return the script's result with a simulated robot, and with its recording."""
     file = folder / "r.mcap"
     first = await run(folder, "universal", str(file), script, **doors)
     return first, await run(folder, f"recording:{file}", "", script, **doors)

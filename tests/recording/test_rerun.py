@@ -97,7 +97,7 @@ for number in range(4):
 
 
 async def with_programs(folder: Path, turns: int) -> Path:
-    """A front end saves, runs, suspends and lists programs, and lets time pass without waiting for answers."""
+    """Record a front end that saves, runs, suspends and lists programs, and does not wait for answers."""
     runtime = Runtime(config(folder))
     await runtime.start()
     clock = runtime.clock

@@ -37,7 +37,7 @@ def lab(
     *, start: Pose = START, size: float = 10.0, robots: tuple[str, ...] = ("a",), body: str = "universal",
     seed: int = 1, floors: int = 1, **floor: Any,
 ) -> Iterator[Lab]:  # fmt: skip
-    """A square room; ``floor`` is the rest of the lowest floor's description."""
+    """Yield a square room; ``floor`` is the rest of the lowest floor's description."""
     storeys = [{"size": [size, size], **floor}, *({"size": [size, size]} for _ in range(floors - 1))]
     description = completed(msgspec.convert({"floors": storeys}, WorldDescription), "test")
     placements = [RobotPlacement(n, body, start=start if n == "a" else None) for n in robots]

@@ -31,7 +31,7 @@ EYE = Pose(4.0, 4.0)
 
 
 async def ranges_at(file: Path, body: str) -> NDArray[np.float32]:
-    """A scan from EYE; ray i points to -180 + i degrees."""
+    """Return a scan from EYE; ray i points to -180 + i degrees."""
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet(str(file), [RobotConfig(body=body)], clock=clock, seed=1, database=database)
     await fleet.start(wait=True)

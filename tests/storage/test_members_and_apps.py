@@ -37,7 +37,7 @@ def members_of(database: Database, robot: str = "a", events: EventStream | None 
 
 
 def robot_of(database: Database, clock: LockstepClock) -> Robot:
-    """A dog in the office."""
+    """Return a dog in the office."""
     fleet = build_fleet("office", [RobotConfig(name="a", body="cyberdog2")], clock=clock, seed=1, database=database)
     fleet.world.start()
     return fleet.robots["a"]

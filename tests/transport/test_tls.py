@@ -58,7 +58,7 @@ class Late(Echo):
 async def port(
     folder: Path, *, plain: bool = True, admit: bool = True, inner: type[Echo] = Echo
 ) -> AsyncIterator[tuple[int, ssl.SSLContext]]:
-    """Its port, and the certificate that a client must trust."""
+    """Yield a server's port, and the certificate that a client must trust."""
     Echo.opened = 0
     tls = Tls(server_context(*ensure_site(folder, {"127.0.0.1", "localhost"})), plain)
     loop = asyncio.get_running_loop()

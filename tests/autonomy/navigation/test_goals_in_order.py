@@ -81,7 +81,7 @@ def test_a_follower_passes_all_goals_in_order(
 
 
 def _reached(now: Twist, asked: Twist, limits: BaseLimits) -> Twist:
-    """The velocity a period later."""
+    """Return the velocity a period later."""
     by, turn_by = limits.linear_acceleration * PERIOD, limits.angular_acceleration * PERIOD
     dx, dy = asked.x - now.x, asked.y - now.y
     share = min(1.0, by / max(math.hypot(dx, dy), 1e-9))

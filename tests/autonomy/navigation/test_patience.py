@@ -69,7 +69,7 @@ async def test_lost_robot_gives_up() -> None:
 
 
 def replanning(tuning: PilotTuning, *, leaves: float | None = None, turning: float = 0.0) -> tuple[Replanner, Any]:
-    """A replanner before an obstacle, and its follower; ``leaves``: a robot does, in so many seconds."""
+    """Return a replanner before an obstacle, and its follower. ``leaves``: s until a robot leaves the route."""
     course: Any = SimpleNamespace(
         robot=SimpleNamespace(clock=LockstepClock(), events=SimpleNamespace(listen=lambda *_: lambda: None)),
         tuning=tuning,

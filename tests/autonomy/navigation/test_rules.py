@@ -40,7 +40,7 @@ async def draw(tour: Tour, *entries: Line | Area) -> None:
 
 
 def placed_in(tour: Tour, entry: Line | Area) -> Line | Area:
-    """The entry in the robot's map."""
+    """Return the entry in the robot's map."""
     start, end = tour.on_map(entry.start.x, entry.start.y), tour.on_map(entry.end.x, entry.end.y)
     if isinstance(entry, Line) and entry.control:
         first, second = (tour.on_map(p.x, p.y) for p in entry.control)

@@ -21,7 +21,7 @@ TIGHT = np.diag((0.02**2, 0.02**2, 0.01**2))
 
 
 def scanned(x: float, robots: tuple[tuple[float, float], ...] = ALONG) -> ScanPoints:
-    """The scan of a robot in the middle of the corridor, ``x`` m along it; ``robots`` relative to it."""
+    """Return the scan of a robot in the middle of the corridor, ``x`` m along it; ``robots`` relative to it."""
     angles = np.arange(RAYS) * math.tau / RAYS
     c, s = np.cos(angles), np.sin(angles)
     with np.errstate(divide="ignore"):

@@ -19,7 +19,7 @@ MAP = object()
 
 
 def fitting(pose: Pose, agreement: float = 0.85) -> Match:
-    """A match in which this share of a thousand known points fits."""
+    """Return a match in which this share of a thousand known points fits."""
     return Match(pose, np.eye(3), 0.0, round(1000 * agreement), 1000, 1000)
 
 

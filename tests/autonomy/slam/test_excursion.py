@@ -38,7 +38,7 @@ async def steer(tour: Tour, *spots: tuple[float, float]) -> None:
 
 
 def walls_in(tour: Tour, corners: tuple[tuple[float, float], tuple[float, float]]) -> np.ndarray:
-    """The map's occupied cells (n, 2; world, m) there."""
+    """Return the map's occupied cells (n, 2; world, m) there."""
     grid = tour.robot[Mapping].grid
     rows, cols = np.nonzero(grid.log_odds > 0)
     c, s = math.cos(tour.start.yaw), math.sin(tour.start.yaw)

@@ -34,7 +34,7 @@ from tests.narrowing import known, of_kind
 
 
 def misjudged(folder: Path) -> str:
-    """A body whose wheels are wronger than most, as its file says."""
+    """Return a body whose wheels are less exact than most, as its file says."""
     text = (BODIES / "universal.toml").read_text()
     text = re.sub(r"(?m)^scale_error = .*$", "scale_error = 0.1\ndescribed = { along = 0.02 }", text)
     (folder / "misjudged.toml").write_text(text)

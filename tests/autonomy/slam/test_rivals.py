@@ -16,7 +16,7 @@ POINTS = 100
 
 
 def candidate(x: float, fitting: int, hidden: int, floating: int) -> Candidate:
-    """A place at ``x`` where the map says that of 100 points; all of the known ones fit closely."""
+    """Return a place at ``x`` where the map says that of 100 points; all of the known ones fit closely."""
     from roboglot.autonomy.slam.certainty import Look, Support
     from roboglot.autonomy.slam.matcher import Candidate, Match
 

@@ -17,7 +17,7 @@ CORRIDOR = (EAST[:, 0] >= 2.0) & (EAST[:, 0] < 8.0)
 
 
 def west(start: float, *, metres: float = 6.0, speed: float = 0.5, outranks: bool = False, name: str = "b") -> Way:
-    """A robot that comes the other way."""
+    """Return the way of a robot that comes the other way."""
     points = np.stack([np.arange(start, start - metres, -0.2), np.zeros(round(metres / 0.2))], axis=1)
     return Way(points, speed, RADIUS, outranks, name)
 

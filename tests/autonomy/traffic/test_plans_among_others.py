@@ -89,7 +89,7 @@ def test_first_one_keeps_its_way(robot: Robot, belief: Belief, way: Way, *, meet
 
 
 def straight(start: tuple[float, float], by: tuple[float, float], speed: float) -> Way:
-    """A robot that goes on by steps of ``by`` m."""
+    """Return the way of a robot that goes on by steps of ``by`` m."""
     return Way(np.array(start) + np.arange(15)[:, None] * np.array(by), speed, RADIUS, outranks=False, under_way=True)
 
 

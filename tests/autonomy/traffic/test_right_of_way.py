@@ -30,7 +30,7 @@ EAST = np.stack([np.arange(0.0, 6.0, 0.05), np.zeros(120)], axis=1)  # 6 m along
 
 
 def north(x: float, start: float = -2.0, speed: float = 0.5) -> Way:
-    """A robot that crosses EAST at ``x``."""
+    """Return the way of a robot that crosses EAST at ``x``."""
     points = np.stack([np.full(21, x), start + 0.2 * np.arange(21)], axis=1)
     return Way(points, speed, RADIUS, outranks=True)
 

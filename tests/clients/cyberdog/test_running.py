@@ -20,7 +20,7 @@ def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def talking(streams: Iterator[tuple[Code, list[Said]]]) -> CyberDogClient:
-    """A client whose requests are answered by these streams, in this order."""
+    """Return a client whose requests are answered by these streams, in this order."""
     client = CyberDogClient("127.0.0.1", None, app_port=None)
 
     async def send(code: int, text: str) -> AsyncGenerator[tuple[int, str], None]:

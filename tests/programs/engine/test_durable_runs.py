@@ -119,7 +119,7 @@ async def texts(service: ProgramService) -> list[str]:
 
 
 async def whole_log(service: ProgramService) -> list[str]:
-    """The last words are written after the run has ended."""
+    """Return the log once it is complete: its last words are written after the end of the run."""
     async with asyncio.timeout(60):
         while (log := await texts(service))[-1] != "end True":  # noqa: ASYNC110
             await asyncio.sleep(0.005)

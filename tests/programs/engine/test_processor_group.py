@@ -11,7 +11,7 @@ from roboglot.programs.engine.processor_group import ProcessorGroup
 
 
 def machine(tmp_path: Path, membership: str, parent: str) -> tuple[Path, Path]:
-    """A root of control groups and a /proc with process 7, a child of 5."""
+    """Return a root of control groups and a /proc with process 7, a child of 5."""
     root, proc = tmp_path / "cgroup", tmp_path / "proc"
     (root / parent).mkdir(parents=True)
     (proc / "self").mkdir(parents=True)

@@ -52,7 +52,7 @@ Effect = Callable[[Seen], bool]
 
 
 def _figure(number: int) -> Effect:
-    """The motion was performed, and ended where the table of motions says."""
+    """Return the check that a motion was performed, and ended where the table of motions says."""
     motion = next(motion for _, known, motion in RESULT_MOTIONS if known == number)
     spec = MOTIONS[motion]
 

@@ -30,13 +30,13 @@ TROT = [("0110", 6), ("1111", 1), ("1001", 6), ("1111", 1)]
 
 
 def record(kind: str, **fields: object) -> Any:
-    """A new record of the language, whose constructor is made with its class."""
+    """Return a new record of the language, whose constructor is made with its class."""
     make: Callable[..., object] = RECORDS.class_of(kind)
     return make(**fields)
 
 
 def sequence(*paces: dict[str, Any], name: str = "hop", gaits: list[tuple[str, int]] = STANDING) -> Record:
-    """A sequence as the worker sends it; a gait lists standing feet in the order of FEET, and 30 ms units."""
+    """Return a sequence as the worker sends it; a gait lists standing feet in the order of FEET, and 30 ms units."""
     made = record("MotionSequence", name=name)
     for down, duration in gaits:
         fields = {foot: int(digit) for foot, digit in zip(FEET, down, strict=True)}

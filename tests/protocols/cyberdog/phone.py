@@ -72,12 +72,12 @@ class Client:
         return self._send(self._messages.SendRequest(nameCode=code, params=text))
 
     async def raw(self, code: int, params: object = None) -> list[tuple[int, str]]:
-        """All answers: (nameCode, data)."""
+        """Return all answers: (nameCode, data)."""
         async with asyncio.timeout(PATIENCE):
             return [(answer.nameCode, answer.data) async for answer in self.open(code, params)]
 
     async def ask(self, code: int, params: object = None) -> Any:
-        """The one answer, which carries the request's code."""
+        """Return the one answer, which carries the request's code."""
         ((name, data),) = await self.raw(code, params)
         assert name == code
         return json.loads(data) if data else data
@@ -165,7 +165,7 @@ async def until(condition: Callable[[], object], patience: float = PATIENCE) -> 
 
 
 async def answered(client: Client, code: int, params: Any, forward: Forward, seconds: float = 20.0) -> Any:
-    """The answer to a request that takes robot time."""
+    """Return the answer to a request that takes robot time."""
     asking = asyncio.ensure_future(client.ask(code, params))
     for _ in range(int(seconds / 0.1)):
         await settle()
@@ -225,7 +225,7 @@ async def state(client: Client) -> int:
 
 
 def examples(page: str) -> list[tuple[int, str, str]]:
-    """The documentation's example of every code: its number, params, and what is said of the answer."""
+    """Return the documentation's example of every code: its number, params, and what is said of the answer."""
     text = (DOCS / page).read_text(encoding="utf-8")
     return [(int(code), params or "{}", answer.strip()) for code, params, answer in EXAMPLE.findall(text)]
 

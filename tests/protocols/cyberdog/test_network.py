@@ -41,7 +41,7 @@ class Afar:
     ways: tuple[Proxy, Proxy]
 
     async def ask(self, code: int, params: object = None) -> Any:
-        """The answer, while robot time passes."""
+        """Return the answer; robot time passes meanwhile."""
         asking = asyncio.ensure_future(self.client.ask(code, params))
         await self.passing(asking.done)
         return asking.result()

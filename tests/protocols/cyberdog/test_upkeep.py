@@ -31,7 +31,7 @@ FILE = {"version": "1.3.2.0", "type": "FULL_PACKAGE", "md5": MD5, "fileSize": 10
 
 
 def module(**changes: object) -> dict[str, object]:
-    """An update as the app describes it; ``changes`` of its package."""
+    """Return an update as the app describes it; ``changes`` of its package."""
     package = {**FILE, **changes}
     return {
         "product": "l91",

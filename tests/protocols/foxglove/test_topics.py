@@ -33,7 +33,7 @@ def decoded(channel: dict[str, Any], data: bytes) -> Any:
 
 
 async def last(viewer: Viewer, topic: str, seconds: float = 3.0) -> Any:
-    """The next message of a topic, decoded."""
+    """Return the next message of a topic, decoded."""
     await viewer.topic(topic, seconds)
     number = await viewer.subscribe(topic)
     await viewer.until(lambda: viewer.data.get(number), seconds)

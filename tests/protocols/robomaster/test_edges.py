@@ -88,7 +88,7 @@ pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
 def key_of(text: str) -> str:
-    """The contract's."""
+    """Return the contract's key of a command."""
     words = [word for word in text.split() if not word.startswith("{")]
     return " ".join(words[:2]) + (" ?" if words[-1] == "?" and words[1] != "?" and len(words) > 2 else "")
 

@@ -55,7 +55,7 @@ async def test_gimbal_lead_turns_the_chassis(client, world, forward) -> None:
 
 
 async def answered(client, forward, text: str, seconds: float = 20.0) -> str:
-    """The answer to a command that takes robot time."""
+    """Return the answer to a command that takes robot time."""
     client.send(text)
     waiting = asyncio.ensure_future(client.reply())
     for _ in range(int(seconds / 0.25)):

@@ -59,7 +59,7 @@ class Inbox:
         self.port: int = self.socket.getsockname()[1]
 
     def drain(self) -> list[tuple[str, str]]:
-        """All datagrams so far: text and the address it came from."""
+        """Return all datagrams so far: text and the address it came from."""
         got = []
         while True:
             try:

@@ -35,7 +35,7 @@ PLATE = Description(
 
 
 async def serve(robot: Robot) -> AsyncIterator[SlamwareDoor]:
-    """An open door, closed afterwards."""
+    """Yield an open door, closed afterwards."""
     door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await door.start()
     yield door

@@ -13,6 +13,6 @@ ICE = {
 
 
 async def ok(reply: httpx.Response) -> httpx.Response:
-    """The answer, which must be a success."""
+    """Return the answer, which must be a success."""
     assert reply.status_code in (200, 204), reply.text
     return reply

@@ -85,7 +85,7 @@ class Generator:
     binaries: list[bytes] = field(default_factory=lambda: [b"", b"STCM", bytes(range(256)) * 40])
 
     def requests(self) -> Iterator[Request]:
-        """Every operation in turn, in another order each time."""
+        """Yield every operation in turn, in another order each time."""
         chance = random.Random(self.seed)
         operations = [
             (f"{method.upper()} {path}", operation)
@@ -261,7 +261,7 @@ class Generator:
 
 
 def number(chance: random.Random, schema: Schema, kind: str) -> int | float:
-    """One within the schema's bounds, often at their edges."""
+    """Return a number within the schema's bounds, often at their edges."""
     low, high = schema.get("minimum", schema.get("exclusiveMinimum", -1e6)), schema.get("maximum", 1e6)
     if kind == "integer":
         low, high = int(low), int(high)
@@ -291,7 +291,7 @@ def spoilt(chance: random.Random, value: Any) -> Any:
 
 
 def tell(request: Request, reply: httpx.Response, problem: str) -> str:
-    """A failure as one can repeat it."""
+    """Return the description of a failure, as one can repeat it."""
     asked = f"{request.method} {request.url} {request.params} {request.headers}\n  {(request.content or b'')[:400]!r}"
     answered = f"{reply.status_code} {reply.reason_phrase} {reply.headers.get('content-type')} {reply.content[:300]!r}"
     return f"{problem}\n  {asked}\n  -> {answered}"

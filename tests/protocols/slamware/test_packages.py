@@ -81,7 +81,7 @@ async def test_packages_are_bounded(client: httpx.AsyncClient, monkeypatch: pyte
 
 
 def firmware(version: str, **more: object) -> bytes:
-    """A package as the page of the protocol describes it."""
+    """Return a package as the page of the protocol describes it."""
     target = io.BytesIO()
     with zipfile.ZipFile(target, "w") as archive:
         archive.writestr("firmware.json", json.dumps({"version": version, **more}))

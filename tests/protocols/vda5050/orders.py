@@ -14,7 +14,7 @@ Spot = tuple[float, float]
 def order(
     id: str, spots: list[Spot], *, update: int = 0, first: int = 0, released: int | None = None, version: str = "3.0.0"
 ) -> dict[str, Any]:
-    """An order through ``spots``; ``first`` is the first node's number (0, 1, …), so many nodes are ``released``."""
+    """Return an order through ``spots``. ``first``: the first node's number; ``released``: number of released nodes."""
     until = len(spots) if released is None else released
     nodes = [
         {

@@ -22,13 +22,13 @@ MARKS = str(Path(__file__).parents[2] / "autonomy" / "worlds" / "marks.toml")
 
 
 def robot_at(x: float, y: float, body: str = "hermes") -> dict[str, object]:
-    """The one robot of a world with a shelf and a tag, looking east."""
+    """Return the one robot of a world with a shelf and a tag, looking east."""
     robot = {"name": "a", "body": body, "address": ADDRESS, "start": {"x": x, "y": y, "yaw": 0.0}}
     return {"world": MARKS, "robots": [robot]}
 
 
 def here(*actions: dict[str, object], id: str = "here") -> dict[str, object]:
-    """An order of nothing but actions where the robot stands."""
+    """Return an order of nothing but actions where the robot stands."""
     made = order(id, [(0, 0)])
     made["nodes"][0]["actions"] = list(actions)
     return made

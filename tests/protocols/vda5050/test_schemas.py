@@ -21,7 +21,7 @@ FOLDER = Path(__file__).with_name("schemas")
 
 @functools.cache
 def validators() -> tuple[Any, dict[str, Any]]:
-    """Those of 2.1 and of 3.0; made when they are used, since other workers of the suite only collect this file."""
+    """Return those of 2.1 and 3.0, made at their use: other workers of the suite only collect this file."""
     import jsonschema
     from vda5050.validation import SchemaValidator
 

@@ -29,7 +29,7 @@ class FrontEnd:
         door.subscribe(lambda text: self.frames.append(json.loads(text)))
 
     async def ask(self, operate: str, *targets: str, type: str = "task", **fields: Any) -> list[Frame]:
-        """The answers to one frame, as the contents of feedback or response."""
+        """Return the answers to one frame, as the contents of feedback or response."""
         id = f"f{next(self._ids)}"
         await self.door.receive(
             json.dumps({"type": type, "id": id, "operate": operate, "target_id": list(targets)} | fields)
@@ -49,7 +49,7 @@ class FrontEnd:
         await self.until(lambda: self.news(id, "start"))
 
     def news(self, id: str, operate: str) -> list[Frame]:
-        """The frames a task sent by itself."""
+        """Return the frames a task sent by itself."""
         return [
             frame
             for frame in self.frames

@@ -197,12 +197,12 @@ async def test_plain_http_is_refused(address: str) -> None:
 
 
 def encode(opcode: Opcode, data: bytes, *, fin: bool = True, masked: bool = True) -> bytes:
-    """A client's frame."""
+    """Return a client's frame."""
     return Frame(opcode, data, fin).serialize(mask=masked)
 
 
 async def opened(address: str, path: str = "/programs") -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    """A WebSocket whose bytes a test writes itself."""
+    """Return a WebSocket whose bytes a test writes itself."""
     host = address.removeprefix("ws://")
     reader, writer = await asyncio.open_connection(*host.split(":"))
     writer.write(UPGRADE.format(path=path, host=host, origin=f"http://{host}").encode())

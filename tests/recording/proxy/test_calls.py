@@ -32,7 +32,7 @@ def frame(kind: Http2Frame, flags: int, stream: int, payload: bytes) -> bytes:
 
 
 def data(stream: int, message: bytes, *, last: bool, packed: bool) -> bytes:
-    """A message in frames of at most 16 KiB, each with padding."""
+    """Return a message in frames of at most 16 KiB, each with padding."""
     body = gzip.compress(message) if packed else message
     whole = bytes((packed,)) + len(body).to_bytes(4) + body
     pieces = [whole[at : at + 16_000] for at in range(0, len(whole), 16_000)]
@@ -125,7 +125,7 @@ def test_nothing_but_known_errors_come_of_noise(noise: bytes) -> None:
 
 
 def app(folder: Path, *, proved: bool) -> ssl.SSLContext:
-    """An app's TLS, with or without its certificate."""
+    """Return an app's TLS, with or without its certificate."""
     ca, certificate, key = (folder / name for name in CLIENT_FILES)
     context = ssl.create_default_context(cafile=str(ca))
     if proved:

@@ -85,7 +85,7 @@ def test_packed_answer_is_noted_unpacked() -> None:
 
 
 def frames(agreed: str = "") -> tuple[FrameSniffer, Connection, Connection, Noted]:
-    """A connection after its handshake: the sniffer, both ends, and what is noted."""
+    """Return a connection after its handshake: the sniffer, both ends, and what is noted."""
     noted, ends = Noted(), list[Connection]()
     sniffer = FrameSniffer(noted)
     for kind in (ConnectionType.CLIENT, ConnectionType.SERVER):

@@ -34,7 +34,7 @@ def skin(dog) -> ElectronicSkin:
 
 
 def trunk(skin: ElectronicSkin) -> str:
-    """A letter for each third, from the front."""
+    """Return a letter for each third, from the front."""
     return "".join("L" if skin.shades[patch] is Shade.LIGHT else "d" for patch in TRUNK)
 
 

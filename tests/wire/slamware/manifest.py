@@ -29,7 +29,7 @@ def _pool(strings: list[str], *, wide: bool) -> bytes:
 
 
 def manifest(package: str, version: str = "", number: int = 7, *, wide: bool = False) -> bytes:
-    """A binary AndroidManifest.xml."""
+    """Return a binary AndroidManifest.xml."""
     strings = ["versionCode", "versionName", "package", "manifest", package, version]
     attributes = [(0, -1, 0x10, number), (2, 4, 3, 4)]
     if version:
@@ -43,7 +43,7 @@ def manifest(package: str, version: str = "", number: int = 7, *, wide: bool = F
 
 
 def archive(**files: bytes) -> bytes:
-    """A zip archive; double underscores in the names are dots."""
+    """Return a zip archive; double underscores in the names are dots."""
     target = io.BytesIO()
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as zipped:
         for name, data in files.items():

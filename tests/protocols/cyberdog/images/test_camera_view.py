@@ -30,7 +30,7 @@ def view() -> CameraView:
 
 
 def scan_of(place: Point) -> LaserScan:
-    """One return, at ``place`` (base_link), and nothing else."""
+    """Return a scan with one echo, at ``place`` (base_link), and nothing else."""
     angles = np.linspace(-math.pi, math.pi, 360, endpoint=False)
     ranges = np.full(360, np.inf, np.float32)
     bearing = math.atan2(place.y, place.x)

@@ -37,7 +37,7 @@ CASES = [(page, index) for page in PAGES for index in range(len(transcripts(page
 
 
 def alike(reported: str, got: str) -> bool:
-    """The same words, as many numbers, and those near each other: wheels slip, odometry drifts. ``…``: and so on."""
+    """True for the same words, and numbers near each other: wheels slip, odometry drifts. ``…``: and so on."""
     if reported.endswith(" …"):
         reported = reported.removesuffix(" …")
         got = " ".join(got.split()[: len(reported.split())])

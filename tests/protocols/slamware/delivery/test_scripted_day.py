@@ -54,18 +54,18 @@ class Day(Screen):
         self.happened: list[str] = []
 
     def at(self, x: float, y: float) -> Point:
-        """A place of the world on the map."""
+        """Return a place of the world on the map."""
         return Pose(x, y).relative_to(self.origin).point
 
     async def ask(self, method: str, path: str, body: object = None, *, content: bytes | None = None) -> httpx.Response:
-        """One request that must succeed."""
+        """Make a request that must succeed; return the response."""
         sent: Any = {"content": content} if body is None else {"json": body}
         reply = await self.client.request(method, path, **sent)
         assert reply.status_code in (200, 204), f"{method} {path}: {reply.status_code} {reply.text}"
         return reply
 
     async def do(self, name: str, within: float = 120.0, **options: object) -> Any:
-        """An action to its end; the state."""
+        """Carry out an action to its end; return its state."""
         body = {"action_name": f"slamtec.agent.actions.{name}", "options": options}
         number = (await self.ask("POST", ACTIONS, body)).json()["action_id"]
         for _ in range(int(within)):

@@ -47,7 +47,7 @@ async def finish(client: httpx.AsyncClient, forward: Forward, id: int, *, within
 
 
 def map_pose(world: World, start_pose: Pose) -> Pose:
-    """The robot's true pose in the map, whose origin is where it woke up."""
+    """Return the robot's true pose in the map, whose origin is where it woke up."""
     return world.truth.pose_of("a").relative_to(start_pose)
 
 

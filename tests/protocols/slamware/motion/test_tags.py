@@ -33,7 +33,7 @@ async def run(client: httpx.AsyncClient, forward: Forward, name: str, **options:
 
 
 def before(tag: Pose, away: float, aside: float, origin: Pose) -> dict[str, float]:
-    """The map pose ``away`` m before the tag, facing it."""
+    """Return the map pose ``away`` m before the tag, facing it."""
     pose = tag.compose(Pose(away, aside, math.pi)).relative_to(origin)
     return {"x": pose.x, "y": pose.y, "yaw": pose.yaw}
 
