@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from roboglot.cli import fleet
-from roboglot.shards import forking
+from roboglot.shards import nursery_client
 from roboglot.shards.plan import PLAN, plan_fleet, save
 from roboglot.shards.requests import Answer, RobotRow, Row
 from roboglot.shards.states import Shard, State
@@ -37,7 +37,7 @@ class Hopeless:
 
 @pytest.mark.parametrize("known", [False, True])
 def test_fleet_without_a_world_leaves_no_plan(known: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(forking, "launched", lambda **_: nullcontext(None))
+    monkeypatch.setattr(nursery_client, "launched", lambda **_: nullcontext(None))
     host, template, folder = Hopeless(tmp_path / "f"), tmp_path / "class.toml", tmp_path / "f"
     template.write_text(TEMPLATE)
     monkeypatch.setattr(fleet, "_fleet_host", lambda *_: host)

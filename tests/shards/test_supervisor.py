@@ -18,7 +18,7 @@ from roboglot.shards.states import Shard, State
 from roboglot.shards.supervisor import STARTING_MAX, Supervisor
 
 
-class Forks:
+class FakeNursery:
     """A nursery whose shards do what the test says."""
 
     def __init__(self, born: Callable[[int, int], None], dead: Callable[[int, int], None], _: object) -> None:
@@ -57,18 +57,18 @@ class Forks:
 
 @pytest.fixture
 async def supervisor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Supervisor]:
-    monkeypatch.setattr(module, "Forks", Forks)
+    monkeypatch.setattr(module, "NurseryClient", FakeNursery)
     made = Supervisor(plan_fleet(STARTING_MAX + 2, 1, {}, tmp_path), tmp_path, memory_max=100 << 20)
     starting = asyncio.create_task(made.start())
-    await made.shards.until(lambda: forks(made).forked != [])
+    await made.shards.until(lambda: nursery_of(made).forked != [])
     yield made
     starting.cancel()
     await made.close()
 
 
-def forks(supervisor: Supervisor) -> Forks:
-    made = supervisor._forks
-    assert isinstance(made, Forks)
+def nursery_of(supervisor: Supervisor) -> FakeNursery:
+    made = supervisor._nursery
+    assert isinstance(made, FakeNursery)
     return made
 
 
@@ -79,8 +79,8 @@ def first(supervisor: Supervisor) -> Shard:
 async def test_few_start_at_a_time_then_the_next(supervisor: Supervisor) -> None:
     states = [shard.state for shard in supervisor.shards.values()]
     assert states == [State.STARTING] * STARTING_MAX + [State.WAITING] * 2
-    forks(supervisor).say(1, Ready({}))
-    await supervisor.shards.until(lambda: len(forks(supervisor).forked) == STARTING_MAX + 1)
+    nursery_of(supervisor).say(1, Ready({}))
+    await supervisor.shards.until(lambda: len(nursery_of(supervisor).forked) == STARTING_MAX + 1)
     assert [shard.state for shard in supervisor.shards.values()].count(State.STARTING) == STARTING_MAX
 
 
@@ -88,18 +88,18 @@ async def test_dead_one_returns_at_growing_distances(
     supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(module, "PAUSES", (0.0, 3600.0))
-    forks(supervisor).die(1, -signal.SIGKILL)
-    await supervisor.shards.until(lambda: forks(supervisor).forked.count(1) == 2)
+    nursery_of(supervisor).die(1, -signal.SIGKILL)
+    await supervisor.shards.until(lambda: nursery_of(supervisor).forked.count(1) == 2)
     assert "shard w1 is down: killed by SIGKILL; it starts again at once" in caplog.text
-    forks(supervisor).die(1, 1)
+    nursery_of(supervisor).die(1, 1)
     assert first(supervisor).state is State.FAILED
     assert first(supervisor).again is not None, "it is tried again"
     assert first(supervisor).reason == "killed by SIGKILL"
 
 
 async def test_one_with_wrong_settings_is_not_retried(supervisor: Supervisor) -> None:
-    forks(supervisor).say(1, Refusal("there is no world 'moon'", lasting=True))
-    forks(supervisor).die(1, 1)
+    nursery_of(supervisor).say(1, Refusal("there is no world 'moon'", lasting=True))
+    nursery_of(supervisor).die(1, 1)
     shard = first(supervisor)
     assert (shard.state, shard.reason, shard.again) == (State.FAILED, "there is no world 'moon'", None)
     await supervisor.stop(shard)
@@ -108,41 +108,41 @@ async def test_one_with_wrong_settings_is_not_retried(supervisor: Supervisor) ->
 
 async def test_a_reason_of_all_is_logged_once(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:
     for number in (1, 2):
-        forks(supervisor).say(number, Refusal("there is no world 'moon'", lasting=True))
-        forks(supervisor).die(number, 1)
+        nursery_of(supervisor).say(number, Refusal("there is no world 'moon'", lasting=True))
+        nursery_of(supervisor).die(number, 1)
     assert [record.getMessage() for record in caplog.records] == ["shard w1 cannot start: there is no world 'moon'"]
 
 
 async def test_one_that_grows_too_large_is_restarted_orderly(supervisor: Supervisor) -> None:
     for number in range(2, STARTING_MAX + 1):
-        forks(supervisor).say(number, Ready({}))
-    forks(supervisor).say(1, Beat(1.0, 200 << 20, 1.0))
-    forks(supervisor).say(1, Ready({}))
+        nursery_of(supervisor).say(number, Ready({}))
+    nursery_of(supervisor).say(1, Beat(1.0, 200 << 20, 1.0))
+    nursery_of(supervisor).say(1, Ready({}))
     await supervisor.shards.until(
         lambda: [s.state for s in supervisor.shards.values()].count(State.READY) == STARTING_MAX
     )
     for number in (STARTING_MAX + 1, STARTING_MAX + 2):
-        await supervisor.shards.until(partial(lambda number: number in forks(supervisor).links, number))
-        forks(supervisor).say(number, Ready({}))
+        await supervisor.shards.until(partial(lambda number: number in nursery_of(supervisor).links, number))
+        nursery_of(supervisor).say(number, Ready({}))
     supervisor._look_after()
     supervisor._look_after()
-    assert forks(supervisor).ended == [(1, signal.SIGTERM)], "once"
-    forks(supervisor).die(1, 0)
-    await supervisor.shards.until(lambda: forks(supervisor).forked.count(1) == 2)
+    assert nursery_of(supervisor).ended == [(1, signal.SIGTERM)], "once"
+    nursery_of(supervisor).die(1, 0)
+    await supervisor.shards.until(lambda: nursery_of(supervisor).forked.count(1) == 2)
     assert "200 MB of 100" in first(supervisor).reason
 
 
 async def test_one_that_is_silent_is_killed(supervisor: Supervisor) -> None:
     first(supervisor).heard = first(supervisor).since = -1e9
     supervisor._look_after()
-    assert (1, signal.SIGKILL) in forks(supervisor).ended
+    assert (1, signal.SIGKILL) in nursery_of(supervisor).ended
 
 
 async def test_stopping_one_that_waits_needs_no_process(supervisor: Supervisor) -> None:
     last = list(supervisor.shards.values())[-1]
     await supervisor.stop(last)
     assert last.state is State.STOPPED
-    assert last.number not in forks(supervisor).forked
+    assert last.number not in nursery_of(supervisor).forked
 
 
 async def test_start_does_not_wait_for_a_stopped_shard(supervisor: Supervisor) -> None:

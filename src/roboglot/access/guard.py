@@ -18,8 +18,8 @@ from typing import NamedTuple
 from weakref import WeakValueDictionary
 
 from roboglot.access import audit
-from roboglot.access.book import LOCAL, Book, Rights
 from roboglot.access.callers import host_of, port_of
+from roboglot.access.identities import LOCAL, Identities, Rights
 from roboglot.access.proofs import Proofs
 from roboglot.access.rights import NOTHING
 from roboglot.access.store import AccessStore, Grant, IdentityKind, Snapshot, open_store
@@ -87,18 +87,18 @@ class Guard:
         self.requests = Limiter(config.requests, config.requests, time.monotonic)
         self.tunnels: dict[str, Tunnelled] = {}  # by the loopback address that stands for each client
         self._list = self._store.snapshot()
-        self._book = Book(self._list.identities)
-        self._proofs = Proofs(self._book, config.logins)
+        self._identities = Identities(self._list.identities)
+        self._proofs = Proofs(self._identities, config.logins)
         self.bytes = Limiter(config.bytes, config.bytes * BURST_SECONDS, time.monotonic)
         self._handshakes = Limiter(HANDSHAKES, 2 * HANDSHAKES, time.monotonic)
         self._handshakes_together = Limiter(HANDSHAKES_TOGETHER, HANDSHAKES_TOGETHER, time.monotonic)
         self._ended, self._wanted = threading.Event(), threading.Event()
         self._looks = list[asyncio.Future[None]]()  # clients that wait for the list
         self._thread: threading.Thread | None = None
-        self._next_end = self._book.next_end(now())
+        self._next_end = self._identities.next_end(now())
         self._admissions = [RobotAdmission(self, name, robot) for name, robot in robots.items()]
         for admission in self._admissions:
-            admission.renew(self._book)
+            admission.renew(self._identities)
 
     def start(self) -> None:
         """Follow the list and the clock, on the running loop."""
@@ -127,12 +127,12 @@ class Guard:
         if newer.version < self._list.version:
             return
         self._list = newer
-        older, self._book = self._book, Book(newer.identities)
-        self._next_end = self._book.next_end(self.now())
-        replaced = self._book.replaced(older)
-        self._proofs.renew(self._book, replaced)
+        older, self._identities = self._identities, Identities(newer.identities)
+        self._next_end = self._identities.next_end(self.now())
+        replaced = self._identities.replaced(older)
+        self._proofs.renew(self._identities, replaced)
         for admission in self._admissions:
-            admission.renew(self._book, replaced)
+            admission.renew(self._identities, replaced)
 
     def cached_identity(self, address: str, proof: Proof) -> str | None:
         """See ``Admission.cached_identity``."""
@@ -141,13 +141,13 @@ class Guard:
         host = host_of(address)
         if (tunnelled := self.tunnels.get(host)) is not None and port_of(address) in tunnelled.calls:
             return tunnelled.who
-        if self._book.has(host, IdentityKind.ADDRESS):
+        if self._identities.has(host, IdentityKind.ADDRESS):
             return host
         return LOCAL if self.config.local and is_loopback(host) else None
 
     def may(self, who: str, robot: str, right: Right) -> bool:
         """Return whether ``who`` has the right on the robot."""
-        return right in self._book.rights(robot, self.now(), local=self.config.local).get(who, NOTHING)
+        return right in self._identities.rights(robot, self.now(), local=self.config.local).get(who, NOTHING)
 
     async def admit(self, address: str, proof: Proof) -> str:
         """See ``Admission.admit``."""
@@ -178,7 +178,7 @@ class Guard:
 
     async def shut_out(self, name: str) -> None:
         """See ``Admission.shut_out``."""
-        if self._book.has(name, IdentityKind.GUEST):
+        if self._identities.has(name, IdentityKind.GUEST):
             await asyncio.to_thread(self._store.revoke, name)
             self._adopt(await asyncio.to_thread(self._store.snapshot))
 
@@ -321,11 +321,11 @@ class RobotAdmission(Admission):
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener) if listener in self._listeners else None
 
-    def renew(self, book: Book, replaced: Set[str] = frozenset()) -> None:
+    def renew(self, identities: Identities, replaced: Set[str] = frozenset()) -> None:
         """Replace the rights; clients that lost some, or use an old proof, are stopped and disconnected."""
         before = self._rights
         self._allowed.clear()
-        self._rights = book.rights(self._name, self._guard.now(), local=self._guard.config.local)
+        self._rights = identities.rights(self._name, self._guard.now(), local=self._guard.config.local)
         for who, rights in before.items():
             lost = rights - self._rights.get(who, NOTHING)
             if lost or (who in replaced and rights):

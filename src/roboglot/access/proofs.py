@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import time
 
-from roboglot.access.book import Book
 from roboglot.access.callers import basic_of
+from roboglot.access.identities import Identities
 from roboglot.access.secrets import password_fits, token_hash
 from roboglot.access.store import IdentityKind
 from roboglot.model.admission import LockedOut, Proof, ProofKind, Unknown
@@ -22,8 +22,8 @@ HTTP = ProofKind.HTTP  # the class look-up of a member is slower than everything
 class Proofs:
     """``logins``: failures allowed to one address per minute."""
 
-    def __init__(self, book: Book, logins: int) -> None:
-        self._book = book
+    def __init__(self, identities: Identities, logins: int) -> None:
+        self._identities = identities
         self._owners: dict[str, str] = {}  # by the header that carries the proof
         self._tries = Limiter(logins / TRIES_SECONDS, logins, time.monotonic)
         often = TRIES_OF_ONE_NAME * logins
@@ -31,9 +31,9 @@ class Proofs:
         self._checking = asyncio.Semaphore(1)
         self._waiting = 0
 
-    def renew(self, book: Book, replaced: set[str]) -> None:
-        """Use the identities of ``book`` from now on; forget cached proofs of those in ``replaced``."""
-        self._book = book
+    def renew(self, identities: Identities, replaced: set[str]) -> None:
+        """Use these identities from now on; forget cached proofs of those in ``replaced``."""
+        self._identities = identities
         self._owners = {proof: who for proof, who in self._owners.items() if who not in replaced}
 
     def known(self, proof: Proof) -> str | None:
@@ -58,7 +58,7 @@ class Proofs:
     def _certified(self, proof: Proof) -> str | None:
         """Return the owner of the certificate, which TLS has verified."""
         certificate = proof.kind is ProofKind.CERTIFICATE
-        return proof.value if certificate and self._book.has(proof.value, IdentityKind.APP) else None
+        return proof.value if certificate and self._identities.has(proof.value, IdentityKind.APP) else None
 
     def _by_token(self, proof: Proof) -> str | None:
         """Return the owner of the certificate or token. They cannot be guessed, so earlier failures do not count."""
@@ -66,9 +66,9 @@ class Proofs:
             return self._certified(proof)
         scheme, _, rest = proof.value.partition(" ")
         if scheme.lower() == "bearer":
-            return self._book.by_token(token_hash(rest.strip()))
+            return self._identities.by_token(token_hash(rest.strip()))
         name, secret = basic_of(proof.value)
-        return name if secret and self._book.by_token(token_hash(secret)) == name else None
+        return name if secret and self._identities.by_token(token_hash(secret)) == name else None
 
     async def _by_password(self, proof: Proof, host: str) -> str | None:
         """Return the owner of this password; a wrong one counts against the host and the name. Raises LockedOut."""
@@ -91,8 +91,8 @@ class Proofs:
         self._waiting += 1
         try:
             async with self._checking:
-                kept = self._book.password_of(name)
+                kept = self._identities.password_of(name)
                 fits = await asyncio.to_thread(password_fits, password, kept)
-                return fits and kept == self._book.password_of(name)  # the password may have been replaced meanwhile
+                return fits and kept == self._identities.password_of(name)  # it may have been replaced meanwhile
         finally:
             self._waiting -= 1

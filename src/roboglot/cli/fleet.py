@@ -26,7 +26,7 @@ from roboglot.hosting.escaping import visible
 
 if TYPE_CHECKING:
     from roboglot.shards.fleet_host import FleetHost
-    from roboglot.shards.forking import Nursery
+    from roboglot.shards.nursery_client import StartedNursery
     from roboglot.shards.plan import FleetPlan
     from roboglot.shards.requests import Answer, Row, Verb
 
@@ -66,7 +66,7 @@ def up(
     data: Data = None,
 ) -> None:
     """Start a fleet and keep it up until Ctrl-C; its robots' data stays in its folder."""
-    from roboglot.shards.forking import NotWarm, launched
+    from roboglot.shards.nursery_client import NotWarm, launched
     from roboglot.shards.warm_up import FOREIGN
 
     if not on:
@@ -271,7 +271,7 @@ class _Where(NamedTuple):
     on: str
     detached: bool
     memory_max: int  # bytes
-    nursery: Nursery | None
+    nursery: StartedNursery | None
 
 
 def _joined(plan: FleetPlan, on: str) -> AbstractContextManager[None]:

@@ -97,8 +97,9 @@ class ShardActor:
             self._receive()
             lines = [self._lines.kept.popleft() for _ in range(len(self._lines.kept))]
             serving, up = self._serving.is_alive(), self._ready is not None
-            told = (None if known == self._run else self._ready, self._beat, self._refusal)
-            return msgspec.json.encode(Condition(os.getpid(), self._node, self._run, serving, up, *told, lines))
+            ready = None if known == self._run else self._ready
+            state = Condition(os.getpid(), self._node, self._run, serving, up, ready, self._beat, self._refusal, lines)
+            return msgspec.json.encode(state)
 
     def stop(self) -> bytes:
         """Close robots and doors in order."""

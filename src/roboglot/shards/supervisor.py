@@ -12,8 +12,8 @@ from pathlib import Path
 import msgspec
 
 from roboglot.hosting.folder_lock import lock_folder
-from roboglot.shards.forking import Forks, NotWarm, Nursery
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
+from roboglot.shards.nursery_client import NotWarm, NurseryClient, StartedNursery
 from roboglot.shards.plan import FleetPlan, save
 from roboglot.shards.shard import SETTINGS
 from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
@@ -34,14 +34,16 @@ class Supervisor:
     ``start`` returns when every shard is ready or has failed; ``close`` ends them.
     """
 
-    def __init__(self, plan: FleetPlan, folder: Path, *, memory_max: int = 0, nursery: Nursery | None = None) -> None:
+    def __init__(
+        self, plan: FleetPlan, folder: Path, *, memory_max: int = 0, nursery: StartedNursery | None = None
+    ) -> None:
         """``memory_max``: bytes per shard; 0: unlimited. Raises FolderInUse if another program uses the folder."""
         self._memory_max = memory_max
         self.plan, self.folder = plan, folder
         self._lock = lock_folder(folder)
         self.shards = Shards(plan, folder)
         self._by_number = {shard.number: shard for shard in self.shards.values()}
-        self._forks = Forks(self._born, self._dead, nursery)
+        self._nursery = NurseryClient(self._born, self._dead, nursery)
         self._turn: asyncio.Task[None] | None = None
         self._watch: asyncio.TimerHandle | None = None
         self._loop = asyncio.get_running_loop()
@@ -51,7 +53,7 @@ class Supervisor:
     @property
     def nursery(self) -> int:
         """Process id of the nursery."""
-        return self._forks.pid
+        return self._nursery.pid
 
     @property
     def stores_here(self) -> bool:
@@ -61,8 +63,8 @@ class Supervisor:
     async def start(self) -> float:
         """Start all shards, in turn; return the nursery's warm-up time, s. Raises NotWarm."""
         save(self.plan, self.folder)
-        self._forks.open()
-        seconds = await self._forks.warm()
+        self._nursery.open()
+        seconds = await self._nursery.warm()
         for shard in self.shards.values():
             self._enqueue(shard)
         self._turn = self._loop.create_task(self._start_in_turn(), name="starts of shards")
@@ -76,7 +78,7 @@ class Supervisor:
         for handle in (self._watch, self._turn, *(shard.again for shard in self.shards.values())):
             if handle is not None:
                 handle.cancel()
-        await self._forks.close()
+        await self._nursery.close()
         for shard in self.shards.values():
             self._unlink(shard)
         os.close(self._lock)
@@ -89,7 +91,7 @@ class Supervisor:
             self._turn_to(shard, State.STOPPED)
         elif shard.state is not State.STOPPED:
             self._turn_to(shard, State.STOPPING)
-            self._forks.end(shard.number, signal.SIGTERM)
+            self._nursery.end(shard.number, signal.SIGTERM)
             await self.shards.until(lambda: shard.state is State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
@@ -118,7 +120,7 @@ class Supervisor:
         """Wait for the nursery, even through restarts, without a limit."""
         while True:
             try:
-                await self._forks.warm()
+                await self._nursery.warm()
                 return
             except NotWarm as error:
                 log.error("cannot start shards: %s", error)
@@ -129,7 +131,7 @@ class Supervisor:
             (shard.folder / SETTINGS).write_bytes(msgspec.json.encode(shard.plan.settings))
             output = _open_log(shard.folder / LOG_FILE)
             try:
-                shard.link = self._forks.fork(shard.number, shard.folder, output)
+                shard.link = self._nursery.fork(shard.number, shard.folder, output)
             finally:
                 os.close(output)
         except OSError as error:
@@ -211,7 +213,7 @@ class Supervisor:
             if limit is not None and silent > limit:
                 log.error("shard %s has been silent for %.0f s while %s: killed", shard.plan.name, silent, shard.state)
                 shard.reason = shard.reason or f"it hung while {shard.state}"
-                self._forks.end(shard.number, signal.SIGKILL)
+                self._nursery.end(shard.number, signal.SIGKILL)
             elif shard.state is State.READY:
                 self._judge(shard)
         self._watch = self._loop.call_later(1.0, self._look_after)
@@ -225,7 +227,7 @@ class Supervisor:
         if self._memory_max and shard.beat.memory > self._memory_max:
             shard.reason = f"it had grown to {shard.beat.memory >> 20} MB of {self._memory_max >> 20}"
             shard.beat = Beat(0.0, 0, 0.0)  # each heartbeat is judged once
-            self._forks.end(shard.number, signal.SIGTERM)
+            self._nursery.end(shard.number, signal.SIGTERM)
 
     def _turn_to(self, shard: Shard, state: State) -> None:
         self.shards.turn_to(shard, state)

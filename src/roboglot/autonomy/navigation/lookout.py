@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from roboglot.autonomy.navigation.course import Course
 from roboglot.autonomy.navigation.follower import PERIOD, Follower
 from roboglot.autonomy.navigation.low_sight import LowSight
-from roboglot.autonomy.navigation.narrow import NarrowWatch
+from roboglot.autonomy.navigation.narrow_passage import NarrowPassage
 from roboglot.autonomy.navigation.route import SPACING
 from roboglot.model.actions import Action
 from roboglot.model.errors import Blocked
@@ -32,7 +32,7 @@ class Lookout:
         self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
         self._tuning, self._planner, self._action = course.tuning, planner, action
         self._traffic = course.traffic
-        self._narrow, self._low = NarrowWatch(planner.radius), LowSight(course.robot)
+        self._narrow, self._low = NarrowPassage(planner.radius), LowSight(course.robot)
         self._scan_at = -math.inf
         self.follower: Follower | None = None
         self.blocked, self.blocked_at = False, -math.inf

@@ -18,7 +18,7 @@ import grpc
 from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
 from roboglot.model.clock import Clock
 from roboglot.model.tap import LOST, Line
-from roboglot.transport.wakes import prompt_wakes
+from roboglot.transport.grpc_wakeups import prompt_wakeups
 from roboglot.values import dataclass
 from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, SERVICE, client_options
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
@@ -131,7 +131,7 @@ class DogLink:
         options = [*client_options(ROBOT_NAME), ("grpc.max_reconnect_backoff_ms", REDIAL_MAX)]
         where, proof = f"{name}:{self._port}", self._certificates
         self.heartbeat, self.serial = None, None  # one from before the link was lost may be another robot's
-        with prompt_wakes():
+        with prompt_wakeups():
             if proof:
                 credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
                 self._channel = grpc.aio.secure_channel(where, credentials, options=options)

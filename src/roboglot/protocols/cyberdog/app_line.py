@@ -9,7 +9,7 @@ from collections.abc import Callable, Coroutine
 import grpc
 
 from roboglot.protocols.cyberdog.frame_queue import Delivery
-from roboglot.transport.wakes import prompt_wakes
+from roboglot.transport.grpc_wakeups import prompt_wakeups
 from roboglot.wire.cyberdog.channel import APP_NAME, SERVICE, client_options
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 
@@ -47,7 +47,7 @@ class AppLine:
 
     def _connect(self) -> _Calls:
         options = client_options(APP_NAME)
-        with prompt_wakes():
+        with prompt_wakeups():
             if self._credentials is None:
                 self._channel = grpc.aio.insecure_channel(self._target, options=options)
             else:

@@ -20,8 +20,8 @@ from roboglot.protocols.cyberdog.chapters.system.bracelet import Bracelet
 from roboglot.protocols.cyberdog.chapters.system.update_jobs import UpdateJobs
 from roboglot.protocols.cyberdog.chapters.system.updates import Updates
 from roboglot.protocols.cyberdog.frame_queue import FrameQueue
-from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
+from roboglot.protocols.cyberdog.recorded_pushes import PlayedPushes
 from roboglot.values import dataclass
 from roboglot.wire.visual.relay import FrameRelay
 

@@ -41,13 +41,13 @@ from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.context import Context
 from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.pem_files import FOLDER
-from roboglot.protocols.cyberdog.played import PlayedPushes
 from roboglot.protocols.cyberdog.profile import Profile
+from roboglot.protocols.cyberdog.recorded_pushes import PlayedPushes
 from roboglot.protocols.cyberdog.requests import add_calls
 from roboglot.protocols.cyberdog.service import CALLS_MAX, Service
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.door import Endpoint
-from roboglot.transport.wakes import prompt_wakes
+from roboglot.transport.grpc_wakeups import prompt_wakeups
 from roboglot.wire.cyberdog.channel import ROBOT_NAME, server_options
 from roboglot.wire.cyberdog.codes import MachineState
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -87,7 +87,7 @@ class CyberDogDoor:
         """Bind and listen, and dial the app if its address is configured."""
         certificates = None if self._config.plaintext else CertificateStore(self._certificates)
         self._context = self._assemble(certificates)
-        with prompt_wakes():
+        with prompt_wakeups():
             self._server = server = grpc.aio.server(options=server_options(), maximum_concurrent_rpcs=CALLS_MAX)
         self._handshakes = Handshakes(self._address, self._config.port)
         self._cleanup.append(self._handshakes.close)

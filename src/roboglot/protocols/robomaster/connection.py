@@ -19,6 +19,7 @@ from roboglot.model.lateness import late
 from roboglot.protocols.robomaster.answers import Answer, Repeated
 from roboglot.protocols.robomaster.context import Context, act_as
 from roboglot.protocols.robomaster.dispatch import DOOR, answer, at_once
+from roboglot.protocols.robomaster.foreign_protocols import Greeting, turn_away_strangers
 from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life
 from roboglot.protocols.robomaster.limits import (
     BATCH_MAX,
@@ -32,7 +33,6 @@ from roboglot.protocols.robomaster.limits import (
 )
 from roboglot.protocols.robomaster.liveness import DrivingClient
 from roboglot.protocols.robomaster.stops import stops
-from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 from roboglot.transport.eager import begin
 from roboglot.wire.robomaster.lines import END, LineSplitter
 

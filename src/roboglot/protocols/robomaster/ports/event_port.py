@@ -9,9 +9,9 @@ import asyncio
 import logging
 from typing import cast
 
+from roboglot.protocols.robomaster.foreign_protocols import Greeting, turn_away_strangers
 from roboglot.protocols.robomaster.keepalive import probe_for_life
 from roboglot.protocols.robomaster.limits import EVENT_BACKLOG_MAX, EVENT_CONNECTIONS_MAX
-from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 
 log = logging.getLogger(__name__)
 

@@ -14,9 +14,9 @@ from roboglot.media.audio import AudioStream
 from roboglot.media.video import VideoStream
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.foreign_protocols import Greeting, turn_away_strangers
 from roboglot.protocols.robomaster.keepalive import probe_for_life
 from roboglot.protocols.robomaster.limits import MEDIA_BACKLOG_MAX, MEDIA_CONNECTIONS_MAX
-from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 
 log = logging.getLogger(__name__)
 

@@ -15,8 +15,8 @@ from roboglot.model.components.interaction.input_device import InputDevice, Mous
 from roboglot.model.errors import InvalidGoal, RobotError
 from roboglot.model.inputs.outside import Input
 from roboglot.model.robot import Robot
+from roboglot.protocols.robomaster.foreign_protocols import Greeting, turn_away_strangers
 from roboglot.protocols.robomaster.limits import PILOT_LINE_MAX, PILOTS_MAX
-from roboglot.protocols.robomaster.strangers import Greeting, turn_away_strangers
 
 Act = Callable[[InputDevice, Sequence[str]], None]
 PILOT = "pilot"  # the kind of these inputs in a recording

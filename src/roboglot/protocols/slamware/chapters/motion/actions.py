@@ -23,7 +23,7 @@ from roboglot.model.components.system.link import require_current
 from roboglot.model.errors import InvalidGoal, RobotError, Unreachable
 from roboglot.model.geometry import Point
 from roboglot.operations import Right
-from roboglot.protocols.slamware.chapters.motion import homing, jacking, moves, relocalizing, rides, tags
+from roboglot.protocols.slamware.chapters.motion import homing, jacking, lift_rides, moves, relocalizing, tags
 from roboglot.protocols.slamware.chapters.motion.errands import part_of
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import BAD_REQUESTS, HttpError
@@ -70,10 +70,10 @@ FACTORIES: dict[str, Factory] = {
     ),
     "ManualRelocalizationAction": Factory(wire.NoOptions, relocalizing.manual_relocalization, (Localization,)),
     "ReturnToParkingAction": Factory(wire.ReturnToParkingOptions, homing.return_to_parking, (Navigation,)),
-    "MultiFloorMoveAction": Factory(wire.MultiFloorMoveOptions, rides.multi_floor_move, (Navigation,)),
-    "MultiFloorBackHomeAction": Factory(wire.GoHomeOptions, rides.multi_floor_back_home, (Docking, Navigation)),
-    "EnterElevatorAction": Factory(wire.EnterElevatorOptions, rides.enter_elevator, (Navigation, Driving)),
-    "LeaveElevatorAction": Factory(wire.LeaveElevatorOptions, rides.leave_elevator, (Navigation,)),
+    "MultiFloorMoveAction": Factory(wire.MultiFloorMoveOptions, lift_rides.multi_floor_move, (Navigation,)),
+    "MultiFloorBackHomeAction": Factory(wire.GoHomeOptions, lift_rides.multi_floor_back_home, (Docking, Navigation)),
+    "EnterElevatorAction": Factory(wire.EnterElevatorOptions, lift_rides.enter_elevator, (Navigation, Driving)),
+    "LeaveElevatorAction": Factory(wire.LeaveElevatorOptions, lift_rides.leave_elevator, (Navigation,)),
     "MoveToTagAction": Factory(wire.MoveToTagOptions, tags.move_to_tag, (TagDocking,)),
     "SchedulableMoveToTagAction": Factory(wire.ScheduledMoveToTagOptions, tags.scheduled_move_to_tag, (TagDocking,)),
     "BackOffFromTagAction": Factory(wire.BackOffFromTagOptions, tags.back_off_from_tag, (TagDocking,)),

@@ -6,7 +6,7 @@ from roboglot.model.actions import Action
 from roboglot.model.components.mapping.storeys import StoreyPlace
 from roboglot.model.errors import InvalidGoal
 from roboglot.protocols.slamware.chapters.motion.errands import Errand, run_errand
-from roboglot.protocols.slamware.chapters.motion.rides import change_floor, home_floor
+from roboglot.protocols.slamware.chapters.motion.lift_rides import change_floor, home_floor
 from roboglot.protocols.slamware.chapters.slam.composite import FloorName
 from roboglot.protocols.slamware.context import Context
 

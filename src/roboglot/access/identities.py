@@ -13,7 +13,7 @@ LOCAL = "local"  # the identity of local programs where no credentials are neede
 Rights = dict[str, frozenset[Right]]  # by identity
 
 
-class Book:
+class Identities:
     """All identities at one instant."""
 
     def __init__(self, identities: Iterable[Identity]) -> None:
@@ -51,7 +51,7 @@ class Book:
         ends = [grant.until for identity in self._identities.values() for grant in identity.grants]
         return min((end for end in ends if end is not None and end > now), default=float("inf"))
 
-    def replaced(self, older: Book) -> set[str]:
+    def replaced(self, older: Identities) -> set[str]:
         """Return identities that are gone or have another password or token than in ``older``; their proofs end."""
         return {
             name

@@ -1,4 +1,4 @@
-"""Fast reading of gRPC's wake-ups in the event loop. Knows no calls.
+"""Faster reading of gRPC's wake-ups in the event loop, by a patch of gRPC's reader. Knows no calls.
 
 A thread of gRPC writes one byte into a socket for each event. gRPC's reader in the loop takes all events, but reads
 only one byte. With many calls, a busy loop falls behind until the socket is full and the thread blocks: then there is
@@ -23,7 +23,7 @@ _reading = threading.Lock()  # the loops of all threads read one socket
 
 
 @contextmanager
-def prompt_wakes() -> Iterator[None]:
+def prompt_wakeups() -> Iterator[None]:
     """Patch the reader of gRPC's socket; create a loop's first server or channel of ``grpc.aio`` inside."""
     loop = asyncio.get_running_loop()
     add_reader = loop.add_reader

@@ -12,7 +12,7 @@ ROOM = 0.3  # m on either side of the hull that count as little room
 WIDE_AFTER = 5  # scans without walls before the next corridor is a new one
 
 
-class NarrowWatch:
+class NarrowPassage:
     """Detector that reports each corridor once. A doorway is too short for a corridor."""
 
     def __init__(self, radius: float) -> None:

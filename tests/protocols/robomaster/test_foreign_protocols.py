@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.model.components.interaction.input_device import InputDevice
-from roboglot.protocols.robomaster.strangers import Greeting, StrangerError
+from roboglot.protocols.robomaster.foreign_protocols import Greeting, StrangerError
 from roboglot.protocols.robomaster.table import TABLE
 from tests.protocols.robomaster.text_client import ADDRESS, port_of
 

@@ -28,7 +28,7 @@ class NotWarm(RuntimeError):
     """The nursery did not come up."""
 
 
-class Nursery(NamedTuple):
+class StartedNursery(NamedTuple):
     """A nursery that was started, and our end of its control socket."""
 
     process: subprocess.Popen[bytes]
@@ -40,7 +40,7 @@ class Nursery(NamedTuple):
             self.process.kill()
 
 
-def launch() -> Nursery:
+def launch() -> StartedNursery:
     """Start a nursery; it loads in the background. Raises OSError."""
     ours, theirs = pair()
     with theirs:
@@ -50,11 +50,11 @@ def launch() -> Nursery:
             env=os.environ | ENVIRONMENT,
             stdin=subprocess.DEVNULL,
         )
-    return Nursery(process, ours)
+    return StartedNursery(process, ours)
 
 
 @contextlib.contextmanager
-def launched(*, wanted: bool) -> Iterator[Nursery | None]:
+def launched(*, wanted: bool) -> Iterator[StartedNursery | None]:
     """Start a nursery if ``wanted``; it ends with the context, used or not. Raises OSError."""
     nursery = launch() if wanted else None
     try:
@@ -64,14 +64,14 @@ def launched(*, wanted: bool) -> Iterator[Nursery | None]:
             nursery.abandon()
 
 
-class Forks:
+class NurseryClient:
     """The nursery of a supervisor. ``born`` and ``dead`` are called with a shard's number and its pid or status.
 
     ``nursery``: one that is loading already, to use first.
     """
 
     def __init__(
-        self, born: Callable[[int, int], None], dead: Callable[[int, int], None], nursery: Nursery | None = None
+        self, born: Callable[[int, int], None], dead: Callable[[int, int], None], nursery: StartedNursery | None = None
     ) -> None:
         self._born, self._dead, self._launched = born, dead, nursery
         self._control: socket.socket | None = None

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from roboglot.autonomy.navigation.narrow import WIDE_AFTER, NarrowWatch
+from roboglot.autonomy.navigation.narrow_passage import WIDE_AFTER, NarrowPassage
 
 
 def walls(left, right, length=2.0):
@@ -11,7 +11,7 @@ def walls(left, right, length=2.0):
 
 
 def test_each_corridor_is_reported_once():
-    watch = NarrowWatch(0.2)
+    watch = NarrowPassage(0.2)
     assert watch.entered(walls(2.0, 2.0)) is None
     assert abs(watch.entered(walls(0.5, 0.4)) - 0.9) < 1e-6
     assert watch.entered(walls(0.4, 0.4)) is None
@@ -24,7 +24,7 @@ def test_each_corridor_is_reported_once():
 
 
 def test_a_doorway_and_one_wall_are_none():
-    watch = NarrowWatch(0.2)
+    watch = NarrowPassage(0.2)
     assert watch.entered(walls(0.4, 0.4, length=0.2)) is None
     assert watch.entered(walls(0.3, 9.0)) is None
     assert watch.entered(np.zeros((0, 2))) is None

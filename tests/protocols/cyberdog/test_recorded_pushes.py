@@ -7,7 +7,7 @@ from typing import cast
 
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols.cyberdog.app_link import AppLink
-from roboglot.protocols.cyberdog.played import PlayedPushes
+from roboglot.protocols.cyberdog.recorded_pushes import PlayedPushes
 from roboglot.recording.playback import Playback
 from roboglot.wire.cyberdog.chapters.system import AGAIN, HEARTBEAT, Beats, ticks_of
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb

@@ -12,8 +12,8 @@ import grpc
 import pytest
 
 from roboglot.testing.addresses import free_addresses
-from roboglot.transport import wakes
-from roboglot.transport.wakes import prompt_wakes
+from roboglot.transport import grpc_wakeups
+from roboglot.transport.grpc_wakeups import prompt_wakeups
 
 ADDRESS = free_addresses(1)
 PATIENCE = 60.0  # real s
@@ -43,7 +43,7 @@ async def test_all_bytes_are_read_in_one_turn() -> None:
         woken.set()
 
     with reads, writes:
-        with prompt_wakes():
+        with prompt_wakeups():
             loop.add_reader(reads, wake)
         writes.send(bytes(200))
         await woken.wait()
@@ -54,15 +54,15 @@ async def test_all_bytes_are_read_in_one_turn() -> None:
 
 
 async def test_server_made_within_wakes_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    loop, takes, count = asyncio.get_running_loop(), list[socket.socket](), wakes._count
+    loop, takes, count = asyncio.get_running_loop(), list[socket.socket](), grpc_wakeups._count
     own = loop.add_reader
 
     def noted(reads: socket.socket) -> int:
         takes.append(reads)
         return count(reads)
 
-    monkeypatch.setattr(wakes, "_count", noted)
-    with prompt_wakes():
+    monkeypatch.setattr(grpc_wakeups, "_count", noted)
+    with prompt_wakeups():
         server = grpc.aio.server()
     assert loop.add_reader == own
     port = server.add_insecure_port(f"{ADDRESS}:0")
@@ -79,7 +79,7 @@ def test_loops_of_two_threads_take_turns() -> None:
     turns = list[str]()
 
     def wake() -> None:
-        other = threading.Thread(target=wakes._taker(reads, lambda: turns.append("other")))
+        other = threading.Thread(target=grpc_wakeups._taker(reads, lambda: turns.append("other")))
         other.start()
         other.join()
         turns.append("own")
@@ -88,11 +88,11 @@ def test_loops_of_two_threads_take_turns() -> None:
     with reads, writes:
         reads.setblocking(False)
         writes.send(bytes(5))
-        wakes._taker(reads, wake)()
+        grpc_wakeups._taker(reads, wake)()
         assert turns == ["own"]
         assert held(reads) == 0
         writes.send(bytes(1))
-        wakes._taker(reads, lambda: read_one(reads))()
+        grpc_wakeups._taker(reads, lambda: read_one(reads))()
         assert held(reads) == 0
 
 
@@ -100,11 +100,11 @@ def test_bytes_left_are_read_within_a_few_turns() -> None:
     reads, writes = socket.socketpair()
     with reads, writes:
         reads.setblocking(False)
-        take = wakes._taker(reads, lambda: read_one(reads))
-        for _ in range(3 * wakes.LOOKED_FOR):
+        take = grpc_wakeups._taker(reads, lambda: read_one(reads))
+        for _ in range(3 * grpc_wakeups.LOOKED_FOR):
             writes.send(bytes(5))
             take()
-        assert held(reads) < 5 * wakes.LOOKED_FOR
+        assert held(reads) < 5 * grpc_wakeups.LOOKED_FOR
         reads.recv(1000)
         take()  # another loop has read all: no error, and no event to take
 
@@ -126,12 +126,12 @@ def test_events_behind_a_closed_loops_are_taken() -> None:
     with reads, writes:
         reads.setblocking(False)
         writes.send(bytes(len(events)))
-        take = wakes._taker(reads, wake)
+        take = grpc_wakeups._taker(reads, wake)
         while held(reads):
             take()
         assert taken == ["own", "own"]
         with pytest.raises(RuntimeError, match="of ours"):
-            wakes._taker(reads, lambda: _fail("of ours"))()
+            grpc_wakeups._taker(reads, lambda: _fail("of ours"))()
 
 
 def _fail(words: str) -> None:
@@ -158,7 +158,7 @@ def test_calls_of_a_closed_loop_disturb_no_other(caplog: pytest.LogCaptureFixtur
 
 
 async def _begin_call(where: str) -> Any:
-    with prompt_wakes():
+    with prompt_wakeups():
         channel = grpc.aio.insecure_channel(where, options=(("grpc.use_local_subchannel_pool", 1),))
     call = channel.unary_unary("/nothing/there")(b"")
     await asyncio.sleep(0)  # it begins
