@@ -101,6 +101,14 @@ def test_the_page_is_small_enough() -> None:
     assert sum(len(asset.packed) for asset in sent.values()) < 60 * 1024
 
 
+def test_pages_leave_the_tab_key_s_start_alone() -> None:
+    """Chromium 150 continues with the Tab key behind what a page scrolled into view."""
+    own = [path for path in FOLDER.rglob("*.js") if "vendor" not in path.parts]
+    assert own
+    for path in own:
+        assert not re.search(r"(?<!EditorView)\.scrollIntoView\(", path.read_text("utf-8")), path
+
+
 def test_studio_asks_for_all_its_modules_at_once() -> None:
     text = (FOLDER / "studio" / "index.html").read_text("utf-8")
     asked = set(re.findall(r'rel="modulepreload" href="/([^"]+)"', text))

@@ -85,7 +85,10 @@ export function Failure() {
 
 export function Output() {
   const end = useRef(null);
-  useEffect(() => { end.current?.scrollIntoView({ block: "nearest" }); }, [printed.value.length]);
+  useEffect(() => {
+    const box = end.current?.parentElement;
+    if (box) box.scrollTop = box.scrollHeight;
+  }, [printed.value.length]);
   return html`<${Failure} />
     <ol class="printed" aria-label=${t("studio.tab.output")} aria-live="polite">${printed.value.length ? printed.value.map((e) => html`<li key=${e.key} class=${e.level}>${e.text || " "}</li>`) : html`<li class="muted">${t("studio.output.none")}</li>`}</ol><span ref=${end}></span>`;
 }
