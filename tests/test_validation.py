@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import msgspec
 import pytest
 
-from roboglot.validation import CHOICES_MAX, PYTHON, read_answer, why_invalid
+from roboglot.access.tunnel import gateway
+from roboglot.access.tunnel.connector import Connector, Refused
+from roboglot.access.tunnel.frames import BadFrame, FrameKind, TunnelFrame
+from roboglot.access.tunnel.link import TunnelLink
+from roboglot.agents import console as agent
+from roboglot.validation import CHOICES_MAX, PYTHON, decode_json, read_answer, why_invalid
+from roboglot.wire.slamware.chapters.artifact import MetadataError, control_points
 
 
 class Side(StrEnum):
@@ -161,3 +168,46 @@ def test_a_number_in_an_answer_is_finite(word: str) -> None:
 def test_numbers_in_answers_may_be_text() -> None:
     assert read_answer(b'{"cornerX": "1.5", "y": "2"}', Corner) == Corner(1.5, 2)
     assert read_answer(b'["nan"]', list[str]) == ["nan"]
+
+
+class Named(msgspec.Struct):
+    name: str = ""
+
+
+STRANGE = {
+    "deep": b'{"x":' + 20_000 * b"[",
+    "closed": b'{"x":' + 20_000 * b"[" + 20_000 * b"]" + b"}",
+    "no text": b'"\xff"',
+}
+
+
+@pytest.mark.parametrize("kind", STRANGE)
+@pytest.mark.parametrize(
+    ("read", "error"),
+    [
+        (lambda data: decode_json(data, Named), msgspec.DecodeError),
+        (lambda data: read_answer(data, Named), msgspec.DecodeError),
+        (gateway._hello, BadFrame),
+        (lambda data: agent._decoded(data, Named), agent.Refused),
+        (lambda data: control_points({"control_point1": data.decode("latin-1")}), MetadataError),
+    ],
+)
+def test_strange_json_raises_one_error(kind: str, read: Callable[[bytes], object], error: type[Exception]) -> None:
+    """Python's RecursionError is no error of msgspec's: a stranger's greeting ended in a traceback."""
+    with pytest.raises(error):
+        read(STRANGE[kind])
+
+
+@pytest.mark.parametrize("greeting", [STRANGE["deep"], b"{}", b'{"tcp": [70000], "callbacks": [], "broadcasts": []}'])
+async def test_strange_greetings_of_gateways_are_refused(greeting: bytes) -> None:
+    class Link:
+        def send(self, *_frame: object) -> None:
+            pass
+
+        async def first(self) -> TunnelFrame:
+            return TunnelFrame(FrameKind.WELCOME, 0, greeting)
+
+    connector = object.__new__(Connector)
+    connector._robot = connector._token = ""
+    with pytest.raises(Refused, match="greeting"):
+        await connector._greet(cast(TunnelLink, Link()))

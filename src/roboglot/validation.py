@@ -162,6 +162,17 @@ def _in_words(value: str, kinds: Mapping[str, str]) -> str:
     return value.removesuffix(".0").replace("\\\\", "\\")  # a pattern comes as Python writes it
 
 
+def decode_json(data: bytes | str, kind: type[T]) -> T:
+    """Return a stranger's JSON as a value. Raises msgspec.DecodeError, also if it is nested too deeply or no text."""
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except (RecursionError, UnicodeError) as error:
+        raise msgspec.DecodeError(why_invalid(error)) from None
+
+
 def read_answer(body: bytes, kind: type[T]) -> T:
     """Return an answer in JSON as a value; numbers may be text there, but are finite. Raises msgspec's errors."""
-    return msgspec.json.decode(body, type=kind, strict=_NO_NUMBER.search(body) is not None)
+    try:
+        return msgspec.json.decode(body, type=kind, strict=_NO_NUMBER.search(body) is not None)
+    except (RecursionError, UnicodeError) as error:
+        raise msgspec.DecodeError(why_invalid(error)) from None

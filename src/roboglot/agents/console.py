@@ -11,6 +11,8 @@ from urllib.request import Request, urlopen
 
 import msgspec
 
+from roboglot.validation import decode_json
+
 ANSWER_MAX = 16 << 20  # bytes
 SECONDS = 20.0  # per answer
 
@@ -64,13 +66,13 @@ class ConsoleClient:
 
 def _decoded(data: bytes, kind: type[T]) -> T:
     try:
-        return msgspec.json.decode(data, type=kind)
+        return decode_json(data, kind)
     except msgspec.MsgspecError as error:
         raise Refused(f"the console's answer has the wrong form: {error}") from None
 
 
 def _reason(error: HTTPError) -> str:
     try:
-        return str(msgspec.json.decode(error.read(ANSWER_MAX))["error"])
+        return str(decode_json(error.read(ANSWER_MAX), dict)["error"])
     except (msgspec.MsgspecError, KeyError, TypeError):
         return f"{error.code} {error.reason}"

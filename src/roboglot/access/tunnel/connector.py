@@ -13,7 +13,9 @@ import ssl
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import NotRequired, Protocol, TypedDict, cast
+from typing import Annotated, Protocol, cast
+
+from msgspec import DecodeError, Meta, Struct
 
 from roboglot.access.tunnel.busy_poll import BusyPoll
 from roboglot.access.tunnel.frames import FrameKind
@@ -21,6 +23,7 @@ from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.tunnel import Tunnel
 from roboglot.transport.listening import listen
 from roboglot.transport.tls import TlsCall
+from roboglot.validation import decode_json, why_invalid
 
 log = logging.getLogger(__name__)
 
@@ -31,13 +34,16 @@ BROADCAST = "127.255.255.255"
 ROBOT_IP = b"robot ip "
 
 
-class Welcome(TypedDict):
+Ports = Annotated[list[Annotated[int, Meta(ge=1, le=65535)]], Meta(max_length=64)]
+
+
+class Welcome(Struct):
     """Answer of the gateway to a greeting: its ports, and the key of a second connection."""
 
-    tcp: list[int]
-    callbacks: list[int]
-    broadcasts: list[int]
-    beats: NotRequired[str]
+    tcp: Ports
+    callbacks: Ports
+    broadcasts: Ports
+    beats: str = ""
 
 
 class NotTrusted(ConnectionError):
@@ -155,13 +161,17 @@ class Connector:
             frame = await link.first()
         if frame.kind is not FrameKind.WELCOME:
             raise Refused(frame.payload.decode("utf-8", "replace"))
-        words: Welcome = json.loads(frame.payload)
-        return words
+        try:
+            return decode_json(frame.payload, Welcome)
+        except DecodeError as error:
+            raise Refused(
+                f"the gateway's greeting is none of roboglot's: {why_invalid(error, wanted=Welcome)}"
+            ) from None
 
     async def _carry(self, link: TunnelLink, words: Welcome, ready: Callable[[list[int]], None]) -> None:
         loop = asyncio.get_running_loop()
-        broadcasts = {int(port) for port in words["broadcasts"]}
-        callbacks = {int(port) for port in words["callbacks"]}
+        broadcasts = set(words.broadcasts)
+        callbacks = set(words.callbacks)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.setblocking(False)
             sender.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
@@ -183,10 +193,10 @@ class Connector:
 
             tunnel = Tunnel(link, first=1, opened=call_back, datagram=pass_on, quiet=quiet)
             async with contextlib.AsyncExitStack() as stack:
-                for port in words["tcp"]:
-                    server = await listen(tunnel.accept(int(port)), self._address, int(port))
+                for port in words.tcp:
+                    server = await listen(tunnel.accept(port), self._address, port)
                     stack.callback(server.close)
-                ready([int(port) for port in words["tcp"]])
-                beside = asyncio.ensure_future(self._beat_beside(tunnel, str(words.get("beats", ""))))
+                ready(words.tcp)
+                beside = asyncio.ensure_future(self._beat_beside(tunnel, words.beats))
                 stack.callback(beside.cancel)
                 await tunnel.run()

@@ -38,6 +38,7 @@ from roboglot.transport.log_limiter import LogLimiter
 from roboglot.transport.metered import Metered
 from roboglot.transport.pipe import join
 from roboglot.transport.tls import Tls, TlsPort, server_context
+from roboglot.validation import decode_json
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -272,7 +273,7 @@ def _first(chain: str) -> str:
 def _hello(payload: bytes) -> Hello:
     """Read a greeting. Raises BadFrame."""
     try:
-        return msgspec.json.decode(payload, type=Hello)
+        return decode_json(payload, Hello)
     except msgspec.MsgspecError:
         raise BadFrame("this is not a client of roboglot") from None
 

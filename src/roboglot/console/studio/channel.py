@@ -35,6 +35,7 @@ from roboglot.programs.language import Problem
 from roboglot.programs.stores import LogEntry
 from roboglot.programs.tasks.reports import Insight, Reading
 from roboglot.transport.limiter import Limiter
+from roboglot.validation import decode_json
 from roboglot.wire.visual.requests import BODY_MAX, FRAME_MAX, ID_MAX
 
 log = logging.getLogger(__name__)
@@ -99,8 +100,8 @@ class _Named(msgspec.Struct):
 def _id_of(text: str) -> str:
     """Return the id of a frame; "" if it has no readable one."""
     try:
-        return msgspec.json.decode(text, type=_Named).id
-    except (msgspec.MsgspecError, ValueError):  # frames may have line breaks in their texts, which JSON has not
+        return decode_json(text, _Named).id
+    except msgspec.MsgspecError:  # frames may have line breaks in their texts, which JSON has not
         found = re.search(r'"id"\s*:\s*"([^"\\]*)"', text)
         return found[1] if found else ""
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import msgspec
 
-from roboglot.validation import why_invalid
+from roboglot.validation import decode_json, why_invalid
 from roboglot.wire.slamware.geometry import COORDINATE_MAX, Point, Pose2D, Pose3D
 
 ID_MAX = 64
@@ -135,8 +135,8 @@ def control_points(metadata: dict[str, str]) -> tuple[Point, Point] | None:
     if texts == [None, None]:
         return None
     try:
-        first, second = (msgspec.json.decode((text or "").replace("'", '"'), type=Point) for text in texts)
-    except (msgspec.DecodeError, UnicodeEncodeError) as error:
+        first, second = (decode_json((text or "").replace("'", '"'), Point) for text in texts)
+    except msgspec.DecodeError as error:
         raise MetadataError(f"control_point1 and control_point2: {why_invalid(error)}") from None
     return first, second
 
