@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import io
+import socket
 from pathlib import Path
+from typing import NoReturn
 
 import httpx
 import numpy as np
@@ -34,7 +36,7 @@ from roboglot.storage.members import StoredMembers
 from roboglot.storage.opening import open_database
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.places import StoredPlaces
-from roboglot.storage.postgresql import in_one_line
+from roboglot.storage.postgresql import PostgreSQL, in_one_line
 from roboglot.storage.programs import DatabaseProgramStore
 from roboglot.storage.settings import StoredSettings
 from roboglot.storage.transactions import Connection, DatabaseError, DiskFull, Transactions
@@ -195,6 +197,27 @@ async def test_a_full_disk_is_only_read(database: Transactions) -> None:
 def test_an_error_of_the_server_is_one_line() -> None:
     error = psycopg.OperationalError("connection failed: Connection refused\n\tIs the server running?")
     assert in_one_line(error) == "connection failed: Connection refused Is the server running?"
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "postgresql://bob:S3cret@[bad/x",
+        "postgresql://bob:p@S3cret@localhost:1/x",
+        "postgresql://bob:50%zzS3cret@localhost:1/x",
+        "postgresql://localhost:1/x?password=%zzS3cret",
+    ],
+)
+def test_errors_of_bad_urls_show_no_password(monkeypatch: pytest.MonkeyPatch, url: str) -> None:
+    """libpq repeats a URL that it cannot read, and a part of a password with an @ as the host's name."""
+
+    def resolve(*_: object, **__: object) -> NoReturn:
+        raise OSError("it resolves nothing")
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
+    with pytest.raises(OSError, match=r"URI|resolve|percent") as raised:
+        PostgreSQL(url)
+    assert "S3cret" not in str(raised.value)
 
 
 @needs_postgresql

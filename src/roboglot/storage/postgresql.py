@@ -32,6 +32,7 @@ CONNECTIONS_MAX = 4
 CONNECT_MAX, STATEMENT_MAX, IDLE_MAX = 5, 10, 10  # s for connecting, for a statement, for an idle transaction
 CLAIM_MAX = 6000  # ms; the server notices within five seconds that a machine is gone
 CLAIM_LOCKS = 0x626F74  # the class of the locks by which a program claims its robots
+PIECE_MIN = 3  # characters of a password that an error may not show
 ESCAPE = "\ue000"  # of Unicode's private use
 MIGRATION_LOCK = 0x726F626F  # the program that opens an empty database first creates the tables; others wait
 
@@ -173,9 +174,13 @@ class PostgreSQL:
             # frees its robots: by then another node may have started their shard.
             " -c tcp_keepalives_idle=2 -c tcp_keepalives_interval=1 -c tcp_keepalives_count=3 -c tcp_user_timeout=5s"
         )
-        connection = psycopg.connect(
-            self._url, autocommit=True, connect_timeout=CONNECT_MAX, options=limits, application_name="roboglot"
-        )
+        try:
+            connection = psycopg.connect(
+                self._url, autocommit=True, connect_timeout=CONNECT_MAX, options=limits, application_name="roboglot"
+            )
+        except psycopg.Error as error:
+            error.args = (without_password(str(error), self._url),)
+            raise
         with self._opening:
             self._opened[:] = [*(opened for opened in self._opened if not opened.closed), connection]
         return connection
@@ -247,6 +252,18 @@ def _restored(row: Sequence[object]) -> tuple[object, ...]:
         else value
         for value in row
     )
+
+
+def without_password(text: str, url: str) -> str:
+    """Return an error of a database without what may be the URL's password, of which a malformed URL shows parts."""
+    shown = url.partition("://")[2].rpartition("@")[0].partition(":")[2]
+    secrets = [shown, *re.findall(r"password=([^&\s]+)", url)]
+    pieces = {
+        piece for secret in secrets for piece in (secret, *re.split(r"[^\w-]", secret)) if len(piece) >= PIECE_MIN
+    }
+    for piece in (url, *sorted(pieces, key=len, reverse=True)):
+        text = text.replace(piece, "…")
+    return text
 
 
 def in_one_line(error: Exception) -> str:
