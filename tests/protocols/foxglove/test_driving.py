@@ -190,6 +190,15 @@ async def test_parameters_that_cannot_be_are_refused(scene: Scene) -> None:
         await viewer.say("setParameters", parameters=[{"name": name, "value": value}])
     await viewer.settled()
     assert len(viewer.complaints) == 4
+    assert "there is no parameter 'no.such'" in viewer.complaints[0]
+
+
+async def test_parameters_are_set_without_being_followed(scene: Scene) -> None:
+    viewer = await scene.connect()
+    await viewer.say("setParameters", parameters=[{"name": "speaker.volume", "value": 0.5}])
+    await viewer.settled()
+    assert viewer.complaints == []
+    assert scene.robot[Speaker].volume == 0.5
 
 
 async def test_pages_of_other_hosts_stay_outside(scene: Scene) -> None:

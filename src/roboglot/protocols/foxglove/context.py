@@ -131,8 +131,7 @@ class Context:
         if self._dropped and now - self._warned_at >= DROPS_PERIOD:
             self._warned_at, dropped, self._dropped = now, self._dropped, 0
             self.status(Level.WARNING, f"{dropped} messages were dropped: this client reads too slowly")
-        if self.watched:
-            self.report_parameters()
+        self.report_parameters()
 
     def played(self, state: Playback) -> None:
         """Report a new state of the playback, which the older subprotocol cannot express."""
@@ -141,6 +140,8 @@ class Context:
 
     def report_parameters(self) -> None:
         """Send changed parameters that the client follows."""
+        if not self.watched:  # without names, all would be found
+            return
         found = parameters(self.robot, list(self.watched))
         changed = [row for row in found if self.watched[row["name"]] != row["value"]]
         if changed:
