@@ -115,7 +115,7 @@ def test_matching_finds_the_pose_finer_than_the_cells(off: tuple[float, float, f
     points = points_of(ranges_in_room(truth, 0.01, np.random.default_rng(7)))
     prior = np.array(truth) + off
     weak = np.diag([0.2**2, 0.2**2, 0.1**2])
-    pose, covariance, strain, fit, known = match(
+    pose, covariance, strain, fit, known, *_ = match(
         room.slots, room.surfaces, room.evidence, points, prior, prior, weak, np.zeros(2), RESOLUTION, 10
     )
     assert math.hypot(pose[0] - truth[0], pose[1] - truth[1]) < 0.005
@@ -129,7 +129,7 @@ def test_a_trusted_prior_stays_where_nothing_is_seen() -> None:
     empty, slots, surfaces = np.zeros((50, 50), np.int16), np.zeros((50, 50), np.int32), np.zeros((1, 5), np.float32)
     prior = np.array([1.0, 1.0, 0.3])
     points = np.ones((10, 2)) * 0.4
-    pose, covariance, strain, fit, known = match(
+    pose, covariance, strain, fit, known, *_ = match(
         slots, surfaces, empty, points, prior, prior, np.eye(3), np.zeros(2), RESOLUTION, 10
     )
     assert pose == pytest.approx(prior)

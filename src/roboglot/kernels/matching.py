@@ -1,7 +1,9 @@
 """Scan matching by Gauss-Newton: laser points against the surfaces of an occupancy grid, around an odometry prior.
 
 Each point is moved onto a line fitted to the mean hits of the cells around it (moving least squares), so the result is
-finer than the cells. Surfaces seen from their other side are ignored: thin walls have two faces.
+finer than the cells. Surfaces seen from their other side are ignored: thin walls have two faces. The match takes the
+directions of surfaces for exact; along a bare corridor, what they seem to show is their noise alone. What it really
+shows, and what it makes of an error, is returned beside its covariance.
 """
 
 from __future__ import annotations
@@ -21,6 +23,9 @@ INLIER = 0.08  # m
 CELLS = 25  # around a point, including its own
 MOVED = 0.0002  # m of motion after which a point's surface is looked up again: no more than the match's tolerance
 CORRELATION = 0.1  # share of the points' information that is used, since they are not independent
+THIN, THIN_WEIGHT = 0.04**2, 10.0  # m2, of a surface that shows where along a wall it is: a pole; its weight, at least
+VAGUE = 0.6  # share of other surfaces' information, without direction, that may be about their place along a wall
+FEIGNED = 1.5  # times the information that wrong directions feign: as much is none
 
 
 @kernel("int64(int32[:,::1], float32[:,::1], int16[:,::1], int64, int64, float64, float64[:,:,::1], int64)")
@@ -55,11 +60,14 @@ def _surfaces(
     return count
 
 
-@kernel("UniTuple(float64, 5)(float64[:,:,::1], int64, int64, float64, float64, float64, float64)")
+@kernel("UniTuple(float64, 6)(float64[:,:,::1], int64, int64, float64, float64, float64, float64)")
 def _line(
     around: FloatArray, i: int, count: int, x: float, y: float, beam_x: float, beam_y: float
-) -> tuple[float, float, float, float, float]:
-    """Return the surface around (x, y) as ``surface_near`` has it, from the ``count`` rows of ``around[i]``."""
+) -> tuple[float, float, float, float, float, float]:
+    """Return the surface around (x, y) as ``surface_near`` has it, from the ``count`` rows of ``around[i]``.
+
+    The last value is the variance of its direction (rad2), or, of an unclear one, its extent (m2).
+    """
     total = mean_x = mean_y = xx = xy = yy = 0.0
     place = around[np.uintp(i)]
     for k in range(count):
@@ -80,17 +88,18 @@ def _line(
         xy += weight * dx * dy
         yy += weight * dy * dy
     if total < 1e-3:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     share = 1.0 / total
     mean_x, mean_y = mean_x * share, mean_y * share
     xx, xy, yy = xx * share - mean_x * mean_x, xy * share - mean_x * mean_y, yy * share - mean_y * mean_y
     half, root = (xx + yy) / 2.0, np.sqrt(((xx - yy) / 2.0) ** 2 + xy * xy)
     long, short = half + root, half - root
     if long < 0.015 * 0.015 or short > 0.25 * long:
-        return x + mean_x, y + mean_y, 0.0, 0.0, total
+        return x + mean_x, y + mean_y, 0.0, 0.0, total, long
     cosine = (xx - yy) / (2.0 * root)  # of twice the angle of the surface
     along, aside = np.sqrt(max(0.0, (1.0 + cosine) / 2.0)), np.sqrt(max(0.0, (1.0 - cosine) / 2.0))
-    return x + mean_x, y + mean_y, (aside if xy < 0.0 else -aside), along, total
+    vague = max(0.0, short) / long * share  # of a line through as many points
+    return x + mean_x, y + mean_y, (aside if xy < 0.0 else -aside), along, total, vague
 
 
 @kernel("UniTuple(float64, 5)(int32[:,::1], float32[:,::1], int16[:,::1], float64, float64, float64, float64, float64)")
@@ -107,7 +116,9 @@ def surface_near(
     """Return the surface around (x, y) as seen along the beam: mean x and y, normal x and y (0, 0: unclear), weight."""
     around = np.empty((1, CELLS, 5))
     row, col = int(np.floor(y / resolution)), int(np.floor(x / resolution))
-    return _line(around, 0, _surfaces(slots, surfaces, evidence, row, col, resolution, around, 0), x, y, beam_x, beam_y)
+    count = _surfaces(slots, surfaces, evidence, row, col, resolution, around, 0)
+    mean_x, mean_y, nx, ny, weight, _ = _line(around, 0, count, x, y, beam_x, beam_y)
+    return mean_x, mean_y, nx, ny, weight
 
 
 @kernel()
@@ -141,7 +152,7 @@ def _linearise(
 ) -> tuple[int, int]:
     """Fill the normal equations at ``pose``; returns how many points fit a surface, how many lie in known cells.
 
-    ``reach`` (m): beyond it a point loses its influence. ``lines`` (n, 7): where each point was when its surface was
+    ``reach`` (m): beyond it a point loses its influence. ``lines`` (n, 8): where each point was when its surface was
     looked up, and what was found; it is looked up again when the point has moved. ``places`` (n, 3): the cell then, and
     how many surfaces ``around`` (n, CELLS, 5) it there are.
     """
@@ -167,7 +178,7 @@ def _linearise(
                 places[i, 2] = _surfaces(slots, surfaces, evidence, row, col, resolution, around, i)
             found = _line(around, i, places[i, 2], x, y, beam_x / away, beam_y / away)
             lines[i, 0], lines[i, 1] = x, y
-            lines[i, 2], lines[i, 3], lines[i, 4], lines[i, 5], lines[i, 6] = found
+            lines[i, 2], lines[i, 3], lines[i, 4], lines[i, 5], lines[i, 6], lines[i, 7] = found
         mean_x, mean_y, nx, ny, weight = lines[i, 2], lines[i, 3], lines[i, 4], lines[i, 5], lines[i, 6]
         if weight == 0.0:
             if evidence[row, col] != 0:
@@ -218,7 +229,7 @@ def gaps(
         px, py = x + cos * points[i, 0] - sin * points[i, 1], y + sin * points[i, 0] + cos * points[i, 1]
         row, col = int(np.floor(py / resolution)), int(np.floor(px / resolution))
         count = _surfaces(slots, surfaces, evidence, row, col, resolution, around, 0)
-        mean_x, mean_y, nx, ny, weight = _line(around, 0, count, px, py, beam_x / away, beam_y / away)
+        mean_x, mean_y, nx, ny, weight, _ = _line(around, 0, count, px, py, beam_x / away, beam_y / away)
         found[i, 1] = weight
         if weight == 0.0:
             found[i, 0] = np.inf
@@ -227,6 +238,89 @@ def gaps(
         else:
             found[i, 0] = abs(nx * (px - mean_x) + ny * (py - mean_y))
     return found
+
+
+@kernel()
+def _feigned(points: FloatArray, pose: FloatArray, lines: FloatArray) -> tuple[float, float, float, float]:
+    """Return the information about x and y (xx, xy, yy) that wrong directions of the ``lines`` found at ``pose`` feign.
+
+    The last value is the information of thin things, which show their place whatever the direction.
+    """
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    xx = xy = yy = things = 0.0
+    for i in range(points.shape[0]):
+        x, y = pose[0] + cos * points[i, 0] - sin * points[i, 1], pose[1] + sin * points[i, 0] + cos * points[i, 1]
+        nx, ny, weight, vague = lines[i, 4], lines[i, 5], lines[i, 6], lines[i, 7]
+        dx, dy = x - lines[i, 2], y - lines[i, 3]
+        if weight == 0.0 or lines[i, 0] == np.inf:
+            continue
+        if nx == 0.0 and ny == 0.0:
+            robust = CORRELATION / (SIGMA_LOOSE * SIGMA_LOOSE) / (1.0 + (dx * dx + dy * dy) / (ROBUST * ROBUST)) ** 2
+            if vague < THIN and weight >= THIN_WEIGHT:
+                things += robust
+            else:
+                xx, yy = xx + VAGUE * robust, yy + VAGUE * robust
+        else:
+            gap = (nx * dx + ny * dy) ** 2
+            robust = vague * CORRELATION / (SIGMA * SIGMA) / (1.0 + gap / (ROBUST * ROBUST)) ** 2
+            xx, xy, yy = xx + robust * ny * ny, xy - robust * nx * ny, yy + robust * nx * nx
+    return xx, xy, yy, things
+
+
+@kernel()
+def _discount(system: FloatArray, feigned: tuple[float, float, float, float], true: FloatArray) -> None:
+    """``true`` (3, 3) = the normal equations' matrix without what wrong directions feign about the position.
+
+    Only in the worst direction, whatever the yaw: in the others it is little. ``feigned``: as ``_feigned`` has it.
+    """
+    index = 0
+    for i in range(3):
+        for j in range(i, 3):
+            true[i, j] = true[j, i] = system[index]
+            index += 1
+    turn = system[5]
+    if turn <= 0.0:
+        return
+    lever_x, lever_y = system[2] / turn, system[4] / turn
+    aa, ab, bb = system[0] - system[2] * lever_x, system[1] - system[2] * lever_y, system[3] - system[4] * lever_y
+    half, root = (aa + bb) / 2.0, np.sqrt(((aa - bb) / 2.0) ** 2 + ab * ab)
+    if root <= 0.0:
+        return
+    cosine = (aa - bb) / (2.0 * root)  # of twice the angle of the best direction
+    along, aside = np.sqrt(max(0.0, (1.0 + cosine) / 2.0)), np.sqrt(max(0.0, (1.0 - cosine) / 2.0))
+    vx, vy = (aside if ab < 0.0 else -aside), along
+    xx, xy, yy, things = feigned
+    less = min(max(0.0, half - root - things), FEIGNED * (xx * vx * vx + 2.0 * xy * vx * vy + yy * vy * vy))
+    true[0, 0] -= less * vx * vx
+    true[0, 1] -= less * vx * vy
+    true[1, 0] = true[0, 1]
+    true[1, 1] -= less * vy * vy
+
+
+@kernel()
+def _considered(
+    points: FloatArray, pose: FloatArray, lines: FloatArray, system: FloatArray, normal: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return how much of an error before a match stays (3, 3), and the covariance (3, 3) of what the match adds to it.
+
+    ``lines``: the surfaces of the ``points`` at ``pose``; ``system``: the normal equations' upper triangle; ``normal``:
+    the covariance that the match claims. It makes an error e to e - normal (true e + noise): ``true`` information only
+    pulls it back, while the noise is that of all points.
+    """
+    true, stays, noise, added = np.empty((3, 3)), np.eye(3), np.empty((3, 3)), np.zeros((3, 3))
+    _discount(system, _feigned(points, pose, lines), true)
+    index = 0
+    for i in range(3):
+        for j in range(i, 3):
+            noise[i, j] = noise[j, i] = system[index]
+            index += 1
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                stays[i, j] -= normal[i, k] * true[k, j]
+                for m in range(3):
+                    added[i, j] += normal[i, k] * noise[k, m] * normal[j, m]
+    return stays, added
 
 
 @kernel("void(float64[:,::1], float64[::1], float64[:,::1])")
@@ -242,7 +336,7 @@ def _covariance(information: FloatArray, system: FloatArray, result: FloatArray)
 
 
 @kernel(
-    "Tuple((float64[::1], float64[:,::1], float64, int64, int64))"
+    "Tuple((float64[::1], float64[:,::1], float64, int64, int64, float64[:,::1], float64[:,::1]))"
     "(int32[:,::1], float32[:,::1], int16[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1],"
     " float64[::1], float64, int64)",
 )
@@ -257,15 +351,15 @@ def match(
     sensor: FloatArray,
     resolution: float,
     iterations: int,
-) -> tuple[FloatArray, FloatArray, float, int, int]:
+) -> tuple[FloatArray, FloatArray, float, int, int, FloatArray, FloatArray]:
     """Return the pose (x, y from the grid's corner, yaw) at which ``points`` (n, 2; base_link, m) fit the grid best.
 
     Begins at ``start``; ``covariance`` (3, 3) is the prior's; ``sensor`` the lidar's x, y in base_link. Returns the
-    pose, its covariance, the squared distance from the prior in the prior's standard deviations, the points that fit
-    and those where something is known.
+    pose, its covariance, the squared distance from the prior in the prior's standard deviations, the points that fit,
+    those where something is known, and two matrices as ``_considered`` has them.
     """
     pose, step, right, system = np.empty(3), np.empty(3), np.empty(3), np.empty(9)
-    information, normal, lines = np.empty((3, 3)), np.empty((3, 3)), np.empty((points.shape[0], 7))
+    information, normal, lines = np.empty((3, 3)), np.empty((3, 3)), np.empty((points.shape[0], 8))
     places, around = np.empty((points.shape[0], 3), np.int64), np.empty((points.shape[0], CELLS, 5))
     for i in range(points.shape[0]):
         lines[i, 0], places[i, 0] = np.inf, -1
@@ -300,4 +394,5 @@ def match(
         for j in range(3):
             strain += (pose[i] - prior[i]) * information[i, j] * (pose[j] - prior[j])
     _covariance(information, system, normal)
-    return pose, normal, strain, fit, known
+    stays, added = _considered(points, pose, lines, system, normal)
+    return pose, normal, strain, fit, known, stays, added

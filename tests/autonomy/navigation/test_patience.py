@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -21,7 +22,7 @@ from roboglot.model.geometry import Point, Pose
 
 def made(clock: LockstepClock, **belief: Any) -> Patience:
     believed: Any = SimpleNamespace(
-        **{"localizing": True, "lost": None, "quality": 1.0, "compared_at": -math.inf, **belief}
+        **{"localizing": True, "lost": None, "quality": 1.0, "sigma": 0.003, "compared_at": -math.inf, **belief}
     )
     return Patience(clock, believed, PilotTuning(), 30.0)
 
@@ -158,14 +159,23 @@ async def test_nothing_succeeds_while_place_is_uncertain() -> None:
     clock = LockstepClock()
     patience = made(clock, is_certain=False)
     believed: Any = patience._belief
-    waiting = asyncio.ensure_future(patience.be_certain())
+    waiting = asyncio.ensure_future(patience.be_certain(0.05))
     await clock.advance(10.0)
     assert not waiting.done()
     believed.is_certain = True
     await clock.advance(0.2)
     assert waiting.done()
     believed.is_certain = False
-    waiting = asyncio.ensure_future(patience.be_certain())
+    waiting = asyncio.ensure_future(patience.be_certain(0.05))
     await clock.advance(PilotTuning().found_seconds + 1.0)
     with pytest.raises(NotLocalized, match="do not confirm the place"):
+        await waiting
+
+
+@pytest.mark.parametrize(("sigma", "tolerance", "arrives"), [(0.4, 0.05, True), (0.6, 0.05, False), (0.6, 1.0, True)])
+async def test_nothing_succeeds_at_an_open_place(sigma: float, tolerance: float, arrives: bool) -> None:
+    clock = LockstepClock()
+    waiting = asyncio.ensure_future(made(clock, is_certain=True, sigma=sigma).be_certain(tolerance))
+    await clock.advance(1.0)
+    with contextlib.nullcontext() if arrives else pytest.raises(NotLocalized, match=r"it may be 0\.6 m off"):
         await waiting

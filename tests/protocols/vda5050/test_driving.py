@@ -179,6 +179,7 @@ async def test_the_broker_says_when_the_robot_is_gone(yard: Opened) -> None:
     assert {"x", "y", "theta", "mapId", "localized"} <= one.control.heard["visualization"][-1][
         "mobileRobotPosition"
     ].keys()
+    assert 0.0 < one.control.heard["visualization"][-1]["mobileRobotPosition"]["deviationRange"] < 0.1  # m
     await one.close()
     await one.until(lambda: one.control.heard["connection"][-1]["connectionState"] == "OFFLINE", 0)
 

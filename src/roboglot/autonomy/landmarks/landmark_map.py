@@ -90,10 +90,12 @@ class LandmarkKeeper(LaserLandmarks):
                 self._remember([here.compose(Pose(place.x, place.y)).point for place in places])
 
     def _fix(self, places: list[Point], known: list[Point], odometry: Pose) -> None:
-        """Correct the pose at the scan by landmarks, weighted by the belief's covariance."""
+        """Correct the pose at the scan by landmarks, weighted by the belief's doubt."""
         belief = self._belief
-        pose, belief.covariance = pose_fixed(belief.map_to_odom.compose(odometry), belief.covariance, places, known)
-        belief.move_to(pose, odometry)
+        pose, doubt = pose_fixed(belief.map_to_odom.compose(odometry), belief.doubt, places, known)
+        if doubt is not belief.doubt:  # else no strip is in sight that matches a landmark
+            belief.doubt = belief.covariance = doubt
+            belief.move_to(pose, odometry)
 
     def _lost(self, now: float) -> bool:
         if not self._belief.localizing or self._belief.quality >= LOST_QUALITY:

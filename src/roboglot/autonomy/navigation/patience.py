@@ -50,8 +50,11 @@ class Patience:
             why = belief.lost or "the scans do not fit the map"
             raise NotLocalized(f"{why} (quality {belief.quality:.2f})")
 
-    async def be_certain(self) -> None:
-        """Wait until the pose is certain, while the robot stands. Raises NotLocalized after a timeout."""
+    async def be_certain(self, tolerance: float) -> None:
+        """Wait until the pose is certain, while the robot stands.
+
+        Raises NotLocalized after a timeout, or if the scans leave more room than the ``tolerance`` (m) and some slack.
+        """
         belief, begun = self._belief, self._clock.time()
         await fresh_look(self._clock, belief)
         while not belief.is_certain:
@@ -60,6 +63,10 @@ class Patience:
                 why = "the scans do not confirm the place"
                 raise NotLocalized(f"{why} (quality {belief.quality:.2f})")
             await self._clock.sleep(LOOK)
+        if belief.localizing and belief.sigma > max(tolerance, self._tuning.vague):
+            raise NotLocalized(
+                f"scans do not show the place, as along a bare corridor: it may be {belief.sigma:.1f} m off"
+            )
 
     def look(self, follower: Follower) -> bool:
         """Note the distance left; return whether it shrank. Raises Blocked if the wheels slip."""

@@ -223,7 +223,7 @@ class Pilot:
 
     async def _arrive(self, follower: Follower) -> State:
         """Check the final pose once it is certain: accept it, try again, or raise Blocked."""
-        await self._patience.be_certain()
+        await self._patience.be_certain(self._goal.options.tolerance)
         pose, goal, options = self._belief.pose, self._goal.points[-1], self._goal.options
         good, tolerance = self._tuning.good, options.tolerance
         faces = options.yaw is None or abs(wrap_angle(options.yaw - pose.yaw)) <= self._tuning.good_yaw

@@ -50,6 +50,7 @@ class PilotTuning:
     # Knowing the place
     lost_quality: float = 0.2
     lost_seconds: float = 5.0
+    vague: float = 0.5  # m: standard deviation of the place, or the tolerance, up to which a drive succeeds
     found_seconds: float = 15.0  # of standing still in which a lost pose may be recovered
 
     # Arriving

@@ -17,9 +17,16 @@ from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.values import dataclass
 
 SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: lower bounds of the variances
+HALF_SURE = 0.5  # m: a place known no better counts half
 SET_BY_CLIENT = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose set by a client
 
 Disc = tuple[float, float, float]  # x, y of the middle (map), radius: m
+
+
+def worst(covariance: NDArray[np.float64]) -> float:
+    """Return the standard deviation (m) of a position in its worst direction."""
+    (along, both, _), (_, across, _), _ = covariance.tolist()
+    return math.sqrt((along + across) / 2 + math.hypot((along - across) / 2, both))
 
 
 def _sure() -> NDArray[np.float64]:
@@ -28,11 +35,16 @@ def _sure() -> NDArray[np.float64]:
 
 @dataclass(slots=True)
 class Belief:
-    """Belief; the pose in map is ``map_to_odom`` composed with odometry, its ``covariance`` (x, y, yaw) in m2, rad2."""
+    """Belief; the pose in map is ``map_to_odom`` composed with odometry.
+
+    ``doubt``: covariance of the pose (x, y, yaw) in m2, rad2; ``covariance``: the one by which a match weighs odometry,
+    smaller where surfaces only seem to show the place, as along a bare corridor.
+    """
 
     odometry: Odometry
     map_to_odom: Pose = ORIGIN
     covariance: NDArray[np.float64] = field(default_factory=_sure)
+    doubt: NDArray[np.float64] = field(default_factory=_sure)
     quality: float = 0.0
     localizing: bool = True
     mapping: bool = True
@@ -66,6 +78,16 @@ class Belief:
         return not self.localizing or not (self.in_doubt or self.contradicted or self.denied)
 
     @property
+    def sigma(self) -> float:
+        """Standard deviation (m) of the position in its worst direction."""
+        return worst(self.doubt)
+
+    @property
+    def score(self) -> float:
+        """The quality as clients see it (0..1): less than the scans' fit where they leave the place open."""
+        return self.quality / (1.0 + (self.sigma / HALF_SURE) ** 2) if self.localizing else self.quality
+
+    @property
     def pose(self) -> Pose:
         """Current pose of base_link in map (m, rad)."""
         return self.map_to_odom.compose(self.odometry.reading.pose)
@@ -74,10 +96,14 @@ class Belief:
         """Set the pose (map) of base_link at the time of ``odometry`` (odom)."""
         self.map_to_odom = pose.compose(odometry.inverse())
 
+    def widen(self, covariance: NDArray[np.float64]) -> None:
+        """Make the pose as much less certain as ``covariance`` has become."""
+        self.doubt, self.covariance = self.doubt + (covariance - self.covariance), covariance
+
     def take_pose(self, pose: Pose) -> None:
         """Set a pose (map) given by a client."""
         self.move_to(pose, self.odometry.reading.pose)
-        self.covariance = np.diag(SET_BY_CLIENT)
+        self.covariance = self.doubt = np.diag(SET_BY_CLIENT)
         self.search = True
 
     def take_map(self, grid: EvidenceGrid, pose: Pose) -> None:
@@ -89,5 +115,6 @@ class Belief:
     def forget_map(self) -> None:
         """Forget the map; the present pose becomes the new origin."""
         self.move_to(ORIGIN, self.odometry.reading.pose)
-        self.covariance, self.search, self.map, self.frame = _sure(), False, EvidenceGrid(), ""
+        self.covariance, self.doubt = _sure(), _sure()
+        self.search, self.map, self.frame = False, EvidenceGrid(), ""
         self.revision += 1

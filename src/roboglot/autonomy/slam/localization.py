@@ -38,7 +38,11 @@ class LidarLocalization(Localization):
 
     @property
     def quality(self) -> float:
-        return self._belief.quality
+        return self._belief.score
+
+    @property
+    def deviation(self) -> float | None:
+        return self._belief.sigma if self.started else None
 
     @property
     def started(self) -> bool:

@@ -6,11 +6,12 @@ Needs the kernels, so it is imported once they are loaded.
 from __future__ import annotations
 
 import math
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.slam.belief import SURE
+from roboglot.autonomy.slam.belief import SURE, worst
 from roboglot.autonomy.slam.certainty import SURE_SIGMA, THINGS_SHARE, Look, Support, look_at, supported
 from roboglot.autonomy.slam.evidence import RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.scan_points import NEARBY, ScanPoints
@@ -50,7 +51,8 @@ RIVAL_SUPPORTED = 0.06  # … and how much less of it the map may support
 class Match:
     """A matched pose; ``strain``: squared distance from the prior in its standard deviations.
 
-    ``fit``: number of the ``points`` on surfaces; ``known``: on known cells.
+    ``covariance``: as the match claims it. ``fit``: number of the ``points`` on surfaces; ``known``: on known cells.
+    ``stays``: how much of an error before stays; ``added``: covariance of what the match adds to it.
     """
 
     pose: Pose
@@ -59,6 +61,8 @@ class Match:
     fit: int
     known: int
     points: int
+    stays: NDArray[np.float64] = field(default_factory=lambda: np.zeros((3, 3)))
+    added: NDArray[np.float64] = field(default_factory=lambda: np.diag(SURE))
 
     @property
     def agreement(self) -> float:
@@ -67,9 +71,12 @@ class Match:
 
     @property
     def sigma(self) -> float:
-        """Standard deviation (m) of the position in its worst direction."""
-        (along, both, _), (_, across, _), _ = self.covariance.tolist()
-        return math.sqrt((along + across) / 2 + math.hypot((along - across) / 2, both))
+        """Standard deviation (m) of the position in its worst direction, if directions of surfaces were exact."""
+        return worst(self.covariance)
+
+    def doubt(self, before: NDArray[np.float64] = FREE) -> NDArray[np.float64]:
+        """Return the covariance of the error (x, y, yaw), if it was ``before`` the match."""
+        return np.maximum(self.stays @ before @ self.stays.T + self.added, LEAST)
 
     @property
     def quality(self) -> float:
@@ -119,12 +126,13 @@ def fit(
     if start is not None:  # near each other, so that their difference is the turn between them
         first = np.array((start.x - corner.x, start.y - corner.y, prior.yaw + wrap_angle(start.yaw - prior.yaw)))
     sensor = np.array((scan.sensor.x, scan.sensor.y))
-    found, narrowed, strain, fitting, known = match(
+    found, narrowed, strain, fitting, known, stays, added = match(
         grid.slots, grid.surfaces, grid.evidence, points, first, centre, covariance, sensor, RESOLUTION, iterations
     )
     np.maximum(narrowed, LEAST, out=narrowed)
     x, y, yaw = found.tolist()
-    return Match(Pose(x + corner.x, y + corner.y, wrap_angle(yaw)), narrowed, strain, fitting, known, len(points))
+    pose = Pose(x + corner.x, y + corner.y, wrap_angle(yaw))
+    return Match(pose, narrowed, strain, fitting, known, len(points), stays, added)
 
 
 def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[float, float]) -> Pose:

@@ -164,7 +164,7 @@ class Slam:
         """Believe a found pose at the time of ``odometry`` (odom)."""
         self._belief.move_to(found.pose, odometry)
         self._witness.forget()
-        self._belief.covariance, self._belief.search = found.covariance, False
+        self._belief.covariance, self._belief.doubt, self._belief.search = found.covariance, found.doubt(), False
         self._belief.quality, self._agreement = found.quality, found.agreement
         self.whereabouts.find(means, self._newest.stamp if self._newest else self._robot.clock.time())
 
@@ -175,7 +175,7 @@ class Slam:
             belief.quality *= 1.0 - QUALITY_GAIN
             return  # a covered lidar sends empty scans: treat it as silent
         if self.whereabouts.note_scan(event.stamp) and belief.map.scans and belief.localizing:
-            belief.covariance = belief.covariance + BLIND
+            belief.widen(belief.covariance + BLIND)
             self._excursions.forget()
             self.whereabouts.lose(LostReason.NO_SCANS, event.stamp)
         last = self._matched_odometry or odometry
@@ -197,7 +197,7 @@ class Slam:
         self._matched_odometry, self._matched_at = odometry, event.stamp
         belief.compared_at, belief.asked = event.scan.stamp, False
         self._way += way
-        belief.covariance = self.odometry.spread(belief.covariance, way, turn, moved, seconds)
+        belief.widen(self.odometry.spread(belief.covariance, way, turn, moved, seconds))
         searches = False
         if belief.map.scans:
             searches = self._correct(scan, odometry, event.stamp, moved, seconds)
@@ -234,9 +234,8 @@ class Slam:
         """
         belief = self._belief
         if belief.localizing and moved:
-            belief.move_to(
-                belief.map_to_odom.compose(odometry).compose(self.odometry.bias.missing(moved, seconds)), odometry
-            )
+            missing = self.odometry.bias.missing(moved, seconds)
+            belief.move_to(belief.map_to_odom.compose(odometry).compose(missing), odometry)
         before = belief.map_to_odom.compose(odometry)
         iterations = ITERATIONS_MAX if belief.localizing else 0
         prior, start = belief.covariance, self._coarse(scan, before, stamp) if belief.localizing else before
@@ -263,7 +262,8 @@ class Slam:
             step, pose = self._step, best.pose
             correction = Correction(before, best, prior, step, moved, seconds)
             self.odometry.learn(correction, self._way, lambda: is_long(step) or is_well_painted(belief.map, scan, pose))
-        belief.covariance = prior if driven else best.covariance
+        if driven is None:
+            belief.covariance, belief.doubt = best.covariance, best.doubt(belief.doubt)
         belief.move_to(best.pose, odometry)
         if shoved is not None and self._displacement.slips:
             belief.slipped += shoved

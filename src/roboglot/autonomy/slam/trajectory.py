@@ -47,7 +47,7 @@ class Trajectory:
             self._map = belief.map
             self.clear()
         if drives or stamp - self.newest >= STANDING_PERIOD:
-            self.add(stamp, belief.map_to_odom.compose(odometry), belief.covariance, anchor)
+            self.add(stamp, belief.map_to_odom.compose(odometry), belief.doubt, anchor)
 
     def add(self, stamp: float, pose: Pose, covariance: NDArray[np.float64], anchor: tuple[int, Pose] | None) -> None:
         """Add a step; ``anchor``: number and pose of the keyframe that moves it; None: it stays."""

@@ -43,6 +43,7 @@ def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
     pose = localization.pose
     known = "localized" if version.new_words else "positionInitialized"
     name = "mobileRobotPosition" if version.new_words else "agvPosition"
+    deviation = {} if localization.deviation is None else {"deviationRange": round(localization.deviation, 3)}
     return {
         name: {
             "x": round(pose.x, 4),
@@ -51,6 +52,7 @@ def position(robot: Robot, version: Version, map_id: str) -> dict[str, object]:
             "mapId": map_id,
             known: localization.started and localization.lost is None,
             "localizationScore": round(min(1.0, max(0.0, localization.quality)), 3),
+            **deviation,
         }
     }
 

@@ -38,7 +38,12 @@ class Localization(Component):
     @property
     @abstractmethod
     def quality(self) -> float:
-        """Fit of the last scans to the map, 0..1."""
+        """Fit of the last scans to the map, 0..1; less where they leave the place open, as along a bare corridor."""
+
+    @property
+    def deviation(self) -> float | None:
+        """Standard deviation of the position in its worst direction, m; None: unknown."""
+        return None
 
     @property
     def started(self) -> bool:
