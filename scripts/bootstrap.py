@@ -36,10 +36,17 @@ PROFILES = ("run", "dev")  # dev includes all of run
 INDEX = "https://pypi.org/simple"
 PAGE_BYTES_MAX = 32 * 1024 * 1024
 UNWANTED = {"PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_QUIET", "PIP_NO_BINARY", "PYTHONHOME", "PYTHONPATH"}
+FULL = "The disk is full: about 700 MB are needed."
+CLOSED = "Clone roboglot into a folder of your own, or have the owner of this one run scripts/run once."
 HINTS = {
     "CERTIFICATE_VERIFY_FAILED": "Certificates aren't trusted: install ca-certificates, or name your own in PIP_CERT.",
-    "No space left": "The disk is full: about 700 MB are needed.",
+    "No space left": FULL,
+    "quota exceeded": FULL,
+    "Permission denied": CLOSED,
+    "Read-only file system": CLOSED,
 }
+# How pip begins a package: one of an index, a file on this machine, or one that is there.
+PACKAGE = re.compile(r"(?:Collecting|Processing|Requirement already satisfied:) (?:\S*/)?(\S+)")
 
 
 class SetupFailed(Exception):
@@ -99,7 +106,11 @@ def make_venv() -> None:
     if VENV.is_symlink():
         VENV.unlink()  # what it leads to is another's, and would be emptied
     with_pip = find_spec("ensurepip") is not None
-    venv.EnvBuilder(symlinks=True, clear=True, with_pip=with_pip).create(VENV)
+    try:
+        venv.EnvBuilder(symlinks=True, clear=True, with_pip=with_pip).create(VENV)
+    except subprocess.CalledProcessError as error:  # of ensurepip
+        words = error.output.decode("utf-8", "replace").strip()
+        raise SetupFailed(f"{words.rpartition(chr(10))[2]}\nPython's ensurepip failed. {hint(words, '')}") from None
     if not with_pip:
         wheel = fetch_pip((ROOT / "requirements/pip.lock").read_text(), VENV)
         pip("install", "--no-index", "--no-deps", str(wheel), runner=f"{wheel}/pip")
@@ -134,10 +145,17 @@ def fetch_pip(lock: str, folder: Path) -> Path:
     return folder / name
 
 
-def hint(text: str) -> str:
-    """The likely reason for a failure to get packages, and what to do, in a sentence."""
+def hint(text: str, otherwise: str = "Without a network? The first start needs one.") -> str:
+    """The likely reason for a failure, and what to do, in a sentence."""
     found = [words for sign, words in HINTS.items() if sign in text]
-    return found[0] if found else "Without a network? The first start needs one."
+    return found[0] if found else otherwise
+
+
+def in_words(error: Exception) -> str:
+    """Text of a failure, with its remedy."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or ROOT}: {error.strerror}. {hint(error.strerror, '')}".rstrip()
+    return str(error)
 
 
 def pip(*arguments: str, runner: str = "", total: int = 0, lock_fd: int | None = None) -> None:
@@ -162,14 +180,16 @@ def pip(*arguments: str, runner: str = "", total: int = 0, lock_fd: int | None =
         assert process.stdout is not None
         for line in process.stdout:
             tail = [*tail, line.rstrip()][-200:]
-            if line.startswith(("Collecting ", "Requirement already satisfied: ")):
+            if package := PACKAGE.match(line):
                 seen += 1
                 if total and (sys.stderr.isatty() or seen % 10 == 0):
-                    say(f"  package {seen} of {total}: {line.split()[1]}", end="" if sys.stderr.isatty() else "\n")
+                    say(f"  package {seen} of {total}: {package[1]}", end="" if sys.stderr.isatty() else "\n")
             elif total and line.startswith("Installing collected"):
                 say("  installing what was fetched")
     if process.returncode != 0:
-        words = "\n".join([line for line in tail if not line.startswith(("Collecting ", " ", "Ignoring "))][-12:])
+        words = "\n".join(
+            [line for line in tail if not (PACKAGE.match(line) or line.startswith((" ", "Ignoring ")))][-12:]
+        )
         raise SetupFailed(f"{words}\npip failed. {hint(words)}")
 
 
@@ -227,7 +247,7 @@ if __name__ == "__main__":
     try:
         set_up(sys.argv[1])
     except (SetupFailed, OSError) as error:
-        sys.exit(f"roboglot: the set-up failed: {error}")
+        sys.exit(f"roboglot: the set-up failed: {in_words(error)}")
     except KeyboardInterrupt:
         say("interrupted; the next start repairs it.")
         sys.exit(130)

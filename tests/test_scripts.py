@@ -1,16 +1,19 @@
 """The scripts' pure parts: what they decide, without a network and without making an environment."""
 
+import errno
 import hashlib
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import tomllib
 import venv
 from pathlib import Path
 from types import SimpleNamespace
 from typing import BinaryIO
+from unittest.mock import Mock
 from urllib.parse import unquote, urlsplit
 
 import bootstrap
@@ -19,6 +22,7 @@ import pytest
 import setuptools_scm
 
 ROOT = Path(__file__).resolve().parent.parent
+NOBODY = 65534
 WHEEL = b"not really a wheel"
 NAME = "pip-26.3-py3-none-any.whl"
 LOCK = f"pip==26.3 --hash=sha256:{hashlib.sha256(WHEEL).hexdigest()}\n"
@@ -41,11 +45,13 @@ def clone(tmp_path: Path) -> Path:
     return root
 
 
-def environment(root: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+def environment(root: Path, user: int | None = None, **variables: str) -> subprocess.CompletedProcess[str]:
     """Runs `environment run` of the clone's scripts/environment."""
+    line = 'source "$1/scripts/environment"; environment run; echo went on'
     return subprocess.run(
-        ["bash", "-c", 'source "$1/scripts/environment"; environment run; echo went on', "bash", str(root)],
+        ["env", "--default-signal=INT", "bash", "-c", line, "bash", str(root)],
         env={"PATH": os.environ["PATH"], **variables},
+        user=user,
         capture_output=True,
         text=True,
         timeout=180,
@@ -65,6 +71,32 @@ def test_kernels_are_recompiled_when_their_source_is_newer(clone: Path) -> None:
     done = environment(clone)
     assert done.stdout == "went on\n"
     assert "compiling the numeric kernels" in done.stderr
+
+
+@pytest.mark.parametrize("status", [130, 1])
+def test_ctrl_c_while_kernels_compile_starts_no_robot(clone: Path, status: int) -> None:
+    (clone / ".venv/bin/python").unlink()
+    (clone / ".venv/bin/python").write_text(f"#!/bin/sh\nkill -INT $PPID\nexit {status}\n")
+    (clone / ".venv/bin/python").chmod(0o755)
+    (clone / ".venv/stamp-run").write_bytes(bootstrap.stamp(clone, "run"))
+    (clone / ".venv/kernels").unlink()
+    done = environment(clone)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.endswith("interrupted; the next start compiles the rest\n")
+    assert not (clone / ".venv/kernels").exists()
+
+
+def test_users_of_anothers_clone_leave_its_kernels_alone(clone: Path) -> None:
+    """They could not note that they have compiled them, and that failure ended the start."""
+    with tempfile.TemporaryDirectory() as shared:
+        root = Path(shutil.copytree(clone, Path(shared) / "clone", symlinks=True))
+        (root / ".venv/stamp-run").write_bytes(bootstrap.stamp(root, "run"))
+        (root / ".venv/kernels").unlink()
+        root.parent.chmod(0o755)
+        (root / ".venv").chmod(0o555)
+        done = environment(root, user=NOBODY if os.geteuid() == 0 else None)
+        (root / ".venv").chmod(0o755)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "went on\n", "")
 
 
 @pytest.mark.parametrize("changed", ["requirements/run.lock", "pyproject.toml"])
@@ -145,6 +177,45 @@ def test_without_a_network_the_way_out_is_named(mirror: Path, tmp_path: Path) ->
 def test_the_likely_reason_is_named() -> None:
     assert "PIP_CERT" in bootstrap.hint("… CERTIFICATE_VERIFY_FAILED …")
     assert "700 MB" in bootstrap.hint("OSError: No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("number", "says"),
+    [(errno.EACCES, "Clone roboglot into"), (errno.EROFS, "Clone roboglot into"), (errno.EDQUOT, "700 MB")],
+)
+def test_unwritable_folder_is_named_with_the_way_out(number: int, says: str) -> None:
+    words = bootstrap.in_words(OSError(number, os.strerror(number), "/srv/roboglot/.venv"))
+    assert words.startswith(f"/srv/roboglot/.venv: {os.strerror(number)}. ")
+    assert says in words
+    assert "Errno" not in words
+
+
+def test_failure_of_ensurepip_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    output = b"Traceback (most recent call last):\nOSError: [Errno 28] No space left on device\n"
+    failing = Mock(side_effect=subprocess.CalledProcessError(1, "ensurepip", output))
+    monkeypatch.setattr(bootstrap, "VENV", tmp_path / ".venv")
+    monkeypatch.setattr(venv, "EnvBuilder", lambda **_: Mock(create=failing))
+    with pytest.raises(
+        bootstrap.SetupFailed, match=r"^OSError: .* device\n.*ensurepip failed\. The disk is full: .* MB"
+    ):
+        bootstrap.make_venv()
+
+
+@pytest.mark.parametrize(
+    ("line", "package"),
+    [
+        ("Collecting anyio==4.16.0 (from -r run.lock (line 4))", "anyio==4.16.0"),
+        (
+            "Processing /opt/files/h11-0.16.0-py3-none-any.whl (from -r a/run.lock (line 9))",
+            "h11-0.16.0-py3-none-any.whl",
+        ),
+        ("Requirement already satisfied: click==8.5.1 in ./lib/site-packages (8.5.1)", "click==8.5.1"),
+    ],
+)
+def test_packages_are_counted_wherever_they_come_from(line: str, package: str) -> None:
+    found = bootstrap.PACKAGE.match(line)
+    assert found is not None
+    assert found[1] == package
 
 
 def test_packages_of_other_systems_are_not_counted() -> None:
