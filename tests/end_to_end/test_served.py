@@ -148,19 +148,22 @@ def test_it_stops_cleanly_on_a_signal(tmp_path: Path) -> None:
 
 STUCK = """
 # warm
+import os
 import time
 from roboglot.hosting import process
 process.LAST_SECONDS = 0.1
+os.dup2(1, 2)
 process.end_in_any_case()
 print("stuck", flush=True)
 time.sleep(60)
 """
 
 
-def test_it_ends_even_if_something_is_stuck() -> None:
+def test_a_stuck_end_is_forced_and_named() -> None:
     with child(STUCK) as process:
         assert process.stdout
         assert process.stdout.readline() == "stuck\n"
+        assert process.stdout.read() == "roboglot: still closing after 0.1 s, so it ends now\n"
         assert process.wait(20) == 1
 
 

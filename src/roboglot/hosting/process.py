@@ -11,6 +11,7 @@ import threading
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # from malloc.h
 SWITCH_SECONDS = 0.001  # s for which other threads (database, pictures) may block the main thread
 KEPT, SPARE = 1 << 19, 1 << 21  # bytes of blocks that come from the heap, and of free heap that is not given back
+STDERR = 2
 LAST_SECONDS = 10.0  # s after a signal; closing takes one or two
 
 
@@ -24,9 +25,15 @@ def prepare() -> None:
 
 def end_in_any_case() -> None:
     """End the process after ``LAST_SECONDS`` s even if a thread or task hangs."""
-    timer = threading.Timer(LAST_SECONDS, os._exit, (1,))
+    timer = threading.Timer(LAST_SECONDS, _cut_short)
     timer.daemon = True
     timer.start()
+
+
+def _cut_short() -> None:
+    with contextlib.suppress(OSError):
+        os.write(STDERR, f"roboglot: still closing after {LAST_SECONDS:g} s, so it ends now\n".encode())
+    os._exit(1)
 
 
 def _give_memory_back() -> None:

@@ -26,7 +26,8 @@ NAVIGATION = (
     "search",
 )
 WORLD = ("sweep", "rays", "together", "gliding", "ticks")
-MODULES = (*NAVIGATION, "raster", "raster_shading", *WORLD, "posing")
+CAMERA = ("raster", "raster_shading", "posing")
+MODULES = (*NAVIGATION, *CAMERA[:2], *WORLD, *CAMERA[2:])
 
 LIBRARY = ".so"  # in the names of such files
 MAPS = Path("/proc/self/smaps")

@@ -6,11 +6,13 @@ In lockstep everything runs in place, so that the same seed gives the same pictu
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from roboglot.kernels import loading
-from roboglot.model.background import beside
+from roboglot.kernels import CAMERA, loading
+from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
+from roboglot.model.background import beside, load
 from roboglot.model.clock import Clock, RealClock
 from roboglot.simulation.rendering.views import Scenery
 
@@ -33,7 +35,7 @@ class Studio:
         """Return the scenery; the first call waits for the kernels (a second; longer if they must be compiled)."""
         async with self._opening:
             if self._stage is None:
-                self._stage = await self.work(self._open_stage)
+                self._stage = await self._load(self._open_stage)
         return self._stage
 
     async def renderer(self, width: int, height: int, fov: float) -> Renderer:
@@ -45,7 +47,18 @@ class Studio:
 
             return Renderer(width, height, fov)
 
-        return await self.work(make)
+        return await self._load(make)
+
+    async def _load(self, job: Callable[[], R]) -> R:
+        """Return the result of ``job``, which imports kernels: missing ones are compiled first, in a separate process.
+
+        Compiled in a thread of the pool, they would slow the robots down and delay the program's end.
+        """
+        if not self._threaded:
+            return job()
+        with contextlib.suppress(KernelsUnavailable):  # then they are compiled as they are imported
+            await compile_beside(CAMERA)
+        return await load(job)
 
     async def work(self, job: Callable[[], R]) -> R:
         """Return the result of ``job``, which runs in a thread in real time."""
