@@ -20,7 +20,7 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.spelling import instead
-from roboglot.text_files import parse_toml
+from roboglot.text_files import parse_toml, text_of
 from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 
@@ -257,7 +257,7 @@ def load_config(
     (``roboglot.protocols.sections()``).
     """
     try:
-        values: dict[str, object] = parse_toml(path.read_text(encoding="utf-8")) if path else {}
+        values: dict[str, object] = parse_toml(text_of(path)) if path else {}
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from None
     except ValueError as error:  # bad TOML, or not UTF-8

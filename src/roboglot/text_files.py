@@ -1,10 +1,11 @@
-"""Reads text that anyone may have written: values too deep or too long for Python are ValueErrors in plain words."""
+"""Reads text that anyone may have written: what it should not be is a ValueError in plain words."""
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TypeVar
 
 import msgspec
@@ -14,21 +15,40 @@ T = TypeVar("T")
 
 @contextmanager
 def in_bounds() -> Iterator[None]:
-    """Raise ValueError in plain words for text nested too deeply, or with a number of too many digits."""
+    """Raise ValueError in plain words for no text, for text nested too deeply, or a number of too many digits."""
     try:
         yield
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+    except UnicodeDecodeError as error:
+        raise ValueError(f"not UTF-8 text ({error.reason})") from None
     except ValueError as error:
         if "integer string conversion" in str(error):
             raise ValueError("a number has too many digits") from None
         raise
 
 
+def text_of(path: Path) -> str:
+    """Return the text of a file. Raises OSError, and ValueError without the file's name if it is not UTF-8."""
+    with in_bounds():
+        return path.read_text(encoding="utf-8")
+
+
+def named_text_of(path: Path) -> str:
+    """Return the text of a file. Raises OSError, and ValueError with the file's name if it is not UTF-8."""
+    try:
+        return text_of(path)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
 def parse_toml(text: str) -> dict[str, object]:
     """Return the values of a TOML document. Raises ValueError."""
     with in_bounds():
-        return tomllib.loads(text)
+        try:
+            return tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise ValueError(f"not TOML: {error}") from None
 
 
 def convert_toml(text: str, kind: type[T], *, strict: bool = True) -> T:

@@ -1,12 +1,26 @@
-"""Commands name a file that is not there, in plain words."""
+"""Commands name a file that is not there, or not what it should be, in plain words."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import typer
+
+from roboglot.cli import connect, mcp
+from roboglot.cli.fleet import _Asked, _plan
+from roboglot.config import load_config
+from roboglot.hosting.error_text import in_words
+from roboglot.hosting.folder_lock import lock_folder
+from roboglot.recording.comparing.masks import read_mask
+from roboglot.simulation.world.declarations import read_toml
+from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.world_files import import_ros_map
+from roboglot.testing.scenarios import files
 
 
 @pytest.mark.parametrize(
@@ -34,3 +48,48 @@ def test_missing_file_is_named(words: tuple[str, ...], tmp_path: Path) -> None:
     )
     assert done.returncode
     assert done.stderr.strip() == f"roboglot {words[0]}: no.mcap: No such file or directory"
+
+
+def template(path: Path) -> object:
+    return _plan(path.parent, _Asked(1, 1, path, ""), replan=True)
+
+
+TOML: list[Callable[[Path], object]] = [
+    lambda path: load_config(path, {}),
+    lambda path: read_toml(path, WorldDescription),
+    read_mask,
+    template,
+]
+
+
+@pytest.mark.parametrize("read", [*TOML, files.read, import_ros_map])
+def test_file_that_is_no_text_is_named(read: Callable[[Path], object], tmp_path: Path) -> None:
+    path = tmp_path / "map.bin"
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(ValueError, match=rf"^{re.escape(str(path))}: not UTF-8 text \(invalid start byte\)$"):
+        read(path)
+
+
+@pytest.mark.parametrize("read", TOML)
+def test_file_that_is_no_toml_is_named(read: Callable[[Path], object], tmp_path: Path) -> None:
+    path = tmp_path / "settings.txt"
+    path.write_text("world = \n")
+    with pytest.raises(ValueError, match=rf"^{re.escape(str(path))}: not TOML: Invalid value \(at line 1, column 9\)$"):
+        read(path)
+
+
+def test_token_file_that_is_no_text_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "token"
+    path.write_bytes(b"\xff")
+    with pytest.raises(SystemExit, match=rf"^roboglot connect: {re.escape(str(path))}: not UTF-8 text"):
+        connect.command("127.0.0.1", token_file=path)
+    with pytest.raises(typer.BadParameter, match=rf"^{re.escape(str(path))}: not UTF-8 text"):
+        mcp.command(token_file=path)
+
+
+@pytest.mark.parametrize("name", ["file", "file/folder"])
+def test_data_folder_that_is_a_file_is_named(name: str, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(NotADirectoryError) as refused:
+        lock_folder(tmp_path / name)
+    assert in_words(refused.value) == f"{tmp_path / name}: Not a directory; choose another folder with --data"

@@ -53,10 +53,42 @@ def test_lines_to_copy_name_a_program(
     (tmp_path / "home").mkdir()
     monkeypatch.chdir(tmp_path if inside else tmp_path / "home")
     assert screen.as_typed("roboglot scan 10.0.0.1") == f"{shown.format(tmp_path)} scan 10.0.0.1"
+    other = tmp_path / "my robots" / "bin" / "roboglot"
+    other.parent.mkdir(parents=True)
+    other.touch(0o755)
+    monkeypatch.setattr(sys, "executable", str(other.with_name("python")))
+    assert screen.as_typed("roboglot scan").endswith("my robots/bin/roboglot' scan")
+    monkeypatch.setattr(sys, "executable", str(program.with_name("python")))
     assert screen.as_typed("curl http://a") == "curl http://a"
     assert screen.as_typed("WHERE='tcp/a' ros2 topic list") == "WHERE='tcp/a' ros2 topic list"
     monkeypatch.setenv("PATH", str(program.parent))
     assert screen.as_typed("roboglot scan") == "roboglot scan"
+
+
+@pytest.mark.parametrize(("typed", "called"), [("help up", ["--help"]), ("up --speed 2", ["--speed", "2"])])
+def test_word_asks_for_help_on_command(typed: str, called: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[list[str]] = []
+    monkeypatch.setattr(cli, "built", lambda name: lambda **_: seen.append([name, *sys.argv[1:]]))
+    monkeypatch.setattr(sys, "argv", ["roboglot", *typed.split()])
+    cli.main()
+    assert seen == [["up", *called]]
+
+
+@pytest.mark.parametrize("typed", ["", "help", "--help", "-h"])
+def test_usage_names_every_command_and_the_version(
+    typed: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["roboglot", *typed.split()])
+    cli.main()
+    shown = capsys.readouterr().out
+    assert all(f"  {command} " in shown for command in COMMANDS)
+    assert "roboglot --version" in shown
+
+
+def test_misspelt_option_before_any_command_is_no_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["roboglot", "--versoin"])  # codespell:ignore
+    with pytest.raises(SystemExit, match=r"there is no option '--versoin'; did you mean '--version'\?"):
+        cli.main()
 
 
 def test_a_robot_is_given_once() -> None:

@@ -22,5 +22,7 @@ def test_port_in_use_is_named(run: Callable[[Coroutine[object, object, object]],
 
 
 def test_address_of_another_machine_is_named() -> None:
-    with pytest.raises(OSError, match=r"cannot listen on 192\.0\.2\.77:0: Cannot assign requested address"):
+    with pytest.raises(OSError, match=r"cannot listen on 192\.0\.2\.77:0: it is not an address of this machine"):
         asyncio.run(listen(asyncio.Protocol, "192.0.2.77", 0))
+    with pytest.raises(OSError, match=r"cannot listen on \[2001:db8::77\]:0: it is not an address of this machine"):
+        asyncio.run(listen(asyncio.Protocol, "2001:db8::77", 0))

@@ -49,6 +49,7 @@ COMMANDS = {
     "certs": "write the certificates that CyberDog clients need",
     "doctor": "show what is missing on this machine, and how to get it",
 }
+HELP, VERSION = ("--help", "-h"), ("--version", "-V")
 FLUSH_FAILED = 120  # Python's own exit status for it
 PREFIX = "ROBOGLOT_"
 # The environment variables that are read, without their prefix.
@@ -104,7 +105,7 @@ def main() -> None:
     """``roboglot COMMAND …``; the commands' own options come from Typer."""
     _tolerate_plain_terminals()
     _warn_of_misspelt_variables()
-    arguments = sys.argv[1:] or ["--help"]
+    sys.argv[1:] = arguments = _without_help(sys.argv[1:]) or ["--help"]
     name = arguments[0]
     try:
         _run(name)
@@ -123,10 +124,15 @@ def main() -> None:
         sys.exit(1)
 
 
+def _without_help(words: list[str]) -> list[str]:
+    """Return ``help COMMAND`` as ``COMMAND --help``."""
+    return [*words[1:], "--help"] if words[:1] == ["help"] else words
+
+
 def _run(name: str) -> None:
-    if name in ("--help", "-h"):
+    if name in HELP:
         _print_usage()
-    elif name == "--version":
+    elif name in VERSION:
         from roboglot.cli.about import about
 
         print("\n".join(about()))
@@ -139,7 +145,8 @@ def _run(name: str) -> None:
     else:
         from roboglot.spelling import instead
 
-        sys.exit(f"roboglot: there is no command {name!r}{instead(name, COMMANDS)}")
+        kind, known = ("option", (*HELP, *VERSION)) if name.startswith("-") else ("command", tuple(COMMANDS))
+        sys.exit(f"roboglot: there is no {kind} {name!r}{instead(name, known)}")
 
 
 def _run_with_extra(name: str, arguments: list[str]) -> None:
@@ -171,7 +178,7 @@ def _print_usage() -> None:
     print("usage: roboglot COMMAND [OPTIONS]\n\nOne robot, every protocol.\n")
     for command, meaning in COMMANDS.items():
         print(f"  {command:12} {meaning}")
-    print("\nroboglot COMMAND --help lists the options of a command.")
+    print("\nroboglot COMMAND --help lists the options of a command; roboglot --version says what is installed.")
 
 
 @functools.cache

@@ -23,6 +23,7 @@ from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import visible
 from roboglot.hosting.event_loop import run, together
 from roboglot.hosting.logs import set_up_logging
+from roboglot.text_files import named_text_of
 
 if TYPE_CHECKING:
     from roboglot.storage.gateways import Whereabouts
@@ -55,7 +56,7 @@ def command(
     if bool(gateway) == bool(registry):
         sys.exit("roboglot connect: which robots: those of a gateway, or those of a --registry?")
     try:
-        token = token_file.read_text() if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
+        token = named_text_of(token_file) if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
         names = robot or ["a"]
         if len({*names}) < len(names):
             raise ValueError("a robot is named twice")

@@ -243,7 +243,7 @@ class _Asked(NamedTuple):
 def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     """Return the stored plan, or a new one. Raises ValueError if the stored one has other options."""
     from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet
-    from roboglot.text_files import parse_toml
+    from roboglot.text_files import parse_toml, text_of
 
     kept = None if replan else load(folder)
     if kept is not None and not any(asked):
@@ -251,7 +251,7 @@ def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     if not asked.worlds:
         raise ValueError(f"there is no fleet in {folder} yet: give --worlds")
     try:
-        template = parse_toml(asked.template.read_text(encoding="utf-8")) if asked.template else {}
+        template = parse_toml(text_of(asked.template)) if asked.template else {}
     except OSError as error:
         raise ValueError(in_words(error)) from None
     except ValueError as error:  # bad TOML, or not UTF-8

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from roboglot.hosting.error_text import in_words
+from roboglot.text_files import named_text_of
 
 
 def command(
@@ -21,13 +22,13 @@ def command(
     token_file: Annotated[Path | None, typer.Option(help="A file with the token; else ROBOGLOT_TOKEN.")] = None,
 ) -> None:
     """Serve the tools until the agent disconnects."""
+    try:
+        token = named_text_of(token_file) if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
+    except (OSError, ValueError) as error:
+        raise typer.BadParameter(in_words(error)) from None
     from roboglot.agents.console import ConsoleClient
     from roboglot.agents.server import make_server
 
-    try:
-        token = token_file.read_text() if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
-    except OSError as error:
-        raise typer.BadParameter(in_words(error)) from None
     server = make_server(ConsoleClient(console, token.strip()))
     if http is None:
         server.run("stdio")

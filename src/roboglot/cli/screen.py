@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
@@ -65,7 +66,8 @@ def as_typed(line: str) -> str:
     path = Path(sys.executable).with_name("roboglot")
     if program != "roboglot" or shutil.which(program) or not path.exists():
         return line
-    return f"{os.path.relpath(path) if path.is_relative_to(Path.cwd()) else path}{space}{arguments}"
+    typed = os.path.relpath(path) if path.is_relative_to(Path.cwd()) else str(path)
+    return f"{shlex.quote(typed)}{space}{arguments}"
 
 
 def shortened(text: str, most: int) -> str:

@@ -20,11 +20,14 @@ async def listen(
         server = await asyncio.get_running_loop().create_server(factory, address, port, backlog=backlog)
     except OSError as error:
         number = error.errno or errno.EADDRNOTAVAIL  # for which Python 3.13 and later give no number
+        place = f"[{address}]:{port}" if ":" in address else f"{address}:{port}"
         if number == errno.EADDRINUSE:
-            reason = f"{address}:{port} is in use by another program"
+            reason = f"{place} is in use by another program"
+        elif number == errno.EADDRNOTAVAIL:
+            reason = f"cannot listen on {place}: it is not an address of this machine"
         else:
             why = os.strerror(number) if number > 0 else error.strerror or str(error)
-            reason = f"cannot listen on {address}:{port}: {why}"
+            reason = f"cannot listen on {place}: {why}"
         raise OSError(number, reason) from None
     for listening in server.sockets:
         end_vanished(listening)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import shlex
 import time
+from pathlib import Path
 
 import grpc
 import pytest
@@ -210,6 +212,14 @@ async def test_the_start_screen_has_a_line_to_try(door) -> None:
     (endpoint,) = door.endpoints
     assert endpoint.address == f"{ADDRESS}:{door.port}"
     assert "-authority cyberdog2.server" in endpoint.try_line
+
+
+async def test_line_to_try_holds_in_folder_with_spaces(robot: Robot, tmp_path: Path) -> None:
+    door = CyberDogDoor(robot, ADDRESS, CyberDogConfig(port=0), tmp_path / "our robots")
+    (endpoint,) = door.endpoints
+    words = shlex.split(endpoint.try_line)
+    assert words[words.index("-key") + 1] == str(tmp_path / "our robots/cyberdog/tls/client-key.pem")
+    assert words[words.index("-d") + 1] == '{"nameCode": 10001, "params": "{}"}'
 
 
 def test_rows_are_done_or_said_to_be_partial() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -121,11 +122,20 @@ class CyberDogDoor:
         """The gRPC server."""
         where = f"{self._address}:{self.port}"
         tls = self._certificates / "tls"
-        proof = f"-cacert {tls}/ca-cert.pem -cert {tls}/client-cert.pem -key {tls}/client-key.pem"
-        security = "-plaintext" if self._config.plaintext else f"{proof} -authority {ROBOT_NAME}"
-        proto = f"-import-path {Path(pb.__file__).parent} -proto cyberdog_app.proto"
-        request = """-d '{"nameCode": 10001, "params": "{}"}'"""
-        line = f"grpcurl {security} {proto} {request} {where} grpcapi.GrpcApp/sendMsg"
+        words = ["grpcurl", "-plaintext"]
+        if not self._config.plaintext:
+            proof = (
+                "-cacert",
+                f"{tls}/ca-cert.pem",
+                "-cert",
+                f"{tls}/client-cert.pem",
+                "-key",
+                f"{tls}/client-key.pem",
+            )
+            words[1:] = [*proof, "-authority", ROBOT_NAME]
+        words += ["-import-path", str(Path(pb.__file__).parent), "-proto", "cyberdog_app.proto"]
+        words += ["-d", '{"nameCode": 10001, "params": "{}"}', where, "grpcapi.GrpcApp/sendMsg"]
+        line = shlex.join(words)  # paths may contain spaces
         return [Endpoint("CyberDog 2 gRPC", where, line, None if self._config.plaintext else tls)]
 
     def _assemble(self, certificates: CertificateStore | None) -> Context:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.recording.comparing.trees import kind_of
-from roboglot.text_files import convert_toml
+from roboglot.text_files import convert_toml, text_of
 from roboglot.validation import why_invalid
 
 RULES_MAX = 1000
@@ -86,7 +86,7 @@ STRICT = Mask(tolerance=0.0, share=0.0, seconds=1e-6, seconds_share=0.0)
 def read_mask(path: Path) -> Mask:
     """Read a TOML file. Raises ValueError, OSError."""
     try:
-        mask = convert_toml(path.read_text(encoding="utf-8"), Mask)
+        mask = convert_toml(text_of(path), Mask)
     except ValueError as error:
         raise ValueError(f"{path}: {why_invalid(error, wanted=Mask)}") from None
     if len(mask.rule) > RULES_MAX:

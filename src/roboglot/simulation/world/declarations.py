@@ -13,7 +13,7 @@ from typing import TypeVar, cast
 
 import msgspec
 
-from roboglot.text_files import convert_toml
+from roboglot.text_files import convert_toml, text_of
 from roboglot.validation import why_invalid
 
 T = TypeVar("T")
@@ -27,21 +27,26 @@ class BadFile(ValueError):
 
 def read_toml(path: Path, structure: type[T]) -> T:
     """Return the content of ``path`` as a ``structure``. Raises BadFile."""
-    try:
-        if path.stat().st_size > FILE_BYTES_MAX:
-            raise BadFile(f"{path}: larger than {FILE_BYTES_MAX} bytes")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise BadFile(f"{path}: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise BadFile(f"{path}: not UTF-8 text ({error.reason})") from None
+    text = text_below(path, FILE_BYTES_MAX)
     try:
         return cast(T, _decoded(text, cast(Hashable, structure)))
     except msgspec.ValidationError as error:
         why = why_invalid(error, "the file", wanted=structure)
         raise BadFile(f"{path}{_line_of(text, str(error))}: {why}") from None
     except ValueError as error:
-        raise BadFile(f"{path}: not TOML: {error}") from None
+        raise BadFile(f"{path}: {error}") from None
+
+
+def text_below(path: Path, most: int) -> str:
+    """Return the text of a file of at most so many bytes. Raises BadFile."""
+    try:
+        if path.stat().st_size <= most:
+            return text_of(path)
+    except OSError as error:
+        raise BadFile(f"{path}: {error.strerror}") from None
+    except ValueError as error:
+        raise BadFile(f"{path}: {error}") from None
+    raise BadFile(f"{path}: larger than {most} bytes")
 
 
 @lru_cache(maxsize=DECODED_MAX)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.building.rectangles import cover
-from roboglot.simulation.world.declarations import BadFile, read_toml
+from roboglot.simulation.world.declarations import BadFile, read_toml, text_below
 from roboglot.simulation.world.description import (
     SOLIDS_MAX,
     AccessPoint,
@@ -110,18 +110,13 @@ def read_ros_grid(path: Path) -> OccupancyGrid:
 def _read(path: Path) -> RosMap:
     import yaml
 
+    text = text_below(path, ROS_MAP_BYTES_MAX)
     try:
-        if path.stat().st_size > ROS_MAP_BYTES_MAX:
-            raise BadFile(f"{path}: larger than {ROS_MAP_BYTES_MAX} bytes")
         with in_bounds():
-            values = yaml.safe_load(path.read_text(encoding="utf-8"))
+            values = yaml.safe_load(text)
         ros_map = msgspec.convert(values, RosMap, strict=False)
-    except OSError as error:
-        raise BadFile(f"{path}: {error.strerror}") from None
     except msgspec.ValidationError as error:
         raise BadFile(f"{path}: not a ROS map: {why_invalid(error, wanted=RosMap)}") from None
-    except BadFile:
-        raise
     except (yaml.YAMLError, ValueError) as error:
         raise BadFile(f"{path}: not YAML: {error}") from None
     if ros_map.origin[2]:
