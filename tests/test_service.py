@@ -103,6 +103,12 @@ def test_programs_are_confined_in_it() -> None:
     assert "42" in ended.stdout
 
 
+def test_kernels_have_a_folder_in_it() -> None:
+    """Its user has no home: without kernels beside the code, robots had no navigation."""
+    [folder] = setting("CacheDirectory")
+    assert f"XDG_CACHE_HOME=%C/{folder}" in setting("Environment")
+
+
 def test_the_unit_starts_what_there_is() -> None:
     [command] = setting("ExecStart")
     assert " up --config " in command

@@ -16,6 +16,7 @@ from numba import njit
 from numba.core import caching
 from numba.core.registry import cpu_target
 
+from roboglot.kernels import ahead
 from roboglot.kernels.ahead import compile_ahead
 from roboglot.kernels.arrays import FloatArray
 from roboglot.kernels.compiled import CHECKED, LeanLibrary, kernel
@@ -95,6 +96,29 @@ def test_kernels_of_a_read_only_folder_are_used(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert kernel("float64(float64)")(doubling.double)(1.5) == 3.0  # not kept
     assert sorted(tmp_path.rglob("*.nb?")) == kept
+
+
+def test_kernels_beside_read_only_sources_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An administrator has installed and compiled; each user would compile once more."""
+    compile_ahead()
+    beside = Path(ahead.__file__).parent / "__pycache__"
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    monkeypatch.setattr(caching.tempfile, "TemporaryFile", Mock(side_effect=OSError(errno.EROFS, "Read-only")))
+    ahead.cache_folder.cache_clear()
+    refresh = Mock()
+    monkeypatch.setattr(cpu_target.target_context, "refresh", refresh)
+    try:
+        assert ahead.cache_folder() == beside
+        assert ahead.missing() == []
+        cached = kernel("void(float64[:,::1])", error_model=CHECKED)(vars(invert)["__wrapped__"])
+        refresh.assert_not_called()
+        assert vars(cached)["_cache"].cache_path == str(beside)
+        monkeypatch.setattr(ahead, "_machine", lambda: "another processor")
+        ahead.cache_folder.cache_clear()
+        assert ahead.cache_folder() != beside
+    finally:
+        ahead.cache_folder.cache_clear()
 
 
 def test_cached_kernels_import_no_lowering_of_arrays() -> None:

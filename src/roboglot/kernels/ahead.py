@@ -40,7 +40,10 @@ class KernelsUnavailable(RuntimeError):
 
 def missing(modules: Sequence[str] = MODULES) -> list[str]:
     """Return those of ``modules`` that are not compiled for this source, this Numba and this processor."""
-    folder = cache_folder()
+    return _missing(cache_folder(), modules)
+
+
+def _missing(folder: Path, modules: Sequence[str]) -> list[str]:
     return [name for name in modules if not (folder / _mark(name)).exists()]
 
 
@@ -61,7 +64,9 @@ def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda _nam
                 (folder / _mark(name)).touch()
                 report(name, done, len(names))
     except OSError as error:
-        raise KernelsUnavailable(f"{folder} cannot hold compiled kernels: {error.strerror or error}") from None
+        raise KernelsUnavailable(
+            f"{folder} cannot hold compiled kernels: {error.strerror or error}; NUMBA_CACHE_DIR chooses another folder"
+        ) from None
 
 
 async def compile_beside(modules: Sequence[str] = MODULES, report: Report = lambda _name, _done, _total: None) -> None:
@@ -98,11 +103,14 @@ async def _compile_apart(modules: Sequence[str], report: Report) -> None:
 
 @cache
 def cache_folder() -> Path:
-    """Return Numba's cache folder: its own setting, a folder beside the sources, or the user's cache folder."""
+    """Return Numba's cache folder: its own setting, a folder beside the sources, or the user's cache folder.
+
+    One beside the sources that cannot be written is taken if it has all kernels, as where an administrator installed.
+    """
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen)
     beside = HERE / "__pycache__"
-    if os.access(beside if beside.exists() else HERE, os.W_OK):
+    if os.access(beside if beside.exists() else HERE, os.W_OK) or not _missing(beside, MODULES):
         return beside
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "numba"
 

@@ -19,7 +19,7 @@ import numpy as np
 from llvmlite.binding import ModuleRef, parse_bitcode
 from numba import njit, types
 from numba.core import dispatcher, environment
-from numba.core.caching import CacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.caching import CacheImpl, FunctionCache, InTreeCacheLocator, UserProvidedCacheLocator
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompileResult
 from numba.core.cpu import CPUContext
@@ -27,6 +27,8 @@ from numba.core.runtime import rtsys
 from numba.core.typing import Signature
 from numba.extending import typeof_impl
 from numba.np.numpy_support import from_dtype, map_layout
+
+from roboglot.kernels import ahead  # is in no kernel: a change of it compiles none anew
 
 F = TypeVar("F", bound=Callable[..., object])
 CHECKED = "python"  # error model of kernels that raise ZeroDivisionError
@@ -69,6 +71,15 @@ class ReadableFolder(UserProvidedCacheLocator):
     def ensure_cache_path(self) -> None:
         """Raise OSError if the folder is not there and cannot be made; called by Numba."""
         Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
+
+
+class BesideSources(InTreeCacheLocator):
+    """Locates kernels beside their sources where ``ahead`` finds them, even if they cannot be written there."""
+
+    def ensure_cache_path(self) -> None:
+        """Raise OSError if they are elsewhere; called by Numba."""
+        if Path(self.get_cache_path()) != ahead.cache_folder():
+            raise FileNotFoundError(self.get_cache_path())
 
 
 class LeanCache(FunctionCache):
@@ -115,4 +126,4 @@ _rebuild_env.__module__ = environment.__name__  # pickles name Numba's
 vars(environment)["_rebuild_env"] = _rebuild_env
 JITCPUCodegen._library_class = LeanLibrary
 vars(dispatcher)["FunctionCache"] = LeanCache
-CacheImpl._locator_classes.insert(0, ReadableFolder)
+CacheImpl._locator_classes[:0] = [ReadableFolder, BesideSources]
