@@ -73,6 +73,25 @@ def test_kernels_are_recompiled_when_their_source_is_newer(clone: Path) -> None:
     assert "compiling the numeric kernels" in done.stderr
 
 
+@pytest.mark.parametrize("called", ["./scripts/run", "bash run", "sh scripts/run", "../robot", "bash ../robot"])
+def test_start_works_however_it_is_called(clone: Path, called: str) -> None:
+    (clone / "scripts/run").write_bytes((ROOT / "scripts/run").read_bytes())
+    (clone / "scripts/run").chmod(0o755)
+    (clone.parent / "robot").symlink_to(clone / "scripts/run")
+    (clone / ".venv/bin/roboglot").write_text('#!/bin/sh\necho "$@"\n')
+    (clone / ".venv/bin/roboglot").chmod(0o755)
+    (clone / ".venv/stamp-run").write_bytes(bootstrap.stamp(clone, "run"))
+    folder = clone / "scripts" if called == "bash run" else clone
+    command = [*called.split(), "--world", "my yard"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=180)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "up --world my yard\n", "")
+
+
+def test_every_script_finds_the_others_through_a_link() -> None:
+    texts = [path.read_text("utf-8") for path in (ROOT / "scripts").iterdir() if path.is_file()]
+    assert not [text for text in texts if '"${BASH_SOURCE[0]%/*}/environment"' in text]
+
+
 @pytest.mark.parametrize("status", [130, 1])
 def test_ctrl_c_while_kernels_compile_starts_no_robot(clone: Path, status: int) -> None:
     (clone / ".venv/bin/python").unlink()

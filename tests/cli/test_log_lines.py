@@ -115,7 +115,7 @@ def test_unusable_data_folder_is_one_sentence(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "roboglot", "up", "--data", str(folder := tmp_path / "file/data")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
     assert done.returncode == 1
-    assert done.stderr == f"roboglot up: {folder}: Not a directory\n"
+    assert done.stderr == f"roboglot up: {folder}: Not a directory; choose another folder with --data\n"
 
 
 def test_running_out_of_files_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:

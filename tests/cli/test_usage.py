@@ -1,9 +1,12 @@
 """Usage of the command, however it is called, and readers of its output that go."""
 
 import gc
+import os
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import click
 import pytest
@@ -89,6 +92,12 @@ def test_misspelt_option_before_any_command_is_no_command(monkeypatch: pytest.Mo
     monkeypatch.setattr(sys, "argv", ["roboglot", "--versoin"])  # codespell:ignore
     with pytest.raises(SystemExit, match=r"there is no option '--versoin'; did you mean '--version'\?"):
         cli.main()
+
+
+@pytest.mark.parametrize(("free", "words"), [(15, "the disk is full"), (16, "disk I/O error")])
+def test_full_disk_is_named(free: int, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "statvfs", lambda _: Mock(f_bavail=free, f_frsize=4096))
+    assert up._why(sqlite3.OperationalError("disk I/O error"), tmp_path) == words
 
 
 def test_a_robot_is_given_once() -> None:

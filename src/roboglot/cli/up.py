@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from roboglot.runtime import Runtime
 
 STANDARD_INPUT = 0
+DATABASE_MIN = 1 << 16  # bytes of free disk without which it cannot be opened
 LINE_MAX = 64  # bytes per line of standard input in lockstep
 FILE_MAX = 1 << 20  # bytes of a file in its place
 STEP_MAX = 86_400.0  # s that one line may advance
@@ -208,7 +209,7 @@ async def _serve(config: Config, *, open_console: bool) -> int:
     except (FolderInUse, ValueError, OSError) as error:
         return _failed(open_files.in_words() if open_files.ran_out(error) else in_words(error))
     except sqlite3.Error as error:
-        return _failed(f"the database in {config.data} can't be used: {error}")
+        return _failed(f"the database in {config.data} can't be used: {_why(error, config.data)}")
     from roboglot.model.errors import RobotError
 
     try:
@@ -247,6 +248,12 @@ def _failed(why: str) -> int:
     """Print why the program ends; return its exit status."""
     print(f"roboglot up: {why}", file=sys.stderr)
     return 1
+
+
+def _why(error: sqlite3.Error, folder: Path) -> str:
+    """Return why the database cannot be used; SQLite calls a full disk an I/O error."""
+    disk = os.statvfs(folder)
+    return "the disk is full" if disk.f_bavail * disk.f_frsize < DATABASE_MIN else str(error)
 
 
 async def _step(clock: LockstepClock) -> None:
