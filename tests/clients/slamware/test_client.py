@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
-from roboglot.clients.slamware import ActionAborted, ActionFailed, SlamwareClient, SlamwareRefused
+from roboglot.clients.slamware import ActionAborted, ActionFailed, SlamwareClient, SlamwareRefused, http
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.server import SlamwareDoor
@@ -21,6 +21,7 @@ from roboglot.wire.slamware.chapters.motion import (
     MoveOptions,
     MoveToOptions,
 )
+from roboglot.wire.slamware.chapters.slam.stcm import MAP_BYTES_MAX
 from roboglot.wire.slamware.geometry import Location
 
 Reply = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
@@ -153,6 +154,17 @@ async def test_bad_answers_are_reported_and_nothing_hangs(
 ) -> None:
     client = await fake(answering(data))
     with pytest.raises(error):
+        await client.get_pose()
+
+
+async def test_an_answer_is_no_longer_than_map(
+    fake: Callable[[Reply], Awaitable[SlamwareClient]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Six answers are kept at once, and a hostile robot's have no end."""
+    assert http.BODY_MAX == MAP_BYTES_MAX
+    monkeypatch.setattr(http, "BODY_MAX", 1000)
+    client = await fake(answering(JSON % (1 << 40, b" " * 1001)))
+    with pytest.raises(BadAnswer, match="more than 1000 bytes"):
         await client.get_pose()
 
 

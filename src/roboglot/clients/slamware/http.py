@@ -19,7 +19,7 @@ from roboglot.values import dataclass
 
 CONNECTIONS_MAX = 6
 HEAD_MAX = 32 * 1024  # bytes of an answer's status line and headers
-BODY_MAX = 256 << 20  # bytes of an answer's body
+BODY_MAX = 64 << 20  # bytes of an answer's body, each of six at once: the longest composite map
 CONNECT_SECONDS_MAX = 3.0
 
 
