@@ -149,10 +149,14 @@ def _bounded(floors: Iterable[FloorMap]) -> list[FloorMap]:
     for floor in floors:
         notes = floor.annotations
         count += sum(map(len, (notes.lines, notes.areas, notes.docks, notes.landmarks, floor.places)))
-        if count > DRAWN_MAX:
-            raise BadMap(f"more than {DRAWN_MAX} places, lines and areas")
+        _check_count(count)
         read.append(floor)
     return read
+
+
+def _check_count(count: int) -> None:
+    if count > DRAWN_MAX:
+        raise BadMap(f"more than {DRAWN_MAX} places, lines and areas")
 
 
 def _floor_name(building: str, floor: str, order: str, default: str) -> FloorName:
@@ -182,6 +186,8 @@ def _read(name: FloorName, layers: Sequence[Layer]) -> FloorMap:
             landmarks += [_mark(m.id, Pose(m.x, m.y, m.yaw), m.metadata) for m in known]
         else:
             unknown.append(layer)
+        drawn = len(lines) + len(areas) + len(landmarks) + sum(map(len, marks.values()))
+        _check_count(drawn)  # at once: a file may have 1000 layers
     notes = Annotations(docks=tuple(marks[stcm_layers.DOCKS]), landmarks=tuple(landmarks)).with_new(*lines, *areas)
     return FloorMap(name, grid, notes, tuple(marks[stcm_layers.PLACES]), tuple(unknown))
 

@@ -54,7 +54,7 @@ class MapKeeper:
 
     def __init__(self, robot: Robot, cloud: CloudFolder, synced: Callable[[], None]) -> None:
         self._robot, self._cloud, self._synced = robot, cloud, synced
-        self._turn = asyncio.Lock()
+        self._turn, self._parsing = asyncio.Lock(), asyncio.Lock()
         self._loading = False
         self._layers: tuple[Layer, ...] = ()  # of the map in memory, of unknown type
         self.status = MapLoadStatus.NOT_LOADED
@@ -203,10 +203,11 @@ class MapKeeper:
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
 
     async def _parse(self, data: bytes) -> list[FloorMap]:
-        """Return the floors in a file, in a thread: a hostile file may take seconds."""
+        """Return the floors in a file, in a thread: a hostile file may take seconds, and 300 MB; so one at a time."""
         if isinstance(self._robot.clock, LockstepClock):
             return _parsed(data)
-        return await asyncio.to_thread(_parsed, data)
+        async with self._parsing:
+            return await asyncio.to_thread(_parsed, data)
 
     async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[object, None, None]) -> None:
         """Load the grid into memory, call ``draw`` for its drawings, and set the robot's pose, else at its dock."""
