@@ -37,7 +37,7 @@ async def main():
     await door.start()
     door.subscribe(lambda text: print(text, flush=True))
     for operate, fields in (
-        ("save", {"mode": "single", "condition": "now", "body": "print('begun')\\nwhile True: pass"}),
+        ("save", {"mode": "single", "condition": "now", "body": "print('begun')\\ntime.sleep(1e5)"}),
         ("run", {}),
         ("suspend", {}),
         ("recover", {}),

@@ -21,7 +21,7 @@ FOREVER = "time.sleep(100000)\n"
 
 
 async def test_lost_client_does_not_leave_half_an_operation(app: FrontEnd) -> None:
-    await app.save("t", BUSY)
+    await app.save("t", FOREVER)
     frame = json.dumps({"type": "task", "id": "x", "operate": "run", "target_id": ["t"]})
     request = asyncio.create_task(app.door.receive(frame))
     await asyncio.sleep(0)
@@ -42,7 +42,7 @@ async def test_the_state_is_stored_before_it_is_reported(connect: Connect, plain
         reported.append((feedback["operate"], found[0] if found else "null"))
 
     app.door.subscribe(note)
-    await app.start("t", BUSY)
+    await app.start("t", FOREVER)
     for operation in ("suspend", "recover", "shutdown", "delete"):
         await app.ask(operation, "t")
     reader.close()

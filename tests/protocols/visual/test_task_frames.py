@@ -219,7 +219,7 @@ async def test_a_line_ends_where_the_program_ends_it(app: FrontEnd) -> None:
 
 
 async def test_running_tasks_report_their_use(app: FrontEnd) -> None:
-    await app.start("t", "x = bytearray(20_000_000)\nprint('ready')\nwhile True: pass")
+    await app.start("t", "x = bytearray(20_000_000)\nfor n in range(2_000_000): pass\ntime.sleep(1e5)")
     await app.until(lambda: app.service.running()[0].cpu > 0.02 and app.service.running()[0].memory > 20_000_000)
     [figures] = app.service.running()
     assert (figures.target_id, figures.state) == ("t", "run")

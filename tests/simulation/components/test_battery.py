@@ -118,10 +118,10 @@ async def test_a_full_discharge_is_the_capacity(simulate):
 
 async def test_every_percent_is_reported(simulate):
     sim = simulate(start=Pose(5, 5))
-    sim.robot[Battery].set_charge(0.905)
+    sim.robot[Battery].set_charge(0.9005)
     events = sim.robot.events.subscribe(BatteryChanged)
     sim.world.start()
-    await sim.clock.advance(180.0)  # 12 W of 100 Wh: a percent in some 320 s
+    await sim.clock.advance(30.0)  # 12 W of 100 Wh: a percent in some 320 s
     assert [round(e.percentage, 3) for e in events.drain()] == [0.9]
 
 
@@ -148,9 +148,14 @@ async def test_empty_battery_stops_robot_until_it_is_charged(simulate):
     await sim.clock.advance(0.1)
     with pytest.raises(Refused, match="empty"):
         sim.robot[Base].set_velocity(Twist(0.5))
+    battery.set_charge(0.018)
     sim.world.hands.place("a", Pose(0.37, 5.0))
-    await sim.clock.advance(180.0)
+    await sim.clock.advance(1.0)
     assert battery.state.charging
+    with pytest.raises(Refused, match="empty"):
+        sim.robot[Base].set_velocity(Twist(0.5))
+    await sim.clock.advance(25.0)
+    assert battery.charge > 0.02
     sim.robot[Base].set_velocity(Twist(0.5))
 
 

@@ -4,6 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
+from msgspec import structs
 
 from roboglot.model.components.interaction.armor import Armor, HitKind, PlatePlace
 from roboglot.model.components.interaction.blaster import Blaster
@@ -123,8 +124,10 @@ async def test_beads_left_are_kept_when_it_ceases(duel):
 
 async def test_an_empty_magazine_is_reported(duel):
     blaster = duel.robot[Blaster]
+    blaster._section = structs.replace(blaster._section, magazine=24)
+    blaster.reload()
     blaster.set_beads(8)
-    for _ in range(125):
+    for _ in range(3):
         blaster.fire()
         await duel.clock.advance(1.1)
     assert blaster.ammo == 0
