@@ -52,7 +52,7 @@ class Belief:
     lost: LostReason | None = None  # why the pose in the map is unknown
     confirmed: bool = True  # whether scans have confirmed a pose that was set, or found after a displacement
     contradicted: bool = False  # whether odometry that is believed contradicts the newest scan
-    denied: bool = False  # whether the map contradicts it
+    denied: bool = False  # whether the map contradicts it, or contradicted one since which none has fitted well
     compared_at: float = -math.inf  # robot time at which the newest scan that was compared with the map began
     asked: bool = False  # compare the next scan, even if the robot stands
     slipped: float = 0.0  # m of wheel slip that scans have shown so far

@@ -22,6 +22,7 @@ DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # contradiction by the map: agreement
 DENIED_HIDDEN = 0.2  # … or share of rays through walls, which no crowd explains
 GOOD_AGREEMENT, GOOD_SHARE = 0.8, 0.6  # confirmation by the map
 DOUBTS_MAX, DOUBT_SECONDS = 3, 1.5  # contradictions in a row, and their duration, before the pose is lost
+POOR_AGREEMENT, POOR_SECONDS = 0.7, 5.0  # after a contradiction, a fit that stays below for so long: the pose is lost
 CONFIRMED = 5  # confirmations in a row before the pose is known again
 BLIND_SECONDS, BLIND_INTERVALS = 2.0, 5.0  # s without a scan, and in usual intervals, from which the pose is uncertain
 INTERVAL_GAIN = 0.1
@@ -38,6 +39,7 @@ class Whereabouts:
         self._heard_at = -math.inf
         self._doubts = self._good = 0
         self._doubted_at = self._lost_at = math.inf
+        self._poor_since = math.inf  # s: since when scans fit poorly, from a contradiction on
         self._given_at = -math.inf  # s: since when a pose is unconfirmed, set by a client or found after a displacement
         self._elsewhere = False  # whether a search found several places, none of them near the believed one
         self.sure = True  # whether scans may be added to the map
@@ -71,7 +73,7 @@ class Whereabouts:
         self._good = self._good + 1 if good else 0
         self._belief.denied = denied
         if denied:
-            self._doubted_at = min(self._doubted_at, stamp)
+            self._doubted_at, self._poor_since = min(self._doubted_at, stamp), min(self._poor_since, stamp)
             self._doubts += 1
             self.sure = False
             if self._doubts >= DOUBTS_MAX and stamp - self._doubted_at >= DOUBT_SECONDS:
@@ -80,6 +82,9 @@ class Whereabouts:
             return
         self._doubts, self._doubted_at = 0, math.inf
         new_ground = judged < DENIED_SHARE * support.points
+        if new_ground or support.agreement >= POOR_AGREEMENT:
+            self._poor_since = math.inf
+        self._belief.denied = math.isfinite(self._poor_since)
         if self._good >= CONFIRMED and not self._belief.confirmed:
             self._belief.confirmed = True
             self._events.publish(PoseConfirmed(stamp=stamp, pose=self._belief.pose))
@@ -88,6 +93,8 @@ class Whereabouts:
                 self.find(RecoveryMeans.NEARBY, stamp)
         elif not self._belief.confirmed and stamp - self._given_at >= DOUBT_SECONDS:
             self.lose(LostReason.NO_GROUND if new_ground else LostReason.NO_FIT, stamp)
+        elif stamp - self._poor_since >= POOR_SECONDS:
+            self.lose(LostReason.NO_FIT, stamp)
         elif not self.sure and self._belief.confirmed and (new_ground or self._good >= CONFIRMED):
             self.sure = True
 
@@ -112,7 +119,8 @@ class Whereabouts:
     def find(self, means: RecoveryMeans, stamp: float) -> None:
         """Note that the pose is known; scans are added to the map after further confirmations."""
         belief = self._belief
-        self._doubts, self._doubted_at, belief.confirmed, self._elsewhere = 0, math.inf, True, False
+        self._doubts, belief.confirmed, self._elsewhere = 0, True, False
+        self._doubted_at = self._poor_since = math.inf
         if belief.lost is None:
             return
         belief.lost, self._good = None, 0
@@ -130,7 +138,8 @@ class Whereabouts:
 
     def begin(self) -> None:
         """Begin a new map, whose first scan defines the pose."""
-        self._doubts, self._doubted_at, self.sure, self._belief.confirmed = 0, math.inf, True, True
+        self._doubts, self.sure, self._belief.confirmed = 0, True, True
+        self._doubted_at = self._poor_since = math.inf
         self._elsewhere = False
 
 
