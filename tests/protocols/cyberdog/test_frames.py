@@ -19,6 +19,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.model.robot import Robot
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.stores import StoredProgram
+from roboglot.programs.tasks import call_time
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.frame_queue import ALONE, NEWS_MAX, ROOM, Delivery, FrameQueue
@@ -75,8 +76,10 @@ async def phone(
     pems: Pems,
     messages: Messages,
     passing: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> AsyncIterator[Phone]:
-    """A phone whose app is connected to a robot that runs programs."""
+    """A phone whose app is connected to a robot that runs programs; their calls wait for the phone alone."""
+    monkeypatch.setattr(call_time, "INSTANT_MAX", 1_000_000)  # time stands still here
     robot = walker[1]
     async with contextlib.AsyncExitStack() as stack:
         database = Database(":memory:")
