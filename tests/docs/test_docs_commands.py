@@ -44,6 +44,8 @@ def made(name: str) -> Any:
 def refusal(arguments: str, full: bool = True) -> str:
     """Return why the command line does not take this; "" if it does."""
     name, *rest = shlex.split(re.sub(r"[…\[\]]", "", arguments))
+    if name == "help":
+        return refusal(" ".join(rest) if rest and rest != ["COMMAND"] else "--help", full)
     if name not in COMMANDS:
         return "" if name in ("--help", "--version") else f"there is no command {name!r}"
     command: Any = made(name)
@@ -67,6 +69,8 @@ def test_a_misspelt_command_is_found() -> None:
     assert "--rigths" in refusal("access add x --rigths drive")
     assert "foo" in refusal("program foo")
     assert "no command" in refusal("upp")
+    assert "no command" in refusal("help upp")
+    assert not refusal("help up")
     assert not refusal("up --robot a=hermes --lockstep")
 
 

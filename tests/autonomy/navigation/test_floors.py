@@ -28,7 +28,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.errors import Blocked, InvalidGoal, Refused
-from roboglot.model.events import ActionChanged
+from roboglot.model.events import ActionChanged, FloorReached
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.components.sensing.lidar import SimulatedLidar
@@ -147,6 +147,35 @@ async def test_ride_in_lift_that_leaves_fails(tour: Tour, monkeypatch: pytest.Mo
     action = await tour.end_of(tour.robot[Floors].ride(1), 400.0)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert tour.world.truth.floor_of("a") == 1
+
+
+async def test_ride_given_up_in_the_car(tour: Tour) -> None:
+    floors, reached = tour.robot[Floors], list[int]()
+    say_where_the_lift_is(tour)
+    tour.robot.events.listen(FloorReached, lambda event: reached.append(event.floor))
+    await tour.go((2.7, 10.0), deg=180)
+    downstairs = tour.robot[Mapping].grid
+    action = floors.ride(1)
+    await tour.until(lambda: action.feedback is RideStage.RIDING, 400.0)
+    await tour.clock.advance(4.0)
+    action.cancel("the client thinks better of it")
+    lift = known(tour.world.building.lift)
+    await tour.until(lambda: lift.floor == 1 and lift.rests, 60.0)
+    await tour.clock.advance(1.5)
+    assert action.status is ActionStatus.CANCELED
+    assert tour.world.truth.floor_of("a") == floors.current == 1
+    assert agreement(downstairs, tour.robot[Mapping].grid) < 0.5
+    lift.call(2)
+    await tour.until(lambda: lift.floor == 2 and lift.rests, 60.0)
+    await tour.clock.advance(1.5)
+    assert (reached, floors.current) == ([1, 2], 2)
+    action = await tour.end_of(floors.ride(0), 400.0)
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert tour.world.truth.floor_of("a") == floors.current == 0
+    assert tour.robot[Mapping].enabled
+    await tour.clock.advance(2.0)
+    assert tour.error[0] < 0.05
+    assert agreement(downstairs, tour.robot[Mapping].grid) > 0.95
 
 
 async def test_covered_lidar_is_no_free_way(tour: Tour) -> None:

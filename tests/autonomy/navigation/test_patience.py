@@ -75,7 +75,9 @@ def replanning(tuning: PilotTuning, *, leaves: float | None = None, turning: flo
         robot=SimpleNamespace(clock=LockstepClock(), events=SimpleNamespace(listen=lambda *_: lambda: None)),
         tuning=tuning,
         belief=SimpleNamespace(pose=Pose()),
-        traffic=SimpleNamespace(is_closed_by_others=lambda *_, **__: leaves is not None, leaves=lambda _: leaves),
+        traffic=SimpleNamespace(
+            is_blocked_by_others=lambda *_, **__: leaves is not None, seconds_until_clear=lambda _: leaves
+        ),
     )
     lookout: Any = SimpleNamespace(
         blocked=True,

@@ -5,6 +5,7 @@ Those of other floors are kept on disk, too, and are restored after a restart wh
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import math
 from functools import partial
@@ -27,7 +28,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.errors import Blocked, Expired, InvalidGoal, Refused, RobotError
-from roboglot.model.events import MapReplaced, PoseJumped
+from roboglot.model.events import FloorReached, MapReplaced, PoseJumped
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -43,6 +44,7 @@ MOUTH = 1.5  # m in front of the waiting place that robots in a queue leave free
 BESIDE, LINE = 0.3, 0.2  # m … between two hulls, and m between its points
 LOOKS = 1.0  # s until some scans have shown what stands around
 TRIP_MAX = 10.0  # m between the waiting place and the car
+STAY_PERIOD = 0.5  # s between two looks at a car in which the ride was given up
 
 
 class LiftFloors(Floors):
@@ -54,6 +56,8 @@ class LiftFloors(Floors):
         self._others = StoreyShelf(robot)
         self._current = 0
         self._places: tuple[Pose, Pose] | None = None  # the waiting place, and the place inside the car
+        self._stay: asyncio.Task[None] | None = None  # in the car, after a ride that was given up there …
+        self._maps_outside = False  # … and that the robot mapped before
 
     @property
     def current(self) -> int:
@@ -131,7 +135,7 @@ class LiftFloors(Floors):
             action.report(RideStage.CALLING)
             await self._comes(self._current)
             await mine.may_board()
-        mapped = belief.mapping
+        mapped, start = self._end_stay(), self._current
         belief.mapping = False  # doors open and close, and the car belongs to no floor
         try:
             action.report(RideStage.BOARDING)
@@ -143,11 +147,42 @@ class LiftFloors(Floors):
                 await self._change_to(floor, redraw)
             action.report(RideStage.LEAVING)
             await self._through(self._places[0], backwards=True)
+        except BaseException:
+            if self._is_aboard or self._current != start:
+                stay = self._stay_aboard(start, redraw)
+                self._stay = asyncio.get_running_loop().create_task(stay, name=f"{self.robot.id} is in the lift")
+                self._maps_outside, mapped = mapped, False
+            raise
         finally:
             belief.mapping = mapped
         with contextlib.suppress(Refused):  # the robot is where it wanted to be, and a door closes by itself
             lift.close_door()
         action.report(RideStage.ARRIVED)
+
+    async def _stay_aboard(self, start: int, redraw: bool) -> None:
+        """Change floors with a car in which a ride from ``start`` was given up, until the robot is outside."""
+        lift, clock, known = self.robot[LiftClient], self.robot.clock, start
+        while True:
+            with contextlib.suppress(Refused):  # out of reach
+                state = lift.state
+                if self._is_aboard and state.target is None and state.floor != self._current:
+                    await self._change_to(state.floor, redraw)
+            if self._current != known:
+                assert self._places is not None
+                known, place = self._current, self.belief.pose.relative_to(self._places[1])
+                self.robot.events.publish(FloorReached(stamp=clock.time(), floor=known, place=place))
+            if not self._is_aboard:
+                break
+            await clock.sleep(STAY_PERIOD)
+        self.belief.mapping = self._end_stay()
+
+    def _end_stay(self) -> bool:
+        """End a stay in the car; return whether the robot maps outside."""
+        if self._stay is not None and self._stay is not asyncio.current_task():
+            self._stay.cancel()
+        maps = self.belief.mapping or self._maps_outside
+        self._stay, self._maps_outside = None, False
+        return maps
 
     async def _comes(self, floor: int) -> None:
         """Call the lift, or ride, to ``floor``; return when its door is open there. Raises Refused, Expired."""

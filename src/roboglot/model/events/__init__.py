@@ -5,6 +5,7 @@ from roboglot.model.events.equipment import BeadFired, BoxChanged, JackChanged, 
 from roboglot.model.events.lift import LiftArrived, LiftCalled, LiftDoorClosed, LiftDoorOpened, LiftFailed
 from roboglot.model.events.mapping import (
     AnnotationsChanged,
+    FloorReached,
     LocalizationLost,
     LocalizationRecovered,
     LoopClosed,
@@ -90,6 +91,7 @@ __all__ = [
     "FaultCleared",
     "FaultRaised",
     "FirmwareChanged",
+    "FloorReached",
     "GearChanged",
     "JackChanged",
     "LiftArrived",

@@ -91,6 +91,17 @@ class MapReplaced(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FloorReached(Event):
+    """The lift has brought the robot to another floor, counted from 0, though its ride was given up.
+
+    ``place``: of base_link in the frame of its place in the car, on the floor's map, which is in use.
+    """
+
+    floor: int
+    place: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LoopClosed(Event):
     """The robot knew a place again after a long way and straightened the map; ``shift``: m its own place moved by.
 

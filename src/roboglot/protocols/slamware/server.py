@@ -21,6 +21,7 @@ from roboglot.protocols.slamware.chapters.delivery.voice import Voice
 from roboglot.protocols.slamware.chapters.firmware.updater import Updater
 from roboglot.protocols.slamware.chapters.motion.action_book import ActionBook
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
+from roboglot.protocols.slamware.chapters.motion.given_up_rides import GivenUpRides
 from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
 from roboglot.protocols.slamware.chapters.multi_floor.floor_maps import LoadedStoreys
 from roboglot.protocols.slamware.chapters.platform.event_log import EventLog
@@ -66,6 +67,7 @@ class SlamwareDoor:
             PoiShifts(robot),
             cloud,
         )
+        self._rides = GivenUpRides(self._context)
         self._browsers = Browsers("[slamware]", config.origins, config.hosts)
         self._application = Application(self._context, self._browsers)
         self._gate = Gate(robot.admission, tls)
@@ -89,6 +91,7 @@ class SlamwareDoor:
             context.totals,
             context.boxes,
             context.shifts,
+            self._rides,
             self._voice,
         ):
             part.start()
@@ -184,6 +187,7 @@ class SlamwareDoor:
             context.boxes,
             context.shifts,
             context.cloud,
+            self._rides,
             self._voice,
         ):
             part.close()

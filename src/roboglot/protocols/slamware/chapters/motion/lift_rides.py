@@ -14,6 +14,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, RobotError, Unreachable
 from roboglot.model.geometry import Point, Pose, wrap_angle
+from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
 from roboglot.protocols.slamware.chapters.motion.home_docks import NAME
 from roboglot.protocols.slamware.chapters.motion.homing import head_home
@@ -112,24 +113,24 @@ async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> Non
     if floor.name == context.maps.current:
         return
     robot, maps = context.robot, context.maps
-    here, there = elevators_here(robot), elevators_of(floor.annotations)
-    shared = [(a, b) for a in here for b in there if a.id == b.id]
+    shared = shared_elevators(robot, floor)
     if not shared or Floors not in robot:
         raise Unreachable(f"no elevator leads from {maps.current.floor} to {floor.name.floor}")
     lift, landing = shared[0]
-    floors, goal = robot[Floors], _stop(context, floor.name)
-    floors.begin_on(_stop(context, maps.current))
+    floors, goal = robot[Floors], stop_at(context, floor.name)
+    floors.begin_on(stop_at(context, maps.current))
     floors.set_lift(lift.waiting(), lift.inside)
-    try:
-        await errand.do(floors.ride(goal, redraw=False, source=PART))  # ``enter`` does this for both floors
-    except RobotError:
-        if floors.current == goal:  # it is in the car on the goal's floor
-            await maps.enter(floor.name.building, floor.name.floor, landing.inside)
-        raise
+    await errand.do(floors.ride(goal, redraw=False, source=PART))  # ``enter`` does this for both floors
     await maps.enter(floor.name.building, floor.name.floor, landing.waiting())
 
 
-def _stop(context: Context, name: FloorName) -> int:
+def shared_elevators(robot: Robot, floor: FloorMap) -> list[tuple[Elevator, Elevator]]:
+    """Return the elevators that stop here and at ``floor``, as drawn on both maps."""
+    here, there = elevators_here(robot), elevators_of(floor.annotations)
+    return [(a, b) for a in here for b in there if a.id == b.id]
+
+
+def stop_at(context: Context, name: FloorName) -> int:
     """Return the lift's number for a floor: by name, else by its order among the loaded floors."""
     stops = context.robot[LiftClient].floors
     if name.floor in stops:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 
-from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import MapMemory
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import RobotError
@@ -22,7 +22,7 @@ class Clearing:
 
     def __init__(self, robot: Robot, move: Callable[[Pose], Awaitable[None]]) -> None:
         self._robot, self._move = robot, move
-        self._waited_for = False  # this door clears the map, and waits for the drawings
+        self._waited_for = False  # this door clears the map, and moves the drawings itself
         self._moving: asyncio.Task[None] | None = None
         self._end_watch: Callable[[], None] | None = None
 
@@ -38,15 +38,14 @@ class Clearing:
         if self._moving is not None:
             await asyncio.wait([self._moving])
 
-    async def clear(self) -> None:
-        """Clear the map and begin a new one where the robot is; return once the drawings are on it."""
-        origin = self._robot[Localization].pose
+    @contextmanager
+    def by_this_door(self) -> Iterator[None]:
+        """Leave the drawings to the caller, who clears the map meanwhile."""
         self._waited_for = True
         try:
-            self._robot[Mapping].clear()
+            yield
         finally:
             self._waited_for = False
-        await self._move(origin)
 
     def _replaced(self, event: MapReplaced) -> None:
         origin = event.origin

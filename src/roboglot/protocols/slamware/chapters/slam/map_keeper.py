@@ -227,6 +227,13 @@ class MapKeeper:
         if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
             self._robot[Localization].set_pose(dock.pose if is_docked(self._robot) else before(dock))
 
+    async def clear(self) -> None:
+        """Clear the map and begin a new one where the robot is; return once the drawings are on it."""
+        origin = self._robot[Localization].pose
+        with self.clearing.by_this_door():
+            self._robot[Mapping].clear()
+        await self._on_map_cleared(origin)
+
     async def _on_map_cleared(self, origin: Pose) -> None:
         """Handle the clearing of memory's grid: its origin is now at ``origin``, from which drawings are given.
 

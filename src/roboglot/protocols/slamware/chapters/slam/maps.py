@@ -76,7 +76,7 @@ async def clear_map(context: Context) -> None:
     origin = context.robot[Localization].pose
     if MapAnnotations in context.robot and Places in context.robot:
         _check_reach(Pose(p.x, p.y).relative_to(origin).point for p in _drawn(context.robot))
-    await context.maps.clearing.clear()
+    await context.maps.clear()
 
 
 @TABLE.on(f"PUT {API}/maps/origin", right=Right.EDIT, needs=(MapAnnotations, MapMemory, Mapping, Places, Settings))
