@@ -1,1 +1,1 @@
-"""One robot, every protocol: a robot runtime that speaks four vendors' protocols at once."""
+"""One robot, every protocol: a robot runtime that speaks the protocols of Slamtec, DJI and Xiaomi at once."""

@@ -1,4 +1,4 @@
-"""The demo: four vendors' clients drive one robot, and all four say the same of where it is."""
+"""The demo: four independent clients drive one robot, and all four say the same of where it is."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 COMMANDS = {
     "up": "start the robots with all their doors",
     "fleet": "run many worlds, each in a separate process",
-    "demo": "let four vendors' clients drive one robot, and draw a picture of it",
+    "demo": "let four independent clients drive one robot, and draw their tracks on its map",
     "coverage": "show how much of each protocol is implemented",
     "capabilities": "show what each protocol can do on each kind of robot",
     "scan": "find robots on the network and show how to connect to them",

@@ -1,4 +1,4 @@
-"""``roboglot demo``: four vendors' clients drive one robot, and a picture of it."""
+"""``roboglot demo``: four independent clients drive one robot, and a picture of their tracks."""
 
 from __future__ import annotations
 
