@@ -103,7 +103,7 @@ def rotate(name: Name, data: Data = None, database: Database = "") -> None:
 
 @app.command(name="list")
 def list_all(data: Data = None, database: Database = "") -> None:
-    """List identities and their rights."""
+    """List accounts and addresses with their rights."""
     from rich.console import Console
     from rich.table import Table
 

@@ -30,7 +30,13 @@ if TYPE_CHECKING:
     from roboglot.shards.plan import FleetPlan
     from roboglot.shards.requests import Answer, Row, Verb
 
-app = typer.Typer(cls=Group, add_completion=False, pretty_exceptions_enable=False, no_args_is_help=True)
+app = typer.Typer(
+    cls=Group,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    help="Run many worlds on this machine or on several, each in a process of its own (a shard).",
+)
 PATIENCE = 120.0  # s for a request; stopping and starting 100 shards takes a while
 MEGABYTE = 1 << 20
 LINES_MAX = 100_000
@@ -166,7 +172,7 @@ def restart(
 
 @app.command()
 def reset(shard: Annotated[str, typer.Argument(help="A shard, or one of its robots.")], data: Data = None) -> None:
-    """Restart a shard empty: programs, maps and places of its robots are deleted."""
+    """Restart a shard empty: programs, maps, places and certificates of its robots are deleted."""
     _print(_ask("reset", data, shard=shard), shard)
 
 

@@ -21,7 +21,7 @@ def command(
     ] = None,
     token_file: Annotated[Path | None, typer.Option(help="A file with the token; else ROBOGLOT_TOKEN.")] = None,
 ) -> None:
-    """Serve the tools until the agent disconnects."""
+    """Offer the robots of a console as tools to an agent, over MCP, until it disconnects."""
     try:
         token = named_text_of(token_file) if token_file else os.environ.get("ROBOGLOT_TOKEN", "")
     except (OSError, ValueError) as error:

@@ -64,7 +64,7 @@ def command(
         int | None, typer.Option(envvar="ROBOGLOT_SEED", help="Seed of all random numbers in the world.")
     ] = None,
     data: Annotated[
-        Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for programs, places, certificates.")
+        Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for maps, places, programs and certificates.")
     ] = None,
     registry: Annotated[
         str | None,

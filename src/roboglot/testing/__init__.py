@@ -2,6 +2,7 @@
 
 Installed with the package as a pytest plugin::
 
+    @pytest.mark.asyncio
     @pytest.mark.world("office")            # or "empty", or a path; this is the default
     async def test_drives(robot, world, forward):
         robot[Driving].move_by(Pose(x=1.0))
