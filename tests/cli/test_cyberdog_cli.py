@@ -13,6 +13,7 @@ from urllib.request import urlopen
 
 import pytest
 
+from roboglot.cli import cyberdog
 from roboglot.testing.addresses import free_addresses, free_port
 from roboglot.testing.process import served
 
@@ -56,6 +57,16 @@ def test_status_is_json(run: Run) -> None:
 def test_a_photo_is_left_here(run: Run, tmp_path: Path) -> None:
     run("photo", "door.jpg", cwd=str(tmp_path))
     assert (tmp_path / "door.jpg").read_bytes()[:2] == b"\xff\xd8"
+
+
+def test_hostile_robot_does_not_place_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.jpg").write_text("mine")
+    assert cyberdog._here("20261128_120000.jpg") == "20261128_120000.jpg"
+    assert cyberdog._here("/etc/cron.d/x.jpg") == cyberdog._here("..\\..\\x.jpg") == "x.jpg"
+    for name in ("", "..", "/etc/", ".bashrc", "a/.bashrc", "x\x1b[2J.jpg", "mine.jpg", "there/mine.jpg"):
+        with pytest.raises(OSError, match="the robot calls the file"):
+            cyberdog._here(name)
 
 
 def test_photo_that_cannot_be_written_is_not_taken(run: Run, tmp_path: Path) -> None:

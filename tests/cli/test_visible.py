@@ -5,10 +5,16 @@ from __future__ import annotations
 import logging
 from xml.etree import ElementTree
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboglot import cli
+from roboglot.access.trail import Entry
+from roboglot.cli import audit
 from roboglot.hosting.escaping import VisibleFormatter, visible, xml_text
+from roboglot.recording.comparing import reports
+from roboglot.recording.comparing.comparison import Comparison, Difference, Row
 
 
 def test_controls_are_written_out_and_words_stay() -> None:
@@ -19,6 +25,20 @@ def test_controls_are_written_out_and_words_stay() -> None:
 @given(st.text())
 def test_nothing_that_drives_a_terminal_is_left(text: str) -> None:
     assert all(character in "\t\n" or character.isprintable() or ord(character) > 0x9F for character in visible(text))
+
+
+HOSTILE = "x\x1b]0;mine\x07\n9 a row of its own\x9b2J"
+
+
+def test_rows_of_commands_are_visible_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    """Names that clients, robots and files bring go through these."""
+    entry = Entry(0.0, "anna", "10.0.0.7:5", "a", HOSTILE, HOSTILE, "refused", HOSTILE)
+    differences = [Difference(HOSTILE, HOSTILE, HOSTILE)]
+    row = Row(HOSTILE, HOSTILE, 1, 1, 1, 0, differences)
+    printed = [audit._line(1, entry), *reports.table(Comparison([row])).split("\n")]
+    assert len(printed) == 5
+    assert cli._printed(SystemExit(HOSTILE)) == 1
+    assert all(line.isprintable() for line in [*printed, *capsys.readouterr().err.split("\n")])
 
 
 def test_log_lines_are_visible_too() -> None:

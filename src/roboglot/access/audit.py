@@ -16,6 +16,7 @@ from typing import NamedTuple, Protocol
 
 from roboglot.access.trail import Entry
 from roboglot.storage.transactions import DatabaseError, DiskFull
+from roboglot.transport.limiter import Limiter
 
 log = logging.getLogger(__name__)
 
@@ -23,6 +24,8 @@ WAITING_MAX = 10_000  # rows waiting to be written; beyond this they are dropped
 TOGETHER_MAX = 500  # rows per transaction
 AGAIN_SECONDS = 1.0  # between two attempts to write them
 REPEATED_WITHIN = 1.0  # s within which an equal row is counted instead of written again
+STRANGERS = "unknown clients come too often for a row each"
+STRANGERS_BURST, STRANGERS_RATE = 60, 1.0  # rows, and rows a second, of unknown clients; beyond that they share a row
 KINDS_MAX = 1024  # different rows whose repetitions are counted at the same time
 CLOSE_SECONDS = 5.0
 
@@ -51,23 +54,29 @@ class Audit:
         self._kinds: dict[tuple[str, ...], _Kind] = {}
         self._lock = threading.Lock()
         self._dropped = 0
+        self._strangers = Limiter(STRANGERS_RATE, STRANGERS_BURST, time.monotonic)
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._write, name="audit", daemon=True)
         self._thread.start()
 
     def note(self, entry: Entry) -> None:
         """Queue an entry. Equal ones within REPEATED_WITHIN are only counted: a joystick sends 50 commands a second."""
-        host = entry.address.rpartition(":")[0]  # another connection from the same host is not another kind
-        key = (entry.who, host, *entry[3:8])
         with self._lock:
+            if not entry.who and not self._is_repeated(entry) and not self._strangers.take(""):
+                entry = entry._replace(address="", door="", operation="", reason=STRANGERS)
+            key = _key(entry)
             kind = self._kinds.get(key)
-            if kind is not None and entry.at - kind.written < REPEATED_WITHIN:
+            if kind is not None and self._is_repeated(entry):
                 self._kinds[key] = _Kind(kind.written, kind.repeats + 1, entry)
                 return
             if kind is None and len(self._kinds) >= KINDS_MAX:
                 self._put_repeats(self._kinds.pop(next(iter(self._kinds))))
             self._kinds[key] = _Kind(entry.at, 0, entry)
             self._put(entry._replace(repeats=kind.repeats if kind else 0))
+
+    def _is_repeated(self, entry: Entry) -> bool:
+        kind = self._kinds.get(_key(entry))
+        return kind is not None and entry.at - kind.written < REPEATED_WITHIN
 
     def close(self) -> None:
         """Write waiting rows; the log reports rows that cannot be written in time."""
@@ -134,6 +143,11 @@ class Audit:
             else:
                 return
             last = self._closing.wait(AGAIN_SECONDS)
+
+
+def _key(entry: Entry) -> tuple[str, ...]:
+    """Return what equal entries share: another connection from the same host makes no other kind."""
+    return entry.who, entry.address.rpartition(":")[0], *entry[3:8]
 
 
 def now() -> float:

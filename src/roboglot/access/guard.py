@@ -137,7 +137,7 @@ class Guard:
     def cached_identity(self, address: str, proof: Proof) -> str | None:
         """See ``Admission.cached_identity``."""
         if proof is not NO_PROOF:
-            return self._proofs.known(proof)
+            return self._proofs.known(proof, address)
         host = host_of(address)
         if (tunnelled := self.tunnels.get(host)) is not None and port_of(address) in tunnelled.calls:
             return tunnelled.who

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 
-from roboglot.access.callers import basic_of
+from roboglot.access.callers import basic_of, host_of
 from roboglot.access.identities import Identities
 from roboglot.access.secrets import password_fits, token_hash
 from roboglot.access.store import IdentityKind
@@ -16,7 +16,8 @@ PROOFS_MAX = 4096  # clients whose proof is cached
 CHECKS_MAX = 16  # passwords waiting to be checked; each check takes 50 ms of a thread
 TRIES_SECONDS = 60.0
 TRIES_OF_ONE_NAME = 10  # times the limit of one address, so that others' guesses do not lock a person out at once
-HTTP = ProofKind.HTTP  # the class look-up of a member is slower than everything else here
+HTTP, SESSION = ProofKind.HTTP, ProofKind.SESSION  # the class look-up of a member is slower than everything else here
+ANYWHERE = "*"  # stands for the host of a proof that is valid from all of them
 
 
 class Proofs:
@@ -24,7 +25,9 @@ class Proofs:
 
     def __init__(self, identities: Identities, logins: int) -> None:
         self._identities = identities
-        self._owners: dict[str, str] = {}  # by the header that carries the proof
+        # By host and header. A password is cached for the host that sent it, as elsewhere the same text is a guess, and
+        # for sessions.
+        self._owners: dict[tuple[str, str], str] = {}
         self._tries = Limiter(logins / TRIES_SECONDS, logins, time.monotonic)
         often = TRIES_OF_ONE_NAME * logins
         self._tries_of_name = Limiter(often / TRIES_SECONDS, often, time.monotonic)
@@ -36,24 +39,40 @@ class Proofs:
         self._identities = identities
         self._owners = {proof: who for proof, who in self._owners.items() if who not in replaced}
 
-    def known(self, proof: Proof) -> str | None:
+    def known(self, proof: Proof, address: str) -> str | None:
         """Return the owner of a proof if that needs no work, else None."""
-        return self._owners.get(proof.value) if proof.kind is HTTP else self._certified(proof)
+        if proof.kind is HTTP:
+            return self._owners.get((ANYWHERE, proof.value)) or self._known_password(proof, host_of(address))
+        if proof.kind is SESSION:
+            return self._owners.get((ANYWHERE, proof.value)) or self._owners.get((SESSION, proof.value))
+        return self._certified(proof)
+
+    def _known_password(self, proof: Proof, host: str) -> str | None:
+        """Return the owner of a password that this host has sent before, unless too many others failed since.
+
+        Otherwise a locked-out client could go on guessing: only the right password would be answered.
+        """
+        owner = self._owners.get((host, proof.value))
+        return owner if owner is not None and self._tries.has(host) else None
 
     async def find(self, proof: Proof, host: str) -> str:
         """Return the identity of ``proof`` from ``host``. Raises Unknown, and LockedOut after too many failures."""
         if proof.kind is ProofKind.NONE:
             raise Unknown("say who you are: a name and password, a token, or have your address allowed")
-        found = self._by_token(proof)
-        if found is None and proof.kind is HTTP:
+        by_header = proof.kind is HTTP or proof.kind is SESSION
+        if (found := self._by_token(proof)) is not None:
+            if by_header:
+                self._cache(ANYWHERE, proof, found)
+        elif by_header:
             found = await self._by_password(proof, host)
         if found is None:
             raise Unknown("this password, token or certificate is not valid")
-        if proof.kind is HTTP:
-            if len(self._owners) >= PROOFS_MAX:
-                self._owners.pop(next(iter(self._owners)))
-            self._owners[proof.value] = found
         return found
+
+    def _cache(self, place: str, proof: Proof, owner: str) -> None:
+        if len(self._owners) >= PROOFS_MAX:
+            self._owners.pop(next(iter(self._owners)))
+        self._owners[place, proof.value] = owner
 
     def _certified(self, proof: Proof) -> str | None:
         """Return the owner of the certificate, which TLS has verified."""
@@ -62,7 +81,7 @@ class Proofs:
 
     def _by_token(self, proof: Proof) -> str | None:
         """Return the owner of the certificate or token. They cannot be guessed, so earlier failures do not count."""
-        if proof.kind is not HTTP:
+        if proof.kind is not HTTP and proof.kind is not SESSION:
             return self._certified(proof)
         scheme, _, rest = proof.value.partition(" ")
         if scheme.lower() == "bearer":
@@ -71,19 +90,29 @@ class Proofs:
         return name if secret and self._identities.by_token(token_hash(secret)) == name else None
 
     async def _by_password(self, proof: Proof, host: str) -> str | None:
-        """Return the owner of this password; a wrong one counts against the host and the name. Raises LockedOut."""
+        """Return the owner of this password; a wrong one counts against the host and the name. Raises LockedOut.
+
+        That of a session was right when its cookie was made, and the cookie cannot be guessed: it does not count.
+        """
         name, password = basic_of(proof.value)
+        counted = proof.kind is HTTP
+        if counted:
+            self._count(name, host)
+        if not name or not await self._password_fits(name, password):
+            return None
+        if counted:
+            self._tries.give_back(host)
+            self._tries_of_name.give_back(name)
+            self._cache(host, proof, name)
+        self._cache(SESSION, proof, name)
+        return name
+
+    def _count(self, name: str, host: str) -> None:
+        """Count one try. Raises LockedOut."""
         if not self._tries.take(host):
             raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")
-        if not name:
-            return None
-        if not self._tries_of_name.take(name):
+        if name and not self._tries_of_name.take(name):
             raise LockedOut(f"too many wrong passwords for {name}: wait a minute")
-        if not await self._password_fits(name, password):
-            return None
-        self._tries.give_back(host)
-        self._tries_of_name.give_back(name)
-        return name
 
     async def _password_fits(self, name: str, password: str) -> bool:
         if self._waiting >= CHECKS_MAX:

@@ -86,9 +86,7 @@ def run_to_end(work: Callable[[], None]) -> NoReturn:
     try:
         work()
     except SystemExit as end:
-        status = end.code if isinstance(end.code, int) else int(end.code is not None)
-        if isinstance(end.code, str):
-            print(end.code, file=sys.stderr)
+        status = _printed(end)
     # These are not public, but multiprocessing ends its children in the same way.
     vars(threading)["_shutdown"]()  # waits for threads
     vars(atexit)["_run_exitfuncs"]()
@@ -99,6 +97,15 @@ def run_to_end(work: Callable[[], None]) -> NoReturn:
     except OSError:  # a full disk, or a closed pipe
         status = status or FLUSH_FAILED
     os._exit(status & 0xFF)
+
+
+def _printed(end: SystemExit) -> int:
+    """Print why the program ends, which may quote a peer or a file; return its exit status."""
+    if isinstance(end.code, str):
+        from roboglot.hosting.escaping import visible
+
+        print(visible(end.code), file=sys.stderr)
+    return end.code if isinstance(end.code, int) else int(end.code is not None)
 
 
 def main() -> None:

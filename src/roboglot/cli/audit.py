@@ -14,6 +14,7 @@ import typer
 from roboglot.access.trail import FILE, Entry, Trail, open_trail
 from roboglot.config import Config
 from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import in_line
 from roboglot.storage.transactions import DatabaseError
 
 LOOK_PERIOD = 0.5  # s
@@ -59,4 +60,4 @@ def _line(number: int, entry: Entry) -> str:
     who = f"{entry.who or '-'} {entry.address}".strip()
     again = f" (and {entry.repeats} times before)" if entry.repeats else ""
     reason = f": {entry.reason}" if entry.reason else ""
-    return f"{number} {when} {entry.robot} {entry.door} {who} {entry.operation} {entry.outcome}{reason}{again}"
+    return in_line(f"{number} {when} {entry.robot} {entry.door} {who} {entry.operation} {entry.outcome}{reason}{again}")

@@ -15,6 +15,7 @@ import typer
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from roboglot.cli.screen import shortened
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, Heartbeat
@@ -22,6 +23,7 @@ from roboglot.clients.cyberdog.values import Grid
 from roboglot.clients.errors import ClientError
 from roboglot.config import load_config
 from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import in_line
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 from roboglot.wire.cyberdog.codes import Feedback
 
@@ -109,7 +111,8 @@ async def _watch(client: CyberDogClient, _: list[str]) -> None:
 
 
 def _table(heartbeat: Heartbeat, connected: bool) -> Table:
-    table = Table(title=f"{heartbeat.serial} at {heartbeat.ip}{'' if connected else ' (lost)'}", show_header=False)
+    title = f"{heartbeat.serial} at {heartbeat.ip}{'' if connected else ' (lost)'}"
+    table = Table(title=Text(in_line(title)), show_header=False)
     charging = "wired" if heartbeat.wired_charging else "docked" if heartbeat.wireless_charging else "no"
     for name, value in (
         ("battery", f"{heartbeat.battery} %, charging: {charging}"),
@@ -119,7 +122,7 @@ def _table(heartbeat: Heartbeat, connected: bool) -> Table:
         ("state", str(heartbeat.state)),
         ("self-check", f"{heartbeat.self_check} {shortened(heartbeat.self_check_description, 80)}"),
     ):
-        table.add_row(name, value)
+        table.add_row(name, Text(in_line(value)))  # no markup
     return table
 
 
@@ -201,7 +204,7 @@ async def _charge(client: CyberDogClient, _: list[str]) -> None:
 async def _photo(client: CyberDogClient, words: list[str]) -> None:
     name = _writable(words[:1])
     photo = await client.photo()
-    _keep(photo.data, name or photo.name)
+    _keep(photo.data, name or _here(photo.name))
 
 
 async def _record(client: CyberDogClient, words: list[str]) -> None:
@@ -212,7 +215,7 @@ async def _record(client: CyberDogClient, words: list[str]) -> None:
     await client.record()
     await client.clock.sleep(seconds)
     film = await client.stop_recording()
-    _keep(film.data, name or film.name)
+    _keep(film.data, name or _here(film.name))
 
 
 def _check_seconds(seconds: float) -> None:
@@ -228,10 +231,17 @@ def _writable(words: list[str]) -> str:
     return "".join(words)
 
 
+def _here(name: str) -> str:
+    """Return the robot's name for a file as one of this folder, whatever a hostile robot calls it. Raises OSError."""
+    last = name.replace("\\", "/").rpartition("/")[2]
+    if last.startswith(".") or not last.isprintable() or not last or Path(last).exists():
+        raise OSError(f"the robot calls the file {name!r}: name one for it")
+    return last
+
+
 def _keep(data: bytes, name: str) -> None:
-    path = Path(name).name if "/" not in name else name
-    Path(path).write_bytes(data)
-    console.print(f"{path}: {len(data)} bytes")
+    Path(name).write_bytes(data)
+    console.print(f"{name}: {len(data)} bytes", markup=False)
 
 
 _WORKS: tuple[Work, ...] = (

@@ -12,8 +12,10 @@ from typing import Annotated
 import typer
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from roboglot.drivers.urls import Drivers
+from roboglot.hosting.escaping import in_line
 from roboglot.model.clock import RealClock
 from roboglot.model.components.component import Component
 from roboglot.model.components.energy.battery import Battery, DockContact
@@ -65,7 +67,7 @@ async def _once(robot: Robot) -> int:
                 await asyncio.sleep(0.05)
             await asyncio.sleep(0.5)  # pushes arrive a little later
     for name, words in rows(robot):
-        print(f"{name:14} {words}")
+        print(in_line(f"{name:14} {words}"))
     return 0 if robot[Link].state is LinkState.UP else 1
 
 
@@ -74,7 +76,7 @@ async def _live(robot: Robot) -> int:
         while True:
             table = Table(title=robot[Link].address, show_header=False, min_width=60)
             for name, words in rows(robot):
-                table.add_row(name, words)
+                table.add_row(name, Text(in_line(words)))  # no markup
             screen.update(table)
             await asyncio.sleep(PERIOD)
 

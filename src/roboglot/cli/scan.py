@@ -19,6 +19,7 @@ import typer
 from roboglot.clients.errors import ClientError
 from roboglot.clients.robomaster.datagrams import discover
 from roboglot.clients.slamware import SlamwareClient
+from roboglot.hosting.escaping import in_line
 from roboglot.model.clock import RealClock
 from roboglot.values import dataclass
 
@@ -74,7 +75,8 @@ async def _scan(hosts: list[str], seconds: float) -> list[Found]:
     """Print each robot as soon as it answers."""
     found = []
     async for robot in find(hosts, seconds):
-        print(f"{shlex.quote(robot.url):40} {robot.words}", flush=True)  # a shell takes the ? of a URL for a pattern
+        quoted = shlex.quote(robot.url)  # a shell takes the ? of a URL for a pattern
+        print(in_line(f"{quoted:40} {robot.words}"), flush=True)
         found.append(robot)
     return found
 

@@ -21,6 +21,11 @@ def visible(text: str) -> str:
     return text.translate(_WRITTEN_OUT).encode("utf-8", "replace").decode()
 
 
+def in_line(text: str) -> str:
+    """Return ``text`` as ``visible`` does, in one line: it begins no row of its own."""
+    return visible(text).replace("\n", "\\n")
+
+
 def xml_text(text: str) -> str:
     """Return ``text`` with characters that XML cannot hold replaced."""
     return re.sub(_NOT_XML, "\ufffd", text)

@@ -22,6 +22,7 @@ class ProofKind(StrEnum):
 
     NONE = "none"
     HTTP = "http"  # the value of an Authorization header: "Bearer TOKEN" or "Basic …"
+    SESSION = "session"  # such a value, from the log-in of a browser whose cookie is valid
     CERTIFICATE = "certificate"  # the common name of a certificate that TLS has verified
 
 

@@ -27,6 +27,10 @@ class Limiter:
         self._buckets[key] = (left - 1.0 if taken else left, now)
         return taken
 
+    def has(self, key: str) -> bool:
+        """Return whether ``take`` would succeed now."""
+        return self._left(key, self._now()) >= 1.0
+
     def spend(self, key: str, amount: float) -> float:
         """Take ``amount`` in any case; return the seconds until the debt is paid, 0 without debt."""
         now = self._now()

@@ -13,6 +13,7 @@ import typer
 from roboglot.cli.control import running
 from roboglot.config import default_data_folder
 from roboglot.control.lease_server import NAME, Answer, Control, Request
+from roboglot.hosting.escaping import in_line
 from roboglot.spelling import instead
 
 PATIENCE = 10.0  # s to wait until the robot has braked
@@ -50,7 +51,7 @@ def command(
     if not shown:
         sys.exit(f"roboglot lease: there is no robot {robot!r}{instead(robot, _names(answer))}")
     for control in shown:
-        print(in_words(control))
+        print(in_line(in_words(control)))
 
 
 def send(command: str, request: Request, data: Path | None) -> Answer:

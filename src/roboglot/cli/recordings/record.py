@@ -21,6 +21,7 @@ from roboglot.cli.suggestions import Group
 from roboglot.config import default_data_folder
 from roboglot.control.record_server import NAME, Answer, Request
 from roboglot.hosting.error_text import in_words
+from roboglot.hosting.escaping import in_line
 from roboglot.hosting.event_loop import run
 
 SWITCH = 0.0002  # s that the writing thread may hold the interpreter's lock; Python's own 5 ms delay messages
@@ -163,12 +164,12 @@ def info(file: Annotated[Path, typer.Argument(help="A recording.")]) -> None:
     except (OSError, BadRecording) as error:
         sys.exit(f"roboglot record: {in_words(error)}")
     for name, value in recording.facts.items():
-        print(f"{name:10} {value}")
+        print(in_line(f"{name:10} {value}"))
     print(f"{'seconds':10} {recording.seconds:.1f}{'' if recording.whole else '  (incomplete: see repair)'}")
     for name, count in sorted(recording.topics.items()):
-        print(f"{count:10} {name}")
+        print(in_line(f"{count:10} {name}"))
     for name, data in recording.attachments.items():
-        print(f"{'file':10} {name}, {len(data)} bytes")
+        print(in_line(f"{'file':10} {name}, {len(data)} bytes"))
 
 
 @app.command()

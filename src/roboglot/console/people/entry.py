@@ -38,7 +38,8 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
     if session is not None:
         session_lasts.set(lambda: sessions.find(cookie) is not None)
     if (admission := admission_of(desk)) is not None:
-        proof = Proof(ProofKind.HTTP, shown) if shown else session.proof if session is not None else NO_PROOF
+        kept = session.proof if session is not None else NO_PROOF
+        proof = Proof(ProofKind.HTTP, shown) if shown else _vouched(kept)
         try:
             who = await _identity(admission, address, proof)
         except LockedOut:
@@ -50,6 +51,11 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
     named = session.name if session is not None else who if shown else ""
     set_client(f"{CLIENT} {named or address.rpartition(':')[0]}".strip(), address, who)
     return named
+
+
+def _vouched(kept: Proof) -> Proof:
+    """Return a session's proof: it is no guess, as the valid cookie came with it."""
+    return Proof(ProofKind.SESSION, kept.value) if kept.kind is ProofKind.HTTP else kept
 
 
 async def _identity(admission: Admission, address: str, proof: Proof) -> str:

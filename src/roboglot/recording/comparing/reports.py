@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from xml.etree import ElementTree
 
-from roboglot.hosting.escaping import xml_text
+from roboglot.hosting.escaping import in_line, xml_text
 from roboglot.recording.comparing.comparison import Comparison, Row
 
 STYLE = (
@@ -24,9 +24,10 @@ def table(comparison: Comparison) -> str:
     """Return a line for each operation with its differences below, and the total at the end."""
     lines = []
     for row in comparison.rows:
-        lines.append(f"{percent(_share(row)):>8}  {row.ones:5} {row.others:5}  {row.door} {row.operation or '(none)'}")
-        lines += [f"{'':24}{d.what}: {d.one} | {d.other}" for d in row.differences[:5]]
-    lines += [f"{door}: {percent(comparison.of(door).fidelity)}" for door in comparison.doors]
+        operation = in_line(row.operation) or "(none)"
+        lines.append(f"{percent(_share(row)):>8}  {row.ones:5} {row.others:5}  {in_line(row.door)} {operation}")
+        lines += [in_line(f"{'':24}{d.what}: {d.one} | {d.other}") for d in row.differences[:5]]
+    lines += [f"{in_line(door)}: {percent(comparison.of(door).fidelity)}" for door in comparison.doors]
     lines.append(f"fidelity: {percent(comparison.fidelity)}")
     return "\n".join(lines)
 

@@ -92,7 +92,7 @@ async function look(name) {
 }
 
 function exported() {
-  const cell = (text) => { const plain = String(text).replace(/^[=+@-]/, "'$&"); return `"${plain.replaceAll('"', '""')}"`; };
+  const cell = (text) => { const plain = String(text).replace(/^[=+@\t\r-]/, "'$&"); return `"${plain.replaceAll('"', '""')}"`; };
   const rows = [t("studio.class.columns").split("|"), ...grid.value.pupils.map((p) => [p.name, p.world, p.robot, p.stars, t(p.handed ? "studio.yes" : "studio.no"), p.mission, inOwnWords(p.error)])];
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([`\ufeff${rows.map((row) => row.map(cell).join(",")).join("\n")}\n`], { type: "text/csv" }));
