@@ -73,6 +73,9 @@ def rewritten(text: str, source: str) -> str:
         relative = os.path.relpath(new.replace(CHINESE, ".md"), PurePosixPath(here).parent)
         return f"{mark}[{words}]({relative}{'#' + anchor if anchor else ''})"
 
+    # The site has a switch of its own: a line that is nothing but a link to the other language would be a lone word.
+    alone = re.escape(os.path.relpath(twin, PurePosixPath(source).parent))
+    text = re.sub(rf"^\[[^\]]+\]\({alone}\)\n+", "", text, flags=re.MULTILINE)
     parts = re.split(r"(^```.*?^```[ \t]*$)", text, flags=re.MULTILINE | re.DOTALL)
     return "".join(part if part.startswith("```") else LINK.sub(link, part) for part in parts)
 

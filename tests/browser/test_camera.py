@@ -11,6 +11,7 @@ import pytest
 
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.sound import SAMPLE_RATE, Sound
+from roboglot.simulation.components.sensing.camera import SimulatedCamera
 from tests.browser.served import PAGE_PATIENCE as PATIENCE
 from tests.browser.served import OpenConsole, Page, Served
 from tests.browser.served import until as until_page
@@ -43,11 +44,21 @@ async def pictures(served: Served, page: Page) -> None:
             await asyncio.sleep(0.05)
 
 
-async def test_the_camera_shows_pictures(served: Served, open_console: OpenConsole) -> None:
+async def test_the_camera_shows_pictures(
+    served: Served, open_console: OpenConsole, monkeypatch: pytest.MonkeyPatch
+) -> None:
     page = await open_console()
     await page.click("#tab-drive")
+    with monkeypatch.context() as patch:
+        patch.setattr(SimulatedCamera, "delay", "the kernels are being compiled")
+        patch.setattr(SimulatedCamera, "capture", asyncio.Event().wait)
+        await page.click("text=Show the camera")
+        await page.wait_for_selector(".screen >> text=the kernels are being compiled")
+    await page.wait_for_selector(".screen >> text=Waiting for the first picture")
+    await page.click("text=Close the camera")
     await page.click("text=Show the camera")
     await pictures(served, page)
+    await page.wait_for_selector(".screen .why", state="detached")
     await page.click("text=Close the camera")
     await page.wait_for_selector(".screen", state="detached")
 

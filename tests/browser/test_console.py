@@ -206,13 +206,13 @@ async def test_labels_of_new_plots_differ(served: Served, open_console: OpenCons
     await page.click("#tab-plots")
     await page.locator("[data-plot=speed] canvas").wait_for()
     for _ in range(3):  # with one value, two, three
-        await page.evaluate("window.written.length = 0")
-        await served.clock.advance(0.3)
         await until_page(page, "window.written.some((texts) => texts.includes('0 s'))")
         for texts in await page.evaluate("window.written"):
             labels = [text for text in texts if text.endswith(" s")]
             assert len(labels) == len(set(labels)), labels
             assert labels[-1:] in ([], ["0 s"])
+        await page.evaluate("window.written.length = 0")
+        await served.clock.advance(0.3)
 
 
 async def test_the_wire_shows_requests_and_why_they_fail(served: Served, open_console: OpenConsole) -> None:

@@ -211,6 +211,8 @@ async def test_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_
     await page.click("form .main")
     await page.wait_for_selector("text=Scan fits map")
     assert await page.locator("header option").all_inner_texts() == ["b"]
+    await page.evaluate("location.hash = '#/world'")
+    await page.wait_for_selector("text=Only those who may see all robots see the world")
     guarded.store.rotate("cell7")
     known(guarded.runtime.guard).reload()
     await page.wait_for_selector(".sign")

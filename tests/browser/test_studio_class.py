@@ -82,6 +82,7 @@ async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     await until(teacher, "studio.program.value.name.includes('Anna')")
     await teacher.click("#panel .button.danger")  # stop all
     await phase(anna, "idle")
+    await teacher.wait_for_selector(".notice >> text=Stopped robots: 1.")
 
     await loaded(anna, QUICK)  # its blocks change faster than pupils report
     await anna.keyboard.press("F5")

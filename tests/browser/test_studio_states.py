@@ -9,6 +9,7 @@ from tests.browser.test_studio import COUNTING, FOREVER, READY, Open, Page, load
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
+COLOUR = "name => getComputedStyle(document.querySelector(name)).backgroundColor"
 WORD = "document.querySelector('.phase').textContent"
 
 
@@ -23,6 +24,8 @@ async def test_line_of_a_running_text_is_lit(studio: Open) -> None:
     await opens_text(page, "import time\nprint('hi')\ntime.sleep(1000)\n")  # of robot time, which stands still
     await page.keyboard.press("F5")
     await until(page, "document.querySelector('.cm-line.here')?.textContent === 'time.sleep(1000)'")
+    colours = [await page.evaluate(COLOUR, name) for name in (".cm-gutters", "header")]
+    assert colours[0] == colours[1]  # the theme's, not the editor's
     await page.keyboard.press("Shift+F5")
     await until(page, "!document.querySelector('.cm-line.here')")
     assert page.errors == []

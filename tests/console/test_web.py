@@ -90,7 +90,7 @@ def test_pages_load_nothing_from_elsewhere() -> None:
 
 
 def test_the_page_is_small_enough() -> None:
-    shown = ("/views/plots.js", "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when shown
+    shown = ("/views/camera.js", "/views/plots.js", "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when shown
     later = (*shown, "/words/server.zh.json")  # loaded after the page
     sent = {
         path: asset

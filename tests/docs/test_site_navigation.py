@@ -41,6 +41,20 @@ def test_navigation_names_each_page_once_in_english() -> None:
     assert [page for page in pages if page.endswith(".zh.md") or pages.count(page) > 1] == []
 
 
+def test_sections_of_the_navigation_have_chinese_names() -> None:
+    settings, _, navigation = (ROOT / "mkdocs.yml").read_text("utf-8").partition("\nnav:\n")
+    sections = re.findall(r"^  - (.+):$", navigation, re.MULTILINE)
+    chinese = dict(re.findall(r"^            (.+): (.*[\u4e00-\u9fff].*)$", settings, re.MULTILINE))
+    assert len(sections) > 5
+    assert [section for section in sections if section not in chinese] == []
+
+
+def test_no_line_is_left_of_links_between_languages(pages: Path) -> None:
+    """The site leads to the other language itself; the links' words stood alone on top of its pages."""
+    texts = {page.name: page.read_text("utf-8") for page in pages.rglob("*.md")}
+    assert [name for name, text in texts.items() if re.search("^(中文|English)$", text, re.MULTILINE)] == []
+
+
 def test_links_lead_somewhere_in_both_languages(site: ModuleType, pages: Path) -> None:
     """Links from pages without a Chinese one, too: they are built among the Chinese pages."""
 

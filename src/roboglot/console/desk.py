@@ -115,6 +115,7 @@ class Desk:
     def hello(self) -> dict[str, object]:
         """First message to a page."""
         visible = self.visible
+        whole = len(visible) == len(self.views)
         simulated = {placed.name for placed in self.stage.robots}
         return {
             "version": self.world.version,
@@ -132,7 +133,8 @@ class Desk:
                 for name, listed in self.doors().items()
                 if name in visible
             },
-            "floors": drawings.plans_of(self.stage) if len(visible) == len(self.views) else [],
+            "whole": whole,  # sees all robots, so the world, too
+            "floors": drawings.plans_of(self.stage) if whole else [],
             "fault_kinds": [
                 {"name": k.name, "of_robot": k.of_robot, "options": dict(k.options)} for k in self.stage.fault_kinds
             ],

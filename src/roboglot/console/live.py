@@ -235,6 +235,7 @@ class Page:
             self._wire_at = 0
             if view is not None:
                 view.open()
+        self._truth = self._truth if self._watch.truth else {}  # the page has forgotten it
         self._watch = watch
         if view is not None:
             if watch.wire:

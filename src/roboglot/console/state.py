@@ -155,6 +155,8 @@ def _safety(robot: Robot) -> dict[str, object]:
 def _body(robot: Robot) -> dict[str, object]:
     """Return the state of optional parts."""
     body: dict[str, object] = {}
+    if Camera in robot and (delay := robot[Camera].delay):
+        body["camera"] = delay
     if Legs in robot:
         body["posture"] = str(robot[Legs].posture)
     if Gimbal in robot:

@@ -25,7 +25,7 @@ async def test_first_picture_has_its_kernels_compiled_apart(compiles: bool, monk
     done: list[object] = []
 
     async def compile_beside(names: Sequence[str]) -> None:
-        done.append(names)
+        done.extend((names, "the kernels that draw it are compiled" in opened.delay))
         if not compiles:
             raise KernelsUnavailable("the disk is full")
 
@@ -34,9 +34,11 @@ async def test_first_picture_has_its_kernels_compiled_apart(compiles: bool, monk
         return Mock(spec=Scenery)
 
     monkeypatch.setattr(studio, "compile_beside", compile_beside)
+    monkeypatch.setattr(studio, "missing", lambda names: names)
     opened = Studio(open_stage, RealClock())
     assert await opened.stage() is await opened.stage()
-    assert done == [CAMERA, True]
+    assert done == [CAMERA, True, True]
+    assert not opened.delay
 
 
 async def test_stage_opens_in_place_in_lockstep(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -240,8 +240,11 @@ class Classroom:
         pupil.bag.world = pupil.world
         return None if pupil.world == at else self.worlds[pupil.world]
 
-    async def stop_all(self, taught: Class) -> None:
-        """End what the robots of all pupils do, of those whose page is away, too. Raises Refused."""
+    async def stop_all(self, taught: Class) -> int:
+        """End what the robots of all pupils do, of those whose page is away, too; return their number.
+
+        Raises Refused.
+        """
         robots = dict.fromkeys((p.world, p.robot) for p in taught.pupils.values() if p.robot)
         found = [(self.worlds.get(world), world, robot) for world, robot in robots]
         stops = [world.stop(robot) for world, _, robot in found if world is not None]
@@ -250,6 +253,7 @@ class Classroom:
         failed += [str(error) for error in ends if isinstance(error, BaseException)]
         if failed:
             raise Refused(f"not stopped: {', '.join(failed)}")
+        return len(robots)
 
 
 class Seat:
@@ -282,7 +286,7 @@ class Seat:
             case "close":
                 await self._room.end(self._taught().code)
             case "stop_all":
-                await self._room.stop_all(self._taught())
+                self.post({"type": "stopped", "robots": await self._room.stop_all(self._taught())})
             case "look":
                 shown = self._taught().pupils.get(request.name)
                 if shown is None:

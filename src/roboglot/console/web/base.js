@@ -177,6 +177,15 @@ export function say(text, bad = false) {
   fading = window.setTimeout(() => { notice.value = { text: "", bad: false }; }, bad ? 8000 : 3500);
 }
 
+/** Ask the server something over HTTP, or wish something of it; its words, or an Error in plain words.
+ * @param {string} path @param {object} [wish] */
+export async function fetched(path, wish) {
+  const reply = await fetch(path, wish ? { method: "POST", body: JSON.stringify(wish) } : {}).catch(() => { throw new Error(t("link.lost")); });
+  const words = /json/.test(reply.headers.get("content-type") ?? "") ? await reply.json() : await reply.text();
+  if (!reply.ok) throw new Error(words.error ?? reply.statusText);
+  return words;
+}
+
 /** A number of so many digits, which is never -0. @param {number} n */
 export const fixed = (n, digits = 2) => (Number(n.toFixed(digits)) || 0).toFixed(digits);
 

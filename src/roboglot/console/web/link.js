@@ -4,7 +4,8 @@ import { lacks, notice, person, rights, say, t, kept } from "./base.js";
 
 export const status = signal(/** @type {"opening" | "open" | "lost" | "out"} */ ("opening")); // out: a name is needed
 export const me = signal({ name: "", asks: false }); // who signed in here; whether names are asked for
-export const age = signal(/** @type {number | null} */ (null)); // ms there and back
+export const age = signal(/** @type {number | null} */ (null)); // ms there and back; of an open question, since it was asked
+export const connections = signal(0); // sockets opened so far: what a page fetched before may have ended
 export const hello = signal(/** @type {any} */ (null));
 export const you = signal("");
 export const clock = signal(0); // robot time, s
@@ -37,9 +38,10 @@ export const wanted = signal({ wire: false, truth: false, seen: false, moving: t
 
 const KEPT_MAX = 20_000; // exchanges
 const RETRY = 1000; // ms
+const SILENT_MAX = 10_000; // ms without an answer after which the link counts as lost
 let socket = /** @type {WebSocket | null} */ (null);
 const REVOKED = 1008; // the code with which a socket is closed when its person's rights change
-let next = 1, sequence = 0, server = { now: 0, at: 0 };
+let next = 1, sequence = 0, asked = 0, server = { now: 0, at: 0 };
 const waiting = /** @type {Map<number, {resolve: (v: any) => void, reject: (e: Error) => void}>} */ (new Map());
 
 /** Whether this browser may open the socket: it needs no name here, or has one. Fails without a connection. */
@@ -59,10 +61,16 @@ export async function connect() {
   const opened = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
   socket = opened;
   opened.binaryType = "arraybuffer";
-  opened.onopen = () => { status.value = "open"; introduce(); watch(); ping(); };
+  opened.onopen = () => {
+    asked = 0;
+    batch(() => { status.value = "open"; connections.value += 1; exchanges.value = []; missed.value = 0; truth.value = null; }); // they come again, whole
+    introduce(); watch(); ping();
+  };
   opened.onmessage = ({ data }) => (typeof data === "string" ? receive(JSON.parse(data)) : receiveFrame(data));
   opened.onclose = ({ code }) => {
     if (socket !== opened) return;
+    socket = null;
+    opened.close();
     batch(() => { status.value = "lost"; age.value = null; });
     for (const { reject } of waiting.values()) reject(new Error(t("link.lost")));
     waiting.clear();
@@ -88,23 +96,41 @@ export function watch() {
   if (current.value) send({ type: "watch", robot: current.value, ...wanted.value });
 }
 
+let drawn = ""; // the robot that scan, map, path and wire are of
+effect(() => {
+  const now = current.value;
+  if (!now || now === drawn) return;
+  if (drawn) batch(() => { scan.value = null; grid.value = null; path.value = new Float32Array(); exchanges.value = []; seen.value = []; });
+  drawn = now;
+});
+
 /** Show another robot. @param {string} name */
 export function choose(name) {
   if (name === current.value) return;
-  batch(() => { chosen.value = name; scan.value = null; grid.value = null; path.value = new Float32Array(); exchanges.value = []; seen.value = []; });
+  chosen.value = name;
   watch();
 }
 
 /** @param {Partial<typeof wanted.value>} change */
 export function want(change) {
   const now = { ...wanted.value, ...change };
-  if (JSON.stringify(now) !== JSON.stringify(wanted.value)) { wanted.value = now; watch(); }
+  if (JSON.stringify(now) === JSON.stringify(wanted.value)) return;
+  if (!now.truth) truth.value = null; // it would grow old
+  wanted.value = now;
+  watch();
 }
 
 let pinging = 0;
 function ping() {
   clearTimeout(pinging);
-  send({ type: "ping", at: performance.now() });
+  const now = performance.now();
+  if (!asked) {
+    asked = now;
+    send({ type: "ping", at: now });
+  } else {
+    age.value = now - asked;
+    if (age.value > SILENT_MAX) { socket?.onclose?.(new CloseEvent("close")); return; } // its own end may take minutes
+  }
   pinging = window.setTimeout(ping, 1000);
 }
 
@@ -151,14 +177,14 @@ function receive(message) {
       watch();
       break;
     case "you": you.value = message.client; break;
-    case "pong": age.value = performance.now() - message.at; break;
+    case "pong": asked = 0; age.value = performance.now() - message.at; break;
     case "moment":
       batch(() => { clock.value = message.time; poses.value = Object.fromEntries(Object.entries(message.poses).filter(([, p]) => p[0] !== null)); recording.value = message.recording; if (message.truth) truth.value = message.truth; steer(message.pace); });
       break;
     case "state": {
       const known = states.value[message.robot], [last] = message.state.history ?? [];
       states.value = { ...states.value, [message.robot]: { ...known, ...message.state } };
-      if (known && last?.status === "ABORTED" && last.client === you.value) say(last.reason, true);
+      if (known && last?.status === "ABORTED" && last.client === you.value) say(message.robot === current.value ? last.reason : t("notice.robot", { name: message.robot, why: last.reason }), true);
       break;
     }
     case "seen":

@@ -232,7 +232,7 @@ export function MapView({ tool, overlay, children }) {
       <${Button} compact icon="minus" label=${t("zoom.out")} onClick=${() => zoom(1 / 1.4)} />
       <${Button} compact icon="follow" label=${t("follow")} on=${following.value} onClick=${() => { following.value = !following.value; }} />
       <${Button} compact icon="fit" label=${t("fit")} onClick=${() => { following.value = false; fit(element.current.getBoundingClientRect()); }} />
-      ${simulated.value && html`<${Button} compact icon="eye" label=${t("truth")} on=${wanted.value.truth} onClick=${() => want({ truth: !wanted.value.truth })} />`}
+      ${simulated.value && hello.value?.whole && html`<${Button} compact icon="eye" label=${t("truth")} on=${wanted.value.truth} onClick=${() => want({ truth: !wanted.value.truth })} />`}
     </div>
     <${FloorChoice} />
     <div class="scale" aria-hidden="true"><i style=${{ width: `${meters * camera.value.scale}px` }}></i>${meters} m</div>

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
 from roboglot.kernels import CAMERA, loading
-from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
+from roboglot.kernels.ahead import KernelsUnavailable, compile_beside, missing
 from roboglot.model.background import beside, load
 from roboglot.model.clock import Clock, RealClock
 from roboglot.simulation.rendering.views import Scenery
@@ -30,6 +30,7 @@ class Studio:
         self._threaded = isinstance(clock, RealClock)
         self._stage: Scenery | None = None
         self._opening = asyncio.Lock()
+        self.delay = ""  # why the first picture takes long, a sentence
 
     async def stage(self) -> Scenery:
         """Return the scenery; the first call waits for the kernels (a second; longer if they must be compiled)."""
@@ -56,9 +57,15 @@ class Studio:
         """
         if not self._threaded:
             return job()
-        with contextlib.suppress(KernelsUnavailable):  # then they are compiled as they are imported
-            await compile_beside(CAMERA)
-        return await load(job)
+        if missing(CAMERA):
+            why = "the first picture waits until the kernels that draw it are compiled: up to a minute, once"
+            self.delay = why
+        try:
+            with contextlib.suppress(KernelsUnavailable):  # then they are compiled as they are imported
+                await compile_beside(CAMERA)
+            return await load(job)
+        finally:
+            self.delay = ""
 
     async def work(self, job: Callable[[], R]) -> R:
         """Return the result of ``job``, which runs in a thread in real time."""

@@ -27,7 +27,8 @@ function litWords() {
 let due = /** @type {any} */ (null); // to join or to teach, as soon as there is a link
 /** @param {any} message */
 function wish(message) {
-  if (send({ type: "class", ...message }) || !/join|open/.test(message.do)) return;
+  if (send({ type: "class", ...message }) || message.do === "doing") return;
+  if (!/join|open/.test(message.do)) { say(t("refused", { why: t("link.lost") }), true); return; }
   due = message;
   say(t("studio.later"), true);
 }
@@ -50,6 +51,7 @@ listen((message) => {
     case "left": group.value = null; grid.value = null; setTimeout(back, AGAIN); break;
     case "map": maps.value = { ...maps.value, [message.name]: message.png }; break;
     case "grid": grid.value = message; code.value = message.code; role.value = "teacher"; break;
+    case "stopped": say(t("stopped.all", { n: message.robots })); break;
     case "handed": say(t("studio.handed")); break;
     case "refused": if (!message.id) say(t("refused", { why: message.why }), true);
   }

@@ -10,7 +10,7 @@ import { Help, Keys, Library, Schedule, shown } from "./dialogs.js";
 import * as editor from "./editor.js";
 import { connect, online, open, opened, unopened } from "./link.js";
 import { Inside } from "./modules.js";
-import { Missions, allowHere, forget, loadMissions } from "./missions.js";
+import { Missions, allowHere, forget, loadMissions, missions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
 import { body, changed, handOver, list, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
@@ -115,7 +115,7 @@ function Side() {
   };
   return html`<aside><div class="tabs" role="tablist" aria-label=${t("panels")} onKeyDown=${move}>${Object.keys(TABS).map((name) => html`
       <button type="button" role="tab" id=${`tab-${name}`} aria-selected=${String(tab.value === name)} aria-controls="panel" tabindex=${tab.value === name ? 0 : -1} onClick=${() => { tab.value = name; }}>${t(`studio.tab.${name}`)}</button>`)}</div>
-    <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><${Shown} /></div></aside>`;
+    <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><h2 class="unseen">${t(`studio.tab.${tab.value in TABS ? tab.value : "python"}`)}</h2><${Shown} /></div></aside>`;
 }
 
 const WINDOWS = { library: Library, schedule: Schedule, keys: Keys, help: Help };
@@ -176,6 +176,11 @@ effect(() => {
   open(id); // the answer says what runs
 });
 loadMissions().catch(() => undefined);
+let cut = false;
+effect(() => { // a page that was opened without the server
+  cut ||= online.value === "lost";
+  if (cut && online.value === "open" && !missions.peek().length) loadMissions().catch(() => undefined);
+});
 addEventListener("pagehide", () => { if (editor.changes.peek()) changed(); });
 effect(() => { document.title = t("studio"); });
 /** Keep the page's files, on https and this machine. */

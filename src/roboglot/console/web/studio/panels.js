@@ -3,7 +3,7 @@ import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import { effect, signal } from "@preact/signals";
 import { Button, html, language, robotWord, t } from "../base.js";
 import { MapView } from "../map.js";
-import { command, current, state, want } from "../link.js";
+import { command, connections, current, state, want } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
 import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
@@ -107,7 +107,7 @@ export function RobotPanel() {
   useEffect(() => { want({ moving: true }); return () => want({ moving: false }); }, []);
   return html`<${Simulate} /><div class="world"><${MapView} tool=${null} overlay=${null} /></div>
     ${has && html`<div class="buttons"><${Button} on=${film.value} label=${t(film.value ? "camera.close" : "camera.open")} onClick=${() => { film.value = !film.value; }} /></div>`}
-    ${has && film.value && html`<figure class="film"><img src=${`/api/robots/${encodeURIComponent(current.value)}/camera.mjpeg`} alt=${t("camera.alt")} /></figure>`}
+    ${has && film.value && html`<figure class="film" key=${`${current.value} ${connections.value}`}><img src=${`/api/robots/${encodeURIComponent(current.value)}/camera.mjpeg`} alt=${t("camera.alt")} /></figure>`}
     ${state.value?.faults?.length > 0 && html`<ul class="faults">${state.value.faults.map((f) => html`<li class=${f.level.toLowerCase()}>${robotWord(f.message)}</li>`)}</ul>`}
     <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop")} title=${t("studio.halt.hint")} onClick=${() => { if (phase.value !== "idle") stop(); command("stop"); }} /></div>`;
 }

@@ -1,13 +1,15 @@
 // The camera: live video with sound by WebRTC, motion JPEG and WAV where that fails, with what the robot makes out drawn over it.
 import { useEffect, useRef } from "preact/hooks";
 import { signal, useSignal } from "@preact/signals";
-import { Button, html, robotWord, say, t } from "../base.js";
-import { current, seen, state, want } from "../link.js";
+import { Button, html, robotWord, say, t, translated } from "../base.js";
+import { connections, current, seen, state, status, want } from "../link.js";
 
 const FILM_RATE = 15; // pictures a second
 const FILM_MAX = 600_000; // ms
 const filming = signal(/** @type {(() => void) | null} */ (null));
 const filmed = signal(0); // bytes of the film so far
+const LOOK = 200; // ms between two looks for the first picture
+const AGAIN = 1000; // ms after a broken film
 const CONNECT_MAX = 5000; // ms until motion JPEG takes the place of the call
 const shown = signal(false);
 const boxes = signal(true);
@@ -65,20 +67,29 @@ function Boxes() {
   if (!boxes.value) return null;
   return html`<svg class="boxes" viewBox="0 0 1 1" preserveAspectRatio="none" aria-hidden="true">${seen.value.map(([kind, , x, y, w, h]) => html`
       <rect class=${kind} x=${x - w / 2} y=${y - h / 2} width=${w} height=${h} />`)}</svg>
-    ${seen.value.map(([kind, label, x, y, w, h]) => html`<span class="sighting" style=${{ left: `${Math.max(0, x - w / 2) * 100}%`, top: `${Math.max(0, y - h / 2) * 100}%` }}>
+    ${seen.value.map(([kind, label, x, y, w, h]) => html`<span class="sighting" style=${{ ...(x > 0.6 ? { right: `${Math.max(0, 1 - x - w / 2) * 100}%` } : { left: `${Math.max(0, x - w / 2) * 100}%` }), top: `${Math.max(0, y - h / 2) * 100}%` }}>
       ${robotWord(kind)}${label ? ` ${robotWord(label)}` : ""}</span>`)}`;
 }
 
-function Picture({ robot }) {
-  const video = useRef(null), plain = useSignal(false);
+/** Why no picture is seen, or no new one; empty once there are. @param {boolean} there */
+function missing(there) {
+  if (status.value !== "open") return t("link.lost");
+  return there ? "" : translated(state.value?.body.camera ?? "") || t("camera.waits");
+}
+
+function Picture({ robot, again }) {
+  const video = useRef(null), screen = useRef(/** @type {any} */ (null)), plain = useSignal(false), there = useSignal(false);
   useEffect(() => {
     let peer = null, gone = false;
-    call(video.current, robot).then((made) => { if (gone) made.close(); else peer = made; }, () => { if (!gone) plain.value = true; });
+    const look = setInterval(() => { const shown = screen.current?.querySelector("video, img"); there.value = Boolean(shown?.videoWidth || shown?.naturalWidth); }, LOOK);
+    const broken = () => { if (!gone && ["failed", "closed"].includes(peer.connectionState)) again(); };
+    call(video.current, robot).then((made) => { if (gone) { made.close(); return; } peer = made; peer.onconnectionstatechange = broken; }, () => { if (!gone) plain.value = true; });
     want({ seen: true });
-    return () => { filming.value?.(); gone = true; hears.value = false; peer?.close(); want({ seen: false }); };
+    return () => { filming.value?.(); gone = true; clearInterval(look); hears.value = false; peer?.close(); want({ seen: false }); };
   }, [robot]);
-  return html`<div class="screen">${plain.value ? html`<img src=${`/api/robots/${robot}/camera.mjpeg`} alt=${t("camera.alt")} />${state.value?.parts.includes("microphone") && html`<audio src=${`/api/robots/${robot}/sound.wav`} autoplay muted=${!loud.value} onPlaying=${() => { hears.value = true; }}></audio>`}`
-    : html`<video ref=${video} autoplay playsinline muted=${!loud.value} aria-label=${t("camera.alt")}></video>`}<${Boxes} /></div>`;
+  const why = missing(there.value);
+  return html`<div class="screen" ref=${screen}>${plain.value ? html`<img src=${`/api/robots/${robot}/camera.mjpeg`} alt=${t("camera.alt")} onError=${() => setTimeout(again, AGAIN)} />${state.value?.parts.includes("microphone") && html`<audio src=${`/api/robots/${robot}/sound.wav`} autoplay muted=${!loud.value} onPlaying=${() => { hears.value = true; }}></audio>`}`
+    : html`<video ref=${video} autoplay playsinline muted=${!loud.value} aria-label=${t("camera.alt")}></video>`}${why ? html`<p class="why" role="status">${why}</p>` : html`<${Boxes} />`}</div>`;
 }
 
 /** What is heard beside a picture; a browser that cannot tap it films in silence. @param {Element} screen @returns {MediaStreamTrack[]} */
@@ -116,8 +127,8 @@ function film(screen, robot) {
 }
 
 export function Camera() {
-  const robot = current.value;
-  return html`<div class="card"><h3>${t("camera")}</h3><figure class="film" data-filmed=${filmed.value}>${shown.value ? html`<${Picture} key=${robot} robot=${robot} />` : html`<p class="muted">${t("camera.off")}</p>`}
+  const robot = current.value, tries = useSignal(0);
+  return html`<div class="card"><h3>${t("camera")}</h3><figure class="film" data-filmed=${filmed.value}>${shown.value ? html`<${Picture} key=${`${robot} ${connections.value} ${tries.value}`} robot=${robot} again=${() => { tries.value += 1; }} />` : html`<p class="muted">${t("camera.off")}</p>`}
     <figcaption class="buttons"><${Button} label=${t(shown.value ? "camera.close" : "camera.open")} onClick=${() => { shown.value = !shown.value; }} />
     ${shown.value && html`<${Button} label=${t("camera.boxes")} on=${boxes.value} onClick=${() => { boxes.value = !boxes.value; }} />`}
     ${shown.value && hears.value && html`<${Button} label=${t("camera.sound")} on=${loud.value} onClick=${() => { loud.value = !loud.value; }} />`}

@@ -1,7 +1,7 @@
 // The class: pupils join by a code and get a robot each; the teacher sees who is where, locks, resets, gives back.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, html, robotWord, say, t } from "../base.js";
+import { Button, fetched, html, robotWord, say, t } from "../base.js";
 import { choose, states } from "../link.js";
 
 const LOOK = 1000; // ms between two looks at who is there
@@ -9,9 +9,7 @@ const group = signal(/** @type {any} */ (null));
 
 /** @param {object} [wish] */
 async function ask(wish) {
-  const reply = await fetch("/api/class", wish ? { method: "POST", body: JSON.stringify(wish) } : {});
-  const words = await reply.json();
-  if (reply.ok) group.value = words; else if (wish) say(t("refused", { why: words.error }), true);
+  try { group.value = await fetched("/api/class", wish); } catch (error) { if (wish) say(t("refused", { why: error.message }), true); }
 }
 
 function Open() {

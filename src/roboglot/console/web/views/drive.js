@@ -3,8 +3,9 @@ import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, fixed, html, lacks, robotWord, t, translated } from "../base.js";
 import { command, drive, padRefused, state } from "../link.js";
-import { Camera } from "./camera.js";
+import { later } from "./later.js";
 
+const Camera = later(() => import("./camera.js").then((m) => m.Camera));
 const PERIOD = 80; // ms between two velocities
 const hand = signal({ x: 0, y: 0, yaw: 0, held: false });
 const share = signal(0.35);
@@ -89,20 +90,23 @@ function Pad() {
     <span class="n">▲</span><span class="s">▼</span><span class="w">↺</span><span class="e">↻</span></div>`;
 }
 
-function Slider({ name, min, max, step, value, onChange, verb, unit = "" }) {
-  return html`<label class="field"><span>${name} <output>${value}${unit}</output></span>
-    <input type="range" min=${min} max=${max} step=${step} value=${value} disabled=${Boolean(lacks(verb))} title=${lacks(verb)} onChange=${(e) => onChange(Number(e.target.value))} /></label>`;
+function Slider({ name, min, max, step, value, onChange, verb, said }) {
+  return html`<label class="field"><span>${name} <output>${said}</output></span>
+    <input type="range" min=${min} max=${max} step=${step} value=${value} aria-valuetext=${said} disabled=${Boolean(lacks(verb))} title=${lacks(verb)} onChange=${(e) => onChange(Number(e.target.value))} /></label>`;
 }
 
+const percent = (part) => `${Math.round(part * 100)} %`;
 const degrees = (rad) => Math.round(rad * 180 / Math.PI);
 const radians = (deg) => deg * Math.PI / 180;
+
+const COLOURS = { red: "#ff3b30", green: "#34c759", blue: "#0a84ff", yellow: "#ffd60a", white: "#ffffff" };
 
 const PANELS = {
   legs: (body) => html`<div class="card"><h3>${t("legs")}</h3><p>${robotWord(body.posture)}</p><div class="buttons">
     <${Button} label=${t("stand")} verb="stand" onClick=${() => command("stand")} /><${Button} label=${t("lie")} verb="lie_down" onClick=${() => command("lie_down")} /></div></div>`,
   gimbal: (body) => html`<div class="card"><h3>${t("gimbal")}</h3>
-    <${Slider} name=${t("pitch")} unit="°" min=${degrees(body.gimbal_reach[0])} max=${degrees(body.gimbal_reach[1])} step="1" value=${degrees(body.gimbal.pitch)} verb="aim" onChange=${(v) => command("aim", { pitch: radians(v) })} />
-    <${Slider} name=${t("yaw")} unit="°" min=${degrees(body.gimbal_reach[2])} max=${degrees(body.gimbal_reach[3])} step="1" value=${degrees(body.gimbal.yaw)} verb="aim" onChange=${(v) => command("aim", { yaw: radians(v) })} />
+    <${Slider} name=${t("pitch")} said=${`${degrees(body.gimbal.pitch)}°`} min=${degrees(body.gimbal_reach[0])} max=${degrees(body.gimbal_reach[1])} step="1" value=${degrees(body.gimbal.pitch)} verb="aim" onChange=${(v) => command("aim", { pitch: radians(v) })} />
+    <${Slider} name=${t("yaw")} said=${`${degrees(body.gimbal.yaw)}°`} min=${degrees(body.gimbal_reach[2])} max=${degrees(body.gimbal_reach[3])} step="1" value=${degrees(body.gimbal.yaw)} verb="aim" onChange=${(v) => command("aim", { yaw: radians(v) })} />
     <div class="buttons"><${Button} label=${t("recenter")} verb="recenter_gimbal" onClick=${() => command("recenter_gimbal")} /></div></div>`,
   arm: (body) => html`<div class="card"><h3>${t("arm")}</h3><p>x ${fixed(body.arm.x)} · z ${fixed(body.arm.z)} m</p><div class="buttons">
     ${/** @type {[string, number, number][]} */ ([["arm.out", 0.02, 0], ["arm.in", -0.02, 0], ["arm.up", 0, 0.02], ["arm.down", 0, -0.02]]).map(([key, x, z]) => html`<${Button} label=${t(key)} verb="move_arm" onClick=${() => command("move_arm", { x, z })} />`)}
@@ -111,12 +115,12 @@ const PANELS = {
     <${Button} label=${t("grip.open")} verb="grip" onClick=${() => command("grip", { close: false })} /><${Button} label=${t("grip.close")} verb="grip" onClick=${() => command("grip", { close: true })} /></div></div>`,
   blaster: (body) => html`<div class="card"><h3>${t("blaster")}</h3><p>${t("beads", { n: body.ammo })}</p><div class="buttons"><${Button} kind="danger" label=${t("fire")} verb="fire" onClick=${() => command("fire")} /></div></div>`,
   light: () => html`<div class="card"><h3>${t("light")}</h3><div class="buttons">
-    ${["#ff3b30", "#34c759", "#0a84ff", "#ffd60a", "#ffffff"].map((c) => html`<button type="button" class="swatch" aria-label=${c} style=${{ background: c }} aria-disabled=${lacks("shine") ? "true" : undefined} onClick=${() => shine(c)}></button>`)}
+    ${Object.entries(COLOURS).map(([name, c]) => html`<button type="button" class="swatch" aria-label=${t(`colour.${name}`)} title=${t(`colour.${name}`)} style=${{ background: c }} aria-disabled=${lacks("shine") ? "true" : undefined} onClick=${() => shine(c)}></button>`)}
     <${Button} label=${t("light.off")} verb="shine" onClick=${() => shine("#000000")} /></div></div>`,
   speaker: (body) => html`<div class="card"><h3>${t("speaker")}</h3>
     <form class="inline" onSubmit=${(e) => { e.preventDefault(); const text = new FormData(e.target).get("text"); if (text) command("say", { text }); }}>
       <label class="grow"><span class="unseen">${t("say.text")}</span><input name="text" maxlength="200" placeholder=${t("say.text")} /></label><${Button} type="submit" label=${t("say")} verb="say" /></form>
-    <${Slider} name=${t("volume")} min="0" max="1" step="0.05" value=${body.volume} verb="volume" onChange=${(to) => command("volume", { to })} /></div>`,
+    <${Slider} name=${t("volume")} said=${percent(body.volume)} min="0" max="1" step="0.05" value=${body.volume} verb="volume" onChange=${(to) => command("volume", { to })} /></div>`,
 };
 
 function shine(colour) {
@@ -130,7 +134,7 @@ export function Drive() {
   const { parts, body, about } = state.value;
   return html`${parts.includes("driving") && html`<div class="card"><h3>${t("pad.title")}</h3><${Pad} />
       ${(lacks("drive") || padRefused.value) && html`<p class="warned">${lacks("drive") || translated(padRefused.value)}</p>`}
-      <${Slider} name=${t("pad.speed", { speed: (about.speed * share.value).toFixed(1) })} min="0.05" max="1" step="0.05" value=${share.value} onChange=${(v) => { share.value = v; }} />
+      <${Slider} name=${t("pad.speed", { speed: fixed(about.speed * share.value) })} said=${percent(share.value)} min="0.05" max="1" step="0.05" value=${share.value} onChange=${(v) => { share.value = v; }} />
       <p class="muted">${t("pad.hint")}</p></div>`}
     ${parts.includes("camera") && html`<${Camera} />`}
     ${Object.entries(PANELS).filter(([name]) => parts.includes(name)).map(([, panel]) => panel(body))}`;

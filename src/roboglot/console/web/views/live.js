@@ -141,6 +141,6 @@ export function Live() {
     <${MapView} tool=${TOOLS[used()]} overlay=${overlay}><${Tools} />
       ${simulated.value && wanted.value.truth && html`<p class="legend">${t("truth.legend")}</p>`}<//>
     <aside><${Tabs} tabs=${TABS} chosen=${tab} label=${t("panels")} />
-      <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0">${state.value ? html`<${Shown} />` : html`<p class="muted">${t("link.opening")}</p>`}</div></aside>
+      <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><h2 class="unseen">${t(`tab.${tab.value}`)}</h2>${state.value ? html`<${Shown} />` : html`<p class="muted">${t("link.opening")}</p>`}</div></aside>
   </div>`;
 }

@@ -66,7 +66,7 @@ function made(uPlot, place, name, range) {
   const ago = (plot, values) => values.map((v) => `${Math.round(v - (plot.data[0].at(-1) ?? 0))} s`);
   return new uPlot({
     width: place.clientWidth, height: HEIGHT, legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0],
-    scales: { x: { time: false, range: (_, from, to) => [Math.min(from, to - SHORTEST), to] }, y: { range: range ?? ((_, low, high) => [Math.min(low, 0), Math.max(high, 1)]) } },
+    scales: { x: { time: false, range: (plot, from, to) => { const [times] = plot.data, last = times.at(-1) ?? to; return [Math.min(times[0] ?? from, last - SHORTEST), last]; } }, y: { range: range ?? ((_, low, high) => [Math.min(low, 0), Math.max(high, 1)]) } },
     axes: [{ ...axis, values: ago, incrs: STEPS, splits: backwards, space: 60, size: 26 }, { ...axis, size: 46 }],
     series: [{}, { stroke: c.path, width: 2, points: { show: false } }],
   }, columns(name), place);

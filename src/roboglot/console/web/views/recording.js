@@ -1,18 +1,21 @@
 // Records all that robots say, hear, see and do: begin, mark, end.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, duration, html, say, t } from "../base.js";
-import { recording } from "../link.js";
+import { Button, duration, fetched, html, say, t } from "../base.js";
+import { connections, recording } from "../link.js";
 
 const LOOK = 1000; // ms
 const known = signal(/** @type {any} */ (null));
 
 /** @param {object} [wish] */
 async function ask(wish) {
-  const reply = await fetch("/api/recording", wish ? { method: "POST", body: JSON.stringify(wish) } : {});
-  const words = await reply.json();
-  if (reply.ok) known.value = words; else if (wish) say(t("refused", { why: words.error }), true);
-  return reply.ok ? words : null;
+  try {
+    known.value = await fetched("/api/recording", wish);
+    return known.value;
+  } catch (error) {
+    if (wish) say(t("refused", { why: error.message }), true);
+    return null;
+  }
 }
 
 async function end() {
@@ -22,7 +25,7 @@ async function end() {
 
 export function Recording() {
   const on = recording.value;
-  useEffect(() => { ask(); if (!on) return undefined; const timer = setInterval(ask, LOOK); return () => clearInterval(timer); }, [on]);
+  useEffect(() => { ask(); if (!on) return undefined; const timer = setInterval(ask, LOOK); return () => clearInterval(timer); }, [on, connections.value]);
   if (!known.value) return null;
   const { seconds, bytes, file, failure } = known.value;
   return html`<div class="card"><h3>${t("record")}</h3><p class=${failure ? "warned" : "muted"}>${failure || (on ? t("record.on", { file, time: duration(seconds), megabytes: (bytes / 1e6).toFixed(1) }) : t("record.hint"))}</p>

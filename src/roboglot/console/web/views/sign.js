@@ -1,7 +1,7 @@
 // The log-in page: a name and a password, a token, or a name and the code of a class.
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, elsewhere, html, person, sent as asked, t, translated } from "../base.js";
+import { Button, elsewhere, fetched, html, person, sent as asked, t, translated } from "../base.js";
 import { chosen, connect, hello, me, status } from "../link.js";
 
 const WAYS = { password: ["name", "password"], token: ["token"], code: ["name", "code"] };
@@ -14,9 +14,7 @@ const busy = signal(false);
 async function signIn(given) {
   busy.value = true;
   try {
-    const reply = await fetch("/api/sign_in", { method: "POST", body: JSON.stringify(given) });
-    const words = await reply.json();
-    if (!reply.ok) throw new Error(words.error);
+    const words = await fetched("/api/sign_in", given);
     if (words.elsewhere) { location.assign(elsewhere(words)); return; }
     if (words.robot) chosen.value = words.robot;
     if (given.name) person.value = given.name;

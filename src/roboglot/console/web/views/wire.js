@@ -1,13 +1,12 @@
 // The wire view: every request, reply and push of all doors as they happen, and each of them to copy.
 import { useEffect, useRef } from "preact/hooks";
-import { computed, signal } from "@preact/signals";
-import { Button, html, say, t } from "../base.js";
-import { clock, current, exchanges, hello, missed } from "../link.js";
+import { batch, computed, effect, signal } from "@preact/signals";
+import { Button, fetched, html, say, t } from "../base.js";
+import { clock, connections, current, exchanges, hello, missed } from "../link.js";
 
 // One row: [number, stamp, door, connection, client, direction, operation, status, refusal, ms, bytes, excerpt]
 const [NUMBER, STAMP, DOOR, CONNECTION, CLIENT, DIRECTION, OPERATION, STATUS, REFUSAL, MS, BYTES, EXCERPT] = Array(12).keys();
 const SHOWN_MAX = 400; // rows in the page at a time
-const DOORS = ["slamware", "robomaster", "cyberdog", "visual"];
 const FORMS = { slamware: ["curl", "python"], robomaster: ["nc", "python"], cyberdog: ["grpcurl", "python"], visual: ["websocat", "python"] };
 
 const door = signal("");
@@ -16,8 +15,10 @@ const refusedOnly = signal(false);
 const pushes = signal(true);
 const paused = signal(/** @type {any[][] | null} */ (null));
 const opened = signal(0);
+effect(() => { void current.value; void connections.value; batch(() => { paused.value = null; opened.value = 0; }); }); // rows of another robot
 const helpings = signal(1); // of them
 
+const doors = computed(() => [...new Set([...Object.keys(FORMS), ...exchanges.value.map((row) => row[DOOR]), door.value])].filter(Boolean));
 const most = computed(() => SHOWN_MAX * helpings.value);
 const found = computed(() => {
   const needle = text.value.trim().toLowerCase(), rows = paused.value ?? exchanges.value, newest = [];
@@ -28,18 +29,21 @@ const found = computed(() => {
 });
 const shown = computed(() => found.value.slice(-most.value));
 
+/** What the server says of a message; a refusal is said. @param {string} what @param {object} [wish] */
+async function over(what, wish) {
+  try { return await fetched(`/api/robots/${current.value}/wire/${what}`, wish); } catch (error) { say(t("refused", { why: error.message }), true); return null; }
+}
+
 async function copy(number, form) {
-  const reply = await fetch(`/api/robots/${current.value}/wire/${number}/${form}`);
-  const words = await reply.text();
-  if (!reply.ok) return say(t("refused", { why: JSON.parse(words).error }), true);
+  const words = await over(`${number}/${form}`);
+  if (words === null) return undefined;
   try { await navigator.clipboard.writeText(words); } catch { return prompt(t("copy.by.hand"), words); }
   return say(t("copied", { form }));
 }
 
 async function sendAgain(number) {
-  const reply = await fetch(`/api/robots/${current.value}/wire/${number}/resend`, { method: "POST" });
-  const words = await reply.json();
-  if (!reply.ok) return say(t("refused", { why: words.error }), true);
+  const words = await over(`${number}/resend`, {});
+  if (words === null) return undefined;
   const [status, answer] = words.answers[0] ?? ["", ""];
   return say(t("wire.resent", { status, answer: answer.slice(0, 120) }));
 }
@@ -79,7 +83,7 @@ export function Wire() {
   return html`<section class="wire" aria-label=${t("view.wire")}>
     <div class="filters" role="search">
       <label><span class="unseen">${t("wire.door")}</span><select value=${door.value} onChange=${(e) => { door.value = e.target.value; }}>
-        <option value="">${t("wire.all")}</option>${DOORS.map((d) => html`<option value=${d}>${d}</option>`)}</select></label>
+        <option value="">${t("wire.all")}</option>${doors.value.map((d) => html`<option value=${d}>${d}</option>`)}</select></label>
       <label class="grow"><span class="unseen">${t("wire.filter")}</span><input type="search" placeholder=${t("wire.filter")} value=${text.value} onInput=${(e) => { text.value = e.target.value; }} /></label>
       <${Button} label=${t("wire.refusedonly")} on=${refusedOnly.value} onClick=${() => { refusedOnly.value = !refusedOnly.value; }} />
       <${Button} label=${t("wire.pushes")} on=${pushes.value} onClick=${() => { pushes.value = !pushes.value; }} />

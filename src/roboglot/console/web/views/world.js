@@ -66,15 +66,19 @@ function rectangle([x0, y0], [x1, y1]) {
 }
 
 function People() {
-  const names = Object.keys(truth.value?.people ?? {}), boxes = Object.keys(truth.value?.boxes ?? {}), tags = Object.entries(truth.value?.tags ?? {});
-  const chosen = chosenPerson();
   return html`<div class="card"><h3>${t("robot.hands")}</h3><div class="buttons">
       <${Button} label=${t("hands.push")} verb="push" onClick=${() => changeWorld("push", { robot: current.value, x: 8 })} />
       <${Button} label=${t("hands.lift")} verb="lift" onClick=${() => changeWorld("lift", { robot: current.value, up: true })} />
       <${Button} label=${t("hands.letgo")} verb="lift" onClick=${() => changeWorld("lift", { robot: current.value, up: false })} />
       <${Button} label=${t("hands.plug")} verb="plug_in" onClick=${() => changeWorld("plug_in", { robot: current.value, wire: true })} />
       <${Button} label=${t("hands.unplug")} verb="plug_in" onClick=${() => changeWorld("plug_in", { robot: current.value, wire: false })} /></div></div>
-    <div class="card"><h3>${t("people")}</h3>${names.length ? html`<ul class="list">${names.map((name) => html`<li>
+    ${hello.value.whole ? html`<${Figures} />` : html`<p class="muted">${t("world.hidden")}</p>`}`;
+}
+
+function Figures() {
+  const names = Object.keys(truth.value?.people ?? {}), boxes = Object.keys(truth.value?.boxes ?? {}), tags = Object.entries(truth.value?.tags ?? {});
+  const chosen = chosenPerson();
+  return html`<div class="card"><h3>${t("people")}</h3>${names.length ? html`<ul class="list">${names.map((name) => html`<li>
       <${Button} label=${name} on=${chosen === name} onClick=${() => { someone.value = name; tool.value = "person"; }} />${chosen === name && html`
       <${Button} label=${t("people.resume")} verb="resume_person" onClick=${() => changeWorld("resume_person", { person: name })} />
       <${Button} label=${t("say")} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} />
@@ -138,6 +142,6 @@ export function World() {
         <${Button} compact icon=${ICONS[name]} label=${t(`tool.${name}`)} verb=${NEEDS[name]} on=${used === name} onClick=${() => { tool.value = name; }} />`)}</div>
       <p class="hint">${t(`tool.${used}.hint`)}</p><//>
     <aside><${Tabs} tabs=${tabs} chosen=${tab} label=${t("panels")} />
-      <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0">${state.value ? html`<${Shown} />` : null}</div></aside>
+      <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><h2 class="unseen">${t(`tab.${Object.keys(tabs).find((name) => tabs[name] === Shown)}`)}</h2>${state.value ? html`<${Shown} />` : null}</div></aside>
   </div>`;
 }

@@ -90,6 +90,11 @@ class Camera(Component):
     def set_exposure(self, stops: float) -> None:
         """Correct the brightness. Raises InvalidGoal beyond EXPOSURE_MAX."""
 
+    @property
+    def delay(self) -> str:
+        """Reason why the first picture takes long at present, a sentence; empty otherwise."""
+        return ""
+
     def prepare(self) -> None:
         """Start the slow preparations of a first picture in the background; return at once."""
 

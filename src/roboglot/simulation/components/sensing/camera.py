@@ -135,6 +135,10 @@ class SimulatedCamera(Camera):
             raise InvalidGoal(f"exposure is corrected by up to {EXPOSURE_MAX:g} stops, not {stops:g}")
         self._exposure = stops
 
+    @property
+    def delay(self) -> str:
+        return self._studio.delay
+
     def prepare(self) -> None:
         """Load the renderer and draw once, in the background; do nothing in lockstep."""
         if isinstance(self._clock, RealClock) and self._renderer is None and self._preparing is None:

@@ -1,0 +1,80 @@
+"""The console beside a lost, silent or other server, in a real browser: nothing old is shown as if it were new."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from roboglot.console.live import Page as ServerPage
+from tests.browser.served import PATIENCE, OpenConsole, Page, Served
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+QUICKLY = """() => {
+    const now = performance.now.bind(performance);
+    let later = 0;
+    performance.now = () => now() + (later += 11_000);
+}"""
+OTHER_ROBOTS = """() => import('/link.js').then((link) => {
+    link.scan.value = {};
+    link.hello.value = { ...link.hello.value, robots: [{ name: 'z', rights: [], simulated: true }] };
+    return [link.current.value, link.scan.value, link.grid.value];
+})"""
+
+
+async def watched(served: Served) -> None:
+    async with asyncio.timeout(PATIENCE):
+        while not served.robot.tap.watched:  # noqa: ASYNC110 - a page has no event of ours
+            await asyncio.sleep(0.02)
+
+
+async def reconnect(served: Served, page: Page) -> None:
+    """Cut the page's connection, and wait until it is there again."""
+    assert served.runtime.console is not None
+    for connection in list(served.runtime.console._connections):
+        connection.transport.abort()  # type: ignore[attr-defined]
+    await page.wait_for_selector("text=The connection to roboglot is lost.")
+    await page.wait_for_selector(".link.good")
+
+
+async def test_silent_server_counts_as_lost(
+    served: Served, open_console: OpenConsole, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = await open_console()
+    await page.wait_for_selector(".link.good >> text=ms")
+    with monkeypatch.context() as patch:
+        patch.setattr(ServerPage, "_reply", lambda *_: None)
+        await page.evaluate(QUICKLY)
+        await page.wait_for_selector("text=The connection to roboglot is lost.")
+        await page.evaluate("delete performance.now")
+    await page.wait_for_selector(".link.good >> text=ms")
+
+
+async def test_reconnected_wire_shows_each_message_once(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console(view="wire")
+    await watched(served)
+    served.robot.tap.request("slamware", "GET /before", b"")
+    await page.wait_for_selector(".lines >> text=GET /before")
+    before = await page.locator(".lines .line").count()
+    await reconnect(served, page)
+    await watched(served)
+    served.robot.tap.request("slamware", "GET /after", b"")
+    await page.wait_for_selector(".lines >> text=GET /after")
+    assert await page.locator(".lines >> text=GET /before").count() <= 1
+    assert await page.locator(".lines .line").count() <= before + 1
+
+
+async def test_gone_robot_leaves_nothing_drawn(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    await page.wait_for_selector("text=Scan fits map")
+    assert await page.evaluate(OTHER_ROBOTS) == ["z", None, None]
+
+
+async def test_buttons_say_that_there_is_no_connection(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    await page.click("#tab-actions")
+    await page.wait_for_selector("text=Record")
+    await page.context.set_offline(True)
+    await page.click("button:has-text('Record')")
+    await page.wait_for_selector(".notice.bad >> text=Refused: No connection")
+    await page.context.set_offline(False)
