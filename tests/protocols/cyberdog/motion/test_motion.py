@@ -113,6 +113,9 @@ async def test_every_frame_is_reported(
     assert app.of(1003)[1]["result"] is False
     assert app.of(1003)[1]["code"] == 3008
     assert "cmd_id" not in app.of(1003)[1]
+    await client.ask(1002, {**WALK, "cmd_type": 3})  # neither data nor end
+    await until(lambda: len(app.of(1003)) == 3)
+    assert (app.of(1003)[2]["result"], app.of(1003)[2]["code"]) == (False, 3010)
 
 
 async def test_lying_and_standing_are_answered_when_done(client, robot, world, forward) -> None:

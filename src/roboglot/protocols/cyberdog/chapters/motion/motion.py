@@ -41,6 +41,8 @@ async def servo(
     gaits = call.context.gaits
     if cmd_type == CommandType.END:
         executed = gaits.end_servo()
+    elif cmd_type not in (CommandType.START, CommandType.DATA):
+        executed = Executed(MotionCode.PARAMETERS)
     elif value == CALIBRATION:
         executed = gaits.calibrate()
     elif motion_id in WALKS:
