@@ -32,6 +32,7 @@ from roboglot.testing import Forward
 
 pytestmark = pytest.mark.world("empty")
 SYSTEM = "/api/core/system/v1"
+ACTIONS = "/api/core/motion/v1/actions"
 PARAMETER, HEALTH, MASKS = f"{SYSTEM}/parameter", f"{SYSTEM}/robot/health", "/api/core/sensors/v1/masks"
 
 
@@ -149,6 +150,13 @@ async def test_sleep_and_waking_up(robot: Robot, client: httpx.AsyncClient, forw
     assert (await client.post(f"{SYSTEM}/power/:hibernate")).status_code == 200
     await forward(seconds=10)
     assert await mode() == "asleep"
+    health = (await client.get(HEALTH)).json()
+    assert (health["hasFatal"], health["hasLidarDisconnected"]) == (False, False)  # it was switched off, not lost
+    goal = {"target": {"x": 1.0, "y": 0.0}, "move_options": {}}
+    sent = await client.post(ACTIONS, json={"action_name": "slamtec.agent.actions.MoveToAction", "options": goal})
+    await forward(seconds=0.5)
+    ended = (await client.get(f"{ACTIONS}/{sent.json()['action_id']}")).json()["state"]
+    assert ended == {"status": 4, "result": -1, "reason": "the robot is asleep"}
     assert (await client.post(f"{SYSTEM}/power/:wakeup")).status_code == 200
     await forward(seconds=0.5)
     assert await mode() == "waking_up"

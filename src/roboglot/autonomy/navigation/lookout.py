@@ -14,6 +14,7 @@ from roboglot.autonomy.navigation.low_sight import LowSight
 from roboglot.autonomy.navigation.narrow_passage import NarrowPassage
 from roboglot.autonomy.navigation.route import SPACING
 from roboglot.model.actions import Action
+from roboglot.model.components.motion.base import Base
 from roboglot.model.errors import Blocked
 from roboglot.model.events import CorridorEntered, PathBlocked, ScanTaken
 from roboglot.model.geometry import Point, Pose
@@ -60,9 +61,11 @@ class Lookout:
         return f": a gap is {self.gap:.2f} m wide, {needed:.2f} m are needed" if self.gap < needed else ""
 
     async def first_scan(self) -> None:
-        """Wait for a recent scan. Raises Blocked if there is none in time."""
+        """Wait for a recent scan. Raises Blocked if there is none in time, Refused at once if the base is held."""
         deadline = self._clock.time() + self._tuning.patience
         while not self.sees:
+            if (refusal := self._robot[Base].refusal) is not None:
+                raise refusal.again()
             if self._clock.time() > deadline:
                 raise Blocked("the lidar is silent")
             await self._clock.sleep(PERIOD)

@@ -7,6 +7,7 @@ from typing import Any
 
 from roboglot.model.components.component import Component
 from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
@@ -118,9 +119,13 @@ class HealthWatch:
                 health.set(watch.name, not before, watch.part, watch.level, watch.message)
 
     def _scanless(self, now: float) -> bool:
-        if self._robot[Lidar].scan is not None:
+        """True if scans stopped by themselves: a robot that sleeps or is off has switched its lidar off."""
+        if self._robot[Lidar].scan is not None or self._rests():
             self._scanned = now
         return now - self._scanned >= SCANLESS_AFTER
+
+    def _rests(self) -> bool:
+        return Power in self._robot and self._robot[Power].mode in (PowerMode.ASLEEP, PowerMode.OFF)
 
     def _bumper_stuck(self, now: float) -> bool:
         """Return whether a zone has been pressed for long without a contact at the hull."""
