@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import AsyncIterator
 from dataclasses import replace
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 import pytest
 from msgspec import structs
 
 from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
+from roboglot.autonomy.building.floors import LiftFloors
 from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.fleet import Fleet
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.components.mapping.annotations import (
     Annotations,
     Area,
@@ -28,7 +31,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.errors import Blocked, InvalidGoal, Refused
-from roboglot.model.events import ActionChanged, FloorReached
+from roboglot.model.events import ActionChanged, FloorReached, MapReplaced
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.components.sensing.lidar import SimulatedLidar
@@ -176,6 +179,71 @@ async def test_ride_given_up_in_the_car(tour: Tour) -> None:
     await tour.clock.advance(2.0)
     assert tour.error[0] < 0.05
     assert agreement(downstairs, tour.robot[Mapping].grid) > 0.95
+
+
+@pytest.fixture
+async def aboard(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[LiftFloors]:
+    """The floors of a robot that takes any place for the car, needs no way into it, and rides five seconds."""
+
+    async def already_there(_goal: Pose, *, backwards: bool) -> None:
+        assert backwards in (True, False)
+
+    async def five_seconds(floor: int) -> None:
+        await tour.clock.sleep(5.0)
+        monkeypatch.setattr(type(lift), "state", replace(lift.state, floor=floor, target=None))
+
+    floors, lift = tour.robot[Floors], tour.robot[LiftClient]
+    assert isinstance(floors, LiftFloors)
+    monkeypatch.setattr(LiftFloors, "_is_aboard", True)
+    monkeypatch.setattr(floors, "_through", already_there)
+    monkeypatch.setattr(floors, "_comes", five_seconds)
+    say_where_the_lift_is(tour)
+    yield floors
+    monkeypatch.setattr(LiftFloors, "_is_aboard", False)
+    await tour.clock.advance(1.0)  # a stay in the car ends
+
+
+async def test_closing_server_begins_no_stay(tour: Tour, aboard: LiftFloors) -> None:
+    action = aboard.ride(1)
+    await tour.until(lambda: action.feedback is RideStage.RIDING)
+    known(action._task).cancel()  # as a closing loop does
+    await tour.end_of(action)
+    assert aboard._stay is None
+
+
+async def test_given_up_ride_mixes_no_floors(tour: Tour, aboard: LiftFloors, monkeypatch: pytest.MonkeyPatch) -> None:
+    await tour.robot[MapAnnotations].change(
+        lambda now: now.with_new(Area(0, AreaKind.DANGEROUS, Point(1.0), Point(2.0), 0.5))
+    )
+    action, store = aboard.ride(1), type(tour.robot[MapAnnotations])
+    change = store.change
+
+    async def given_up_meanwhile(*arguments: Any) -> None:
+        action.cancel("the client thinks better of it")
+        await asyncio.sleep(0)
+        await change(*arguments)
+
+    monkeypatch.setattr(store, "change", given_up_meanwhile)
+    await tour.end_of(action)
+    assert (action.status, aboard.current) == (ActionStatus.CANCELED, 1)
+    assert tour.robot[MapAnnotations].current.areas == ()
+
+
+async def test_ride_begins_where_the_car_stopped(
+    tour: Tour, aboard: LiftFloors, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("roboglot.autonomy.building.floors.STAY_PERIOD", 2.0)
+    lift, maps = tour.robot[LiftClient], list[MapReplaced]()
+    action = aboard.ride(1)
+    await tour.until(lambda: action.feedback is RideStage.RIDING)
+    action.cancel("the client thinks better of it")
+    await tour.end_of(action)
+    tour.robot.events.listen(MapReplaced, maps.append)
+    monkeypatch.setattr(type(lift), "state", replace(lift.state, floor=1, target=None))
+    aboard.begin_on(0)  # a client that has not heard of the stop
+    action = await tour.end_of(aboard.ride(2))
+    assert action.status is ActionStatus.SUCCEEDED, action.reason
+    assert (aboard.current, len(maps)) == (2, 2)  # first the floor of the stop, then the ride's
 
 
 async def test_covered_lidar_is_no_free_way(tour: Tour) -> None:

@@ -18,7 +18,7 @@ from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start
 from roboglot.autonomy.navigation.course import Course, Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.slam.scan_points import ScanReader, sees
-from roboglot.model.actions import Action
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.logistics.lift_client import LiftClient, LiftDoor
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.floors import Floors, RideStage
@@ -65,7 +65,8 @@ class LiftFloors(Floors):
 
     def begin_on(self, floor: int) -> None:
         self._check(floor)
-        self._current = floor
+        if self._stay is None:  # else the car decides
+            self._current = floor
 
     def set_lift(self, waiting: Pose, inside: Pose) -> None:
         numbers = (waiting.x, waiting.y, waiting.yaw, inside.x, inside.y, inside.yaw)
@@ -135,9 +136,12 @@ class LiftFloors(Floors):
             action.report(RideStage.CALLING)
             await self._comes(self._current)
             await mine.may_board()
-        mapped, start = self._end_stay(), self._current
+        stay, mapped, start = self._stay, self._end_stay(), self._current
         belief.mapping = False  # doors open and close, and the car belongs to no floor
         try:
+            if stay is not None:
+                await asyncio.wait([stay])  # it may be changing floors
+                await self._follow_car(redraw)
             action.report(RideStage.BOARDING)
             await self._through(inside, backwards=False)
             lift.close_door()
@@ -147,11 +151,11 @@ class LiftFloors(Floors):
                 await self._change_to(floor, redraw)
             action.report(RideStage.LEAVING)
             await self._through(self._places[0], backwards=True)
-        except BaseException:
-            if self._is_aboard or self._current != start:
-                stay = self._stay_aboard(start, redraw)
-                self._stay = asyncio.get_running_loop().create_task(stay, name=f"{self.robot.id} is in the lift")
+        except BaseException as error:
+            closing = isinstance(error, asyncio.CancelledError) and action.status is not ActionStatus.CANCELING
+            if not closing and (self._is_aboard or self._current != start):
                 self._maps_outside, mapped = mapped, False
+                self._begin_stay(start, redraw)
             raise
         finally:
             belief.mapping = mapped
@@ -159,14 +163,15 @@ class LiftFloors(Floors):
             lift.close_door()
         action.report(RideStage.ARRIVED)
 
+    def _begin_stay(self, start: int, redraw: bool) -> None:
+        stay = self._stay_aboard(start, redraw)
+        self._stay = asyncio.get_running_loop().create_task(stay, name=f"{self.robot.id} is in the lift")
+
     async def _stay_aboard(self, start: int, redraw: bool) -> None:
         """Change floors with a car in which a ride from ``start`` was given up, until the robot is outside."""
-        lift, clock, known = self.robot[LiftClient], self.robot.clock, start
+        clock, known = self.robot.clock, start
         while True:
-            with contextlib.suppress(Refused):  # out of reach
-                state = lift.state
-                if self._is_aboard and state.target is None and state.floor != self._current:
-                    await self._change_to(state.floor, redraw)
+            await self._follow_car(redraw)
             if self._current != known:
                 assert self._places is not None
                 known, place = self._current, self.belief.pose.relative_to(self._places[1])
@@ -175,6 +180,13 @@ class LiftFloors(Floors):
                 break
             await clock.sleep(STAY_PERIOD)
         self.belief.mapping = self._end_stay()
+
+    async def _follow_car(self, redraw: bool) -> None:
+        """Change to the floor at which the car stands, if the robot is in it."""
+        with contextlib.suppress(Refused):  # out of reach
+            state = self.robot[LiftClient].state
+            if self._is_aboard and state.target is None and state.floor != self._current:
+                await self._change_to(state.floor, redraw)
 
     def _end_stay(self) -> bool:
         """End a stay in the car; return whether the robot maps outside."""
@@ -248,6 +260,15 @@ class LiftFloors(Floors):
         return sees(self.robot[Lidar].scan, 0.0 if way > 0.0 else math.pi)
 
     async def _change_to(self, floor: int, redraw: bool) -> None:
+        """Exchange the floors to the end, even if the ride is given up meanwhile: half of it would mix them."""
+        exchange = asyncio.get_running_loop().create_task(self._exchange(floor, redraw))
+        try:
+            await asyncio.shield(exchange)
+        except asyncio.CancelledError:
+            await exchange
+            raise
+
+    async def _exchange(self, floor: int, redraw: bool) -> None:
         """Store the present floor's state and restore that of ``floor``, keeping the robot's place in the car."""
         assert self._places is not None
         robot, belief = self.robot, self.belief

@@ -18,6 +18,7 @@ from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.events import FloorReached
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
@@ -200,6 +201,29 @@ async def test_to_a_place_on_another_floor_and_back(
     events = [event["type"] for event in (await client.get("/api/platform/v1/events")).json()]
     assert [event for event in events if "ELEVATOR" in event] == ["WAIT_ELEVATOR", "ENTER_ELEVATOR_FAILED"]
     assert world.truth.floor_of("a") == 0
+
+
+async def test_unloaded_floor_shows_no_other_one(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, origin: Pose
+) -> None:
+    """The robot was brought there by a car in which a ride was given up."""
+
+    async def brought_to(floor: int) -> tuple[str, str, list[str]]:
+        robot.events.publish(FloorReached(stamp=robot.clock.time(), floor=floor, place=Pose(0.1)))
+        await forward(seconds=0.5)
+        here = (await client.get(f"{MULTI}/floors/:current")).json()
+        places = (await client.get("/api/core/artifact/v1/pois")).json()
+        return here["building"], here["floor"], [place["id"] for place in places]
+
+    await forward(seconds=1)
+    await two_floors(robot, client, origin)
+    assert await brought_to(2) == ("A", "second", [])
+    (elevator,) = (await client.get(ELEVATORS)).json()  # the car in which it stands is all that it knows there
+    assert elevator["elevator_id"] == LIFT
+    (front,) = elevator["front_scheduling_poses"]
+    assert [front[key] for key in ("x", "y", "yaw")] == pytest.approx([-2.1, 0.0, 0.0], abs=1e-6)
+    assert await brought_to(1) == ("A", "first", ["u1"])
+    assert await brought_to(0) == ("A", "ground", ["g1"])
 
 
 async def test_unknown_place_fails_the_action(client: httpx.AsyncClient, forward: Forward) -> None:

@@ -6,10 +6,16 @@ import asyncio
 import logging
 from collections.abc import Callable
 
+from roboglot.model.components.logistics.lift_client import LiftClient
+from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.floors import Floors
+from roboglot.model.components.mapping.map_memory import Drawings
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.events import FloorReached
+from roboglot.model.geometry import Pose
+from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.motion.lift_rides import shared_elevators, stop_at
+from roboglot.protocols.slamware.chapters.multi_floor.elevators import elevators_here
 from roboglot.protocols.slamware.context import Context
 
 log = logging.getLogger(__name__)
@@ -44,9 +50,20 @@ class GivenUpRides:
             floor = next((floor for floor in maps.floors if stop_at(self._context, floor.name) == event.floor), None)
             shared = shared_elevators(robot, floor) if floor else []
             if floor is None or not shared:
-                raise NotFound(f"no loaded floor has a map of the lift's stop {event.floor}")
+                stop = robot[LiftClient].floors[event.floor]
+                await maps.leave_floors(stop, self._car(event.place))
+                raise NotFound(f"no loaded floor has a map of the lift's stop {stop}")
             _, landing = shared[0]
             await maps.enter(floor.name.building, floor.name.floor, landing.inside.compose(event.place))
             robot[Floors].set_lift(landing.waiting(), landing.inside)
         except RobotError as error:
             log.warning("robot %s was brought to a floor whose map it cannot use: %s", robot.id, error)
+
+    def _car(self, place: Pose) -> Drawings:
+        """Return the car's area, if only one is drawn, as seen from the robot at ``place`` in it."""
+        now, elevators = self._context.robot[MapAnnotations].current, elevators_here(self._context.robot)
+        if len(elevators) != 1:
+            return Drawings((), Annotations(last_id=now.last_id))
+        (elevator,) = elevators
+        drawn = Drawings((), Annotations(areas=(elevator.area,), last_id=now.last_id))
+        return seen_from(elevator.inside.compose(place), drawn)

@@ -108,7 +108,9 @@ class MapKeeper:
         """Use the map of a file's start floor from now on, in memory only."""
         floor = self._start_of(await self._parse(data))
         async with self._turn:
-            await self._use(floor, pose, self._put_drawings(floor, {}))  # the present drawings belong to no file
+            await self._use(
+                floor, pose, _put_drawings(self._robot, floor, {})
+            )  # the present drawings belong to no file
 
     async def upload(self, data: bytes) -> None:
         """Store the file on disk unchanged, without loading it. Raises InvalidGoal unless it is a composite map."""
@@ -166,7 +168,9 @@ class MapKeeper:
                 if restarting:
                     floor, pose = _resumed(self._robot, floors, digest) or (floor, None)
                 keep = restarting and digest in _basis(self._robot)
-                draw = self._turn_over(floor, digest) if keep else self._put_drawings(floor, {digest: NOT_MOVED})
+                draw = (
+                    self._turn_over(floor, digest) if keep else _put_drawings(self._robot, floor, {digest: NOT_MOVED})
+                )
                 await self._use(floor, pose, draw)
             except NotFound:
                 self.status = before
@@ -201,6 +205,19 @@ class MapKeeper:
                     await self._use(loaded, pose, self._turn_over(loaded, self._loaded))
                 return
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
+
+    async def leave_floors(self, stop: str, drawn: Drawings) -> None:
+        """Put the floor's drawings aside: the robot is at the lift's ``stop``, whose map has no more than ``drawn``."""
+        async with self._turn:
+            others, basis = await self._others(), _basis(self._robot)
+
+            def edit(now: Drawings) -> Replacement:
+                for shift in basis.values():
+                    self._put_aside(now, shift, others)
+                return Replacement(drawn, {FLOOR: NO_FLOOR}, {DRAWN: _encoded(others)})
+
+            await self._robot[MapMemory].replace(edit)
+            self._layers, self.current = (), FloorName(self.current.building, stop, default=False)
 
     async def _parse(self, data: bytes) -> list[FloorMap]:
         """Return the floors in a file, in a thread: a hostile file may take seconds, and 300 MB; so one at a time."""
@@ -263,7 +280,7 @@ class MapKeeper:
     async def _turn_over(self, floor: FloorMap, digest: str) -> None:
         """Switch from the floor in memory to ``floor`` of the map with ``digest``, each with its drawings."""
         if digest not in _basis(self._robot):  # memory holds another map
-            await self._put_drawings(floor, {digest: NOT_MOVED})
+            await _put_drawings(self._robot, floor, {digest: NOT_MOVED})
             return
         others, shift = await self._others(), _basis(self._robot)[digest]
 
@@ -285,9 +302,10 @@ class MapKeeper:
         except NotFound:
             return {}
 
-    async def _put_drawings(self, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
-        """Replace memory's drawings by those of the file: all or nothing."""
-        await self._robot[MapMemory].replace(lambda _: _replacement(floor, basis, {}))
+
+async def _put_drawings(robot: Robot, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
+    """Replace memory's drawings by those of the file: all or nothing."""
+    await robot[MapMemory].replace(lambda _: _replacement(floor, basis, {}))
 
 
 def _basis(robot: Robot) -> dict[str, Sequence[float]]:
