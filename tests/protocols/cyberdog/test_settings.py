@@ -50,6 +50,8 @@ async def test_the_volume_is_the_loudspeaker_s(client, robot) -> None:
     assert (await client.ask(1001, {"is_volume": True}))["volume"] == 35
     assert await client.ask(1012, {"volume": 101}) == {"success": False}
     assert robot[Speaker].volume == pytest.approx(0.35)
+    robot[Speaker]._volume = None  # as after a restart
+    assert robot[Speaker].volume == pytest.approx(0.35)
 
 
 async def test_the_eyes_shine_as_bright_as_asked(client, robot) -> None:

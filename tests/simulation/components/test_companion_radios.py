@@ -153,6 +153,8 @@ async def test_the_bracelet_steers_the_robot(fleet, clock):
     await clock.advance(1.0)
     assert [event.gear for event in gears.drain()] == [Gear.MIDDLE]
     assert robot[Base].velocity.x == pytest.approx(1.0)
+    remote._gear = None  # as after a restart
+    assert remote.gear is Gear.MIDDLE
     gadget.steer()
     await clock.advance(1.5)
     assert robot[Base].velocity == STILL

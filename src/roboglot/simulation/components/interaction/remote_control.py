@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from roboglot.model.actions import Action
 from roboglot.model.components.interaction.remote_control import REMOTE, Gear, RemoteControl
 from roboglot.model.components.motion.driving import Driving
@@ -33,6 +35,7 @@ class SimulatedRemoteControl(RemoteControl):
         self._gear: Gear | None = None
         self._pressed = 0
         self._driving: Action | None = None
+        self._keeping: asyncio.Task[None] | None = None
 
     @property
     def gear(self) -> Gear:
@@ -55,6 +58,9 @@ class SimulatedRemoteControl(RemoteControl):
         if gadget.presses != self._pressed:
             steps, self._pressed = gadget.presses - self._pressed, gadget.presses
             self._gear = Gear((self.gear + steps) % len(Gear))
+            if Settings in self._robot:
+                keeping = self._robot[Settings].keep(KEY, int(self._gear))
+                self._keeping = asyncio.get_running_loop().create_task(keeping)
             self._robot.events.publish(GearChanged(stamp=stamp, gear=self._gear))
         if gadget.stick == STILL:
             self._stop()

@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 from roboglot.model.actions import Action
 from roboglot.model.clock import RealClock
 from roboglot.model.components.interaction.speaker import SPEAKER, TEXT_MAX, Speaker
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.robot import Robot
@@ -22,6 +23,8 @@ from roboglot.simulation.sound.sound import Air, Source, Speech
 from roboglot.simulation.sound.voice import speaking_time, spoken
 
 log = logging.getLogger(__name__)
+VOLUME = "speaker.volume"  # the setting
+BUILT = 0.7  # volume of a new robot
 
 
 class SpeakerSection(Struct, frozen=True, forbid_unknown_fields=True):
@@ -35,16 +38,22 @@ class SimulatedSpeaker(Speaker):
 
     def __init__(self, section: SpeakerSection, hull: Hull, air: Air, robot: Robot) -> None:
         self._loudness, self._hull, self._air, self._robot = section.loudness, hull, air, robot
-        self._volume = 0.7
+        self._volume: float | None = None
+        self._keeping: asyncio.Task[None] | None = None
 
     @property
     def volume(self) -> float:
+        if self._volume is None:
+            kept = self._robot[Settings].get(VOLUME, BUILT) if Settings in self._robot else BUILT
+            self._volume = float(kept)
         return self._volume
 
     def set_volume(self, volume: float) -> None:
         if not 0.0 <= volume <= 1.0:
             raise InvalidGoal(f"the volume is 0 to 1, not {volume:g}")
         self._volume = volume
+        if Settings in self._robot:
+            self._keeping = asyncio.get_running_loop().create_task(self._robot[Settings].keep(VOLUME, volume))
 
     def say(self, text: str, *, source: str = "") -> Action:
         if not text.strip() or len(text) > TEXT_MAX:
@@ -76,7 +85,7 @@ class SimulatedSpeaker(Speaker):
         if sound is None:
             await clock.sleep(seconds)
             return
-        loudness = self._loudness * self._volume
+        loudness = self._loudness * self.volume
         source = Source(sound, hull.pose.point, hull.floor, clock.time(), loudness, speech)
         try:
             self._air.emit(source)
