@@ -32,7 +32,7 @@ For integrators who look an operation up. After this page you have a request tha
 
 `scripts/operations.py` made it: it played `examples/operations/slamware.py` on a simulated `hermes` in the world
 `office`, one request after the other, and recorded requests and answers. Long lists and texts are cut (`…`),
-numbers are rounded. What may be asked otherwise is in the robot's own `http://127.0.0.1:1448/openapi.json`; why it
+numbers are rounded. All parameters are in the robot's own `http://127.0.0.1:1448/openapi.json`; why it
 refuses is in [Slamware REST](../protocols/slamware.md#why-was-i-refused).
 """
 

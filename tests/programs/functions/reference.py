@@ -17,7 +17,7 @@ For authors of block programs who look up a function. After this page you know i
 that runs.
 
 Made from the declarations by `.venv/bin/python -m tests.programs.functions.reference docs/reference/programs.md`.
-How the language looks is in [programs](../programs/programs.md), what the functions do with the robot in
+The language is described in [its guide](../programs/language.md), the functions' effects on the robot in
 [visual programming](../protocols/visual.md).
 Names without parentheses are read, not called. Every example is played by the tests on a simulated dog.
 """
