@@ -29,7 +29,7 @@ def _notes() -> Sequence[str]:
     there, refused = (
         ", ".join(f"`{code}`" for code, yes in extras.items() if yes is wanted) for wanted in (True, False)
     )
-    found = f"Real robots have {len(extras)} codes that the text leaves out."
+    found = f"Real robots have {len(extras)} codes that the manual leaves out."
     return [f"{found} There: {there}. Refused: {refused or 'none'}."]
 
 
