@@ -371,7 +371,7 @@ async def test_robot_shown_again_keeps_its_map(served: Served, open_console: Ope
     page = await open_console()
     await shows(page, "import('/link.js').then((link) => Boolean(link.grid.value))", True)
     await page.click("nav a[href='#/robots']")
-    await page.get_by_role("button", name="Show", exact=True).click()
+    await page.get_by_role("button", name="Show: a", exact=True).click()
     await page.wait_for_selector("text=Scan fits map")
     assert await page.evaluate("import('/link.js').then((link) => Boolean(link.grid.value))")
 

@@ -23,6 +23,11 @@ SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input
     .filter(e => !e.classList.contains('line'))
     .map(e => e.outerHTML.slice(0, 80))"""
 
+LOW = """() => import('/link.js').then((link) => {
+    const { a } = link.states.value, level = 'WARNING', name = 'battery low';
+    const battery = { ...a.battery, remaining: 1380 }, faults = [{ id: 1, name, level, message: name }];
+    link.states.value = { a: { ...a, battery, faults } };
+})"""
 TALLER = "document.scrollingElement.scrollHeight - innerHeight"  # px
 COVERED_OR_CUT = """() => {
     const pen = document.createElement('canvas').getContext('2d');
@@ -74,6 +79,15 @@ async def test_phone_shows_and_can_touch_everything(served: Served, open_console
         if view == "robots":
             await page.evaluate("document.querySelector('.tile h2').firstChild.data = 'robot_of_a_class_'.repeat(5)")
             assert await page.evaluate(COVERED_OR_CUT) == []
+
+
+async def test_times_and_faults_are_said_once(served: Served, open_console: OpenConsole) -> None:
+    """A time known to the minute has no seconds; a fault whose sentence is its name has it once."""
+    page = await open_console()
+    await page.wait_for_selector("text=Scan fits map")
+    await page.evaluate(LOW)
+    await page.wait_for_selector("text=/ 23 min left$/")
+    assert await page.inner_text(".faults li") == "battery low"
 
 
 async def test_only_panels_scroll(served: Served, open_console: OpenConsole) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from itertools import combinations
 from pathlib import Path
 
 import pytest
 
 from roboglot.config import REMEDY
 from roboglot.console.assets import FOLDER
+from roboglot.simulation.components.sensing.bumper import MIDDLES
 from roboglot.simulation.world.placing import EDGE, GAP, IN_THE_WAY, ROBOT
 from roboglot.validation import FORMS, KINDS, PYTHON
 from tests.console.server_sentences import sentences
@@ -33,6 +35,12 @@ WORDS = {
     ROBOT,
     *IN_THE_WAY.values(),
 } - {"None"}
+
+
+def test_sides_of_a_bumper_have_chinese_names() -> None:
+    words: dict[str, str] = json.loads((FOLDER / "words" / "zh.json").read_text("utf-8"))
+    pairs = {" and ".join(pair) for pair in combinations(MIDDLES, 2)}
+    assert {f"robot.{sides}" for sides in {*MIDDLES, *pairs}} <= words.keys()
 
 
 def test_each_sentence_of_the_server_has_its_chinese() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing import reports
-from roboglot.recording.comparing.comparison import compare
+from roboglot.recording.comparing.comparison import Comparison, Row, compare
 from roboglot.recording.comparing.masks import STRICT, How, Mask, Rule
 from roboglot.recording.matching import normal, rewritten
 from roboglot.recording.reader import pair
@@ -130,6 +130,12 @@ def test_reports_name_what_differs() -> None:
     suites = ET.fromstring(reports.junit(comparison))
     failed = [case.get("name") for case in suites.iter("testcase") if case.find("failure") is not None]
     assert failed == ["2002"]
+
+
+def test_values_are_named_as_messages_have_them() -> None:
+    row = Row("slamware", "GET /")
+    row.check(False, "$.isCharging", True, None)
+    assert reports.table(Comparison([row])).splitlines()[1].strip() == "$.isCharging: true | null"
 
 
 UUIDS = st.uuids().map(str)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Self
 
 
@@ -32,7 +33,8 @@ class ComponentMissing(RobotError):
     """The robot has no such component."""
 
     def __init__(self, component: type) -> None:
-        super().__init__(f"this robot has no {component.__name__.lower()}")
+        words = re.sub("(?<=[a-z])(?=[A-Z])", " ", component.__name__).lower()
+        super().__init__(f"this robot has no {words}")
         self.component = component
 
 

@@ -10,10 +10,11 @@ from roboglot.model.tap import Exchange
 
 SHOWN_MAX = 500  # exchanges
 TEXT_MAX = 4000  # characters per exchange
-STYLE = """body{font:14px/1.4 system-ui,sans-serif;margin:2em;max-width:80em}pre{white-space:pre-wrap;margin:0}
-table{border-collapse:collapse;width:100%}td,th{border-top:1px solid #ccc;padding:4px 8px;text-align:left;
-vertical-align:top}td:nth-child(-n+4){white-space:nowrap}.refused{background:#fdecea}.push{color:#666}
-img{max-width:100%;border:1px solid #ccc}"""
+STYLE = """:root{color-scheme:light dark}body{font:14px/1.4 system-ui,sans-serif;margin:2em 1em;max-width:80em}
+pre{white-space:pre-wrap;overflow-wrap:anywhere;margin:0}table{border-collapse:collapse;width:100%}
+td,th{border-top:1px solid #8888;padding:4px 8px;text-align:left;vertical-align:top}
+td:nth-child(-n+4){white-space:nowrap}.refused{background:#f003}.push{opacity:.7}
+img{max-width:100%;border:1px solid #8888}"""
 COLUMNS = ("robot time", "robot", "door", "", "operation", "message", "status")
 
 
@@ -24,6 +25,7 @@ def page(title: str, failure: str, exchanges: Iterable[Exchange], picture: bytes
     head = "".join(f"<th>{name}</th>" for name in COLUMNS)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{STYLE}</style>'
+        '<meta name="viewport" content="width=device-width">'
         f"<h1>{escape(title)}</h1><pre>{escape(failure)}</pre>{image}"
         f"<h2>The last {len(shown)} exchanges</h2><table><tr>{head}</tr>{''.join(map(_row, shown))}</table></html>\n"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import field
@@ -198,6 +199,9 @@ def _first_places(exchanges: Sequence[Exchange]) -> dict[tuple[str, str, str], i
 
 
 def _short(value: object) -> str:
-    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    if value is None or isinstance(value, bool):
+        text = json.dumps(value)  # as the message has it
+    else:
+        text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
     text = " ".join(filter(None, text.splitlines()))
     return text if len(text) <= VALUE_MAX else text[: VALUE_MAX - 1] + "…"

@@ -9,9 +9,9 @@ from roboglot.hosting.escaping import in_line, xml_text
 from roboglot.recording.comparing.comparison import Comparison, Row
 
 STYLE = (
-    "body{font:15px sans-serif;margin:2em auto;max-width:70em}table{border-collapse:collapse;width:100%}"
-    "td,th{border:1px solid #ccc;padding:.3em .6em;text-align:left;vertical-align:top}.bad{background:#fdd}"
-    "code{word-break:break-all}"
+    ":root{color-scheme:light dark}body{font:15px sans-serif;margin:2em auto;padding:0 1em;max-width:70em}"
+    "table{border-collapse:collapse;width:100%}.bad{background:#f003}td{overflow-wrap:anywhere}th:last-child{width:45%}"
+    "td,th{border:1px solid #8888;padding:.3em .6em;text-align:left;vertical-align:top}"
 )
 
 
@@ -35,7 +35,8 @@ def table(comparison: Comparison) -> str:
 def page(comparison: Comparison, names: tuple[str, str]) -> str:
     """Return a self-contained HTML page."""
     parts = [
-        "<!doctype html><meta charset=utf-8><title>roboglot compare</title>",
+        '<!doctype html><html lang="en"><meta charset=utf-8><title>roboglot compare</title>',
+        '<meta name="viewport" content="width=device-width">',
         f"<style>{STYLE}</style><h1>{percent(comparison.fidelity)} agree</h1>",
         f"<p>{escape(names[0])} and {escape(names[1])}</p>",
     ]

@@ -52,8 +52,11 @@ function Faults() {
   const faults = state.value.faults;
   if (!faults.length) return html`<p class="allwell">${t("faults.none")}</p>`;
   return html`<ul class="faults">${faults.map((f) => html`<li class=${f.level.toLowerCase()}><${Icon} name="alert" size=${18} />
-    <span><b>${robotWord(f.name)}</b><small>${robotWord(f.message)}</small></span></li>`)}</ul>`;
+    <span><b>${robotWord(f.name)}</b>${robotWord(f.message) !== robotWord(f.name) && html`<small>${robotWord(f.message)}</small>`}</span></li>`)}</ul>`;
 }
+
+/** Seconds that are known to the minute. @param {number} seconds */
+const minutes = (seconds) => (seconds >= 3600 ? duration(seconds) : t("time.whole", { m: Math.round(seconds / 60) }));
 
 function Control() {
   const control = state.value.control, mine = control.taken_by && control.taken_by === you.value;
@@ -74,7 +77,7 @@ function State() {
   return html`<${Control} />
     <div class="card"><h3>${t("condition")}</h3><${Faults} />${stale.value && html`<p class="warned">${t("link.stale")}</p>`}<dl>
       ${battery && html`<${Row} name=${t("battery")} kind=${battery.low ? "bad" : ""}>${Math.round(battery.charge * 100)} %${battery.charging ? ` · ${t("charging")}` : ""}
-        <small>${[battery.volts && `${battery.volts} V`, battery.amperes && `${battery.amperes} A`, battery.remaining && t("battery.left", { time: duration(battery.remaining) })].filter(Boolean).join(" · ")}</small><//>`}
+        <small>${[battery.volts && `${battery.volts} V`, battery.amperes && `${battery.amperes} A`, battery.remaining && t("battery.left", { time: minutes(battery.remaining) })].filter(Boolean).join(" · ")}</small><//>`}
       ${pose && html`<${Row} name=${t("pose")}>x ${fixed(pose[0])} · y ${fixed(pose[1])} m · ${Math.round(pose[2] * 180 / Math.PI)}°<//>
       ${!stale.value && pose[3] !== null && html`<${Row} name=${t("speed")}>${Math.hypot(pose[3], pose[4]).toFixed(2)} m/s · ${Math.round(pose[5] * 180 / Math.PI)}°/s<//>`}`}
       ${place.quality !== null && html`<${Row} name=${t("place.fit")} kind=${place.lost ? "bad" : ""}>${place.lost ? t("place.lost", { why: robotWord(place.lost) }) : `${Math.round(place.quality * 100)} %`}<//>`}
@@ -89,7 +92,7 @@ function State() {
     <details class="card"><summary>${t("list")}</summary>
       <p>${pose && t("list.robot", { name: current.value, x: fixed(pose[0], 1), y: fixed(pose[1], 1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>
       <ul class="list">${drawings.places.map((p) => html`<li><span>${p.name}</span><small>${fixed(p.pose[0], 1)}, ${fixed(p.pose[1], 1)}</small>
-        <${Button} label=${t("go")} verb="go_to" onClick=${() => go([[p.pose[0], p.pose[1]]], p.pose[2])} /></li>`)}</ul>
+        <${Button} label=${t("go")} of=${p.name} verb="go_to" onClick=${() => go([[p.pose[0], p.pose[1]]], p.pose[2])} /></li>`)}</ul>
       <p>${t("list.drawn", { lines: drawings.lines.length, areas: drawings.areas.length, docks: drawings.docks.length })}</p>
       ${can("go_to") && html`<form class="inline" onSubmit=${(e) => { e.preventDefault(); const f = new FormData(e.target); go([[Number(f.get("x")), Number(f.get("y"))]]); }}>
         <label>x <input name="x" type="number" step="0.1" required /></label><label>y <input name="y" type="number" step="0.1" required /></label>

@@ -34,9 +34,9 @@ export function Maps() {
   const save = () => { const map = prompt(t("map.name")); if (map) change("save_map", { map }, t("map.saved", { map })); };
   return html`<div class="card"><h3>${t("maps")}</h3>
     ${kept.value.length ? html`<ul class="list">${kept.value.map((map) => html`<li><span>${map}</span>
-      <${Button} label=${t("map.load")} verb="load_map" onClick=${() => change("load_map", { map }, t("map.loading", { map }))} />
-      <${Button} label=${t("map.merge")} verb="merge_map" on=${merging.value === map} onClick=${() => { merging.value = merging.value === map ? "" : map; }} />
-      <${Button} label=${t("remove")} verb="remove_map" onClick=${() => { if (confirm(t("map.remove.sure", { map }))) change("remove_map", { map }, t("map.removed", { map })); }} /></li>`)}</ul>` : html`<p class="muted">${t("maps.none")}</p>`}
+      <${Button} label=${t("map.load")} of=${map} verb="load_map" onClick=${() => change("load_map", { map }, t("map.loading", { map }))} />
+      <${Button} label=${t("map.merge")} of=${map} verb="merge_map" on=${merging.value === map} onClick=${() => { merging.value = merging.value === map ? "" : map; }} />
+      <${Button} label=${t("remove")} of=${map} verb="remove_map" onClick=${() => { if (confirm(t("map.remove.sure", { map }))) change("remove_map", { map }, t("map.removed", { map })); }} /></li>`)}</ul>` : html`<p class="muted">${t("maps.none")}</p>`}
     ${merging.value && html`<${Merge} />`}
     <div class="buttons"><${Button} label=${t("map.save")} verb="save_map" onClick=${save} />
       <a class="button" href=${`/api/robots/${current.value}/map.zip`} download="map.zip">${t("map.export")}</a></div></div>`;

@@ -34,7 +34,7 @@ function Tile({ robot }) {
       <div class="row"><dt>${t("control")}</dt><dd>${control.taken_by || control.holder || t("control.nobody")}</dd></div>
       <div class="row"><dt>${t("pose")}</dt><dd>${pose ? `${fixed(pose[0], 1)}, ${fixed(pose[1], 1)} m` : "–"}</dd></div></dl>
     ${safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(faults[0].name)}${faults.length > 1 ? ` +${faults.length - 1}` : ""}</p>` : html`<p class="allwell">${t("faults.none")}</p>`}
-    <div class="buttons"><${Button} kind="main" label=${t("show")} onClick=${open} /><${Button} icon="stop" label=${t("stop")} disabled=${!robot.rights.includes("drive")} title=${robot.rights.includes("drive") ? "" : t("right.missing", { right: t("right.drive") })} onClick=${() => ask(robot.name, "stop").catch((e) => say(e.message, true))} /></div></li>`;
+    <div class="buttons"><${Button} kind="main" label=${t("show")} of=${robot.name} onClick=${open} /><${Button} icon="stop" label=${t("stop")} of=${robot.name} disabled=${!robot.rights.includes("drive")} title=${robot.rights.includes("drive") ? "" : t("right.missing", { right: t("right.drive") })} onClick=${() => ask(robot.name, "stop").catch((e) => say(e.message, true))} /></div></li>`;
 }
 
 export function Robots() {

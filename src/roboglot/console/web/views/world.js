@@ -82,11 +82,11 @@ function Figures() {
       <${Button} label=${name} on=${chosen === name} onClick=${() => { someone.value = name; tool.value = "person"; }} />${chosen === name && html`
       <${Button} label=${t("people.resume")} verb="resume_person" onClick=${() => changeWorld("resume_person", { person: name })} />
       <${Button} label=${t("say")} verb="person_says" onClick=${() => { const text = prompt(t("say.text")); if (text) changeWorld("person_says", { person: name, text }); }} />
-      <${Button} label=${t("remove")} verb="remove_person" onClick=${() => changeWorld("remove_person", { person: name })} />`}</li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
+      <${Button} label=${t("remove")} of=${name} verb="remove_person" onClick=${() => changeWorld("remove_person", { person: name })} />`}</li>`)}</ul>` : html`<p class="muted">${t("people.none")}</p>`}</div>
     <div class="card"><h3>${t("boxes")}</h3>${boxes.length ? html`<ul class="list">${boxes.map((number) => html`<li><span>${t("box.number", { number })}</span>
-      <${Button} label=${t("remove")} verb="remove_box" onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>
+      <${Button} label=${t("remove")} of=${t("box.number", { number })} verb="remove_box" onClick=${() => changeWorld("remove_box", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("boxes.none")}</p>`}</div>
     <div class="card"><h3>${t("tags")}</h3>${tags.length ? html`<ul class="list">${tags.map(([number, p]) => html`<li><span>${p[4]}</span>
-      <${Button} label=${t("remove")} verb="remove_tag" onClick=${() => changeWorld("remove_tag", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("tags.none")}</p>`}</div>`;
+      <${Button} label=${t("remove")} of=${p[4]} verb="remove_tag" onClick=${() => changeWorld("remove_tag", { number: Number(number) })} /></li>`)}</ul>` : html`<p class="muted">${t("tags.none")}</p>`}</div>`;
 }
 
 function Faults() {
@@ -127,7 +127,7 @@ function Drawn() {
       <${Button} label=${t("mapping")} on=${Boolean(state.value.place.mapping)} verb="mapping" onClick=${() => command("mapping", { on: !state.value.place.mapping })} />
       <${Button} kind="danger" label=${t("map.clear")} verb="clear_map" onClick=${() => { if (confirm(t("map.clear.sure"))) command("clear_map"); }} /></div></div>
     <div class="card"><h3>${t("drawn.title")}</h3>${rows.length ? html`<ul class="list">${rows.map(([name, what, remove]) => html`<li><span>${name}<small>${what}</small></span>
-      <${Button} label=${t("remove")} verb="remove_drawing" onClick=${remove} /></li>`)}</ul>` : html`<p class="muted">${t("drawn.none")}</p>`}</div><${Maps} />`;
+      <${Button} label=${t("remove")} of=${name} verb="remove_drawing" onClick=${remove} /></li>`)}</ul>` : html`<p class="muted">${t("drawn.none")}</p>`}</div><${Maps} />`;
 }
 
 export function World() {
