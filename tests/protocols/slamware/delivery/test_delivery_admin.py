@@ -73,6 +73,11 @@ async def test_speeds_of_the_way_there(screen: Screen, robot: Robot) -> None:
     assert await get(screen, "admin/line_speed") == {"delivery_speed": most, "return_speed": most}
     assert (await put(screen, "admin/line_speed", {"delivery_speed": 0.25})).status_code == 200
     assert await get(screen, "admin/line_speed") == {"delivery_speed": 0.25, "return_speed": most}
+    assert (await put(screen, "admin/line_speed", {"return_speed": 2.0 * most})).status_code == 200
+    assert await get(screen, "admin/line_speed") == {
+        "delivery_speed": 0.25,
+        "return_speed": most,
+    }  # it drives no faster
     await screen.create("R101", "RETURN")
     await screen.until("ON_DELIVERING", within=5)
     await screen.forward(seconds=8)

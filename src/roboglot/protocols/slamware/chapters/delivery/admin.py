@@ -162,10 +162,12 @@ def _effective(how: MoveOptions) -> MoveOptions:
 
 @TABLE.on(f"GET {API}/admin/line_speed", right=Right.SEE, needs=(Base, Delivery))
 def get_line_speed(context: Context) -> LineSpeed:
-    """Return the speeds on the way to people and back, m/s; by default the robot's top speed."""
+    """Return the speeds on the way to people and back, m/s: those set, at most the robot's top speed."""
     policy, most = context.robot[Delivery].policy, context.robot[Base].limits.twist.x
-    there = most if policy.delivery_speed is None else policy.delivery_speed
-    return LineSpeed(there, most if policy.return_speed is None else policy.return_speed)
+    there, back = (
+        most if speed is None else min(speed, most) for speed in (policy.delivery_speed, policy.return_speed)
+    )
+    return LineSpeed(there, back)
 
 
 @TABLE.on(f"PUT {API}/admin/line_speed", right=Right.EDIT, needs=(Delivery,))
