@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from roboglot.console.live import Page as ServerPage
-from tests.browser.served import PATIENCE, OpenConsole, Page, Served
+from tests.browser.served import PATIENCE, OpenConsole, Page, Served, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 QUICKLY = """() => {
@@ -19,6 +19,20 @@ OTHER_ROBOTS = """() => import('/link.js').then((link) => {
     link.scan.value = {};
     link.hello.value = { ...link.hello.value, robots: [{ name: 'z', rights: [], simulated: true }] };
     return [link.current.value, link.scan.value, link.grid.value];
+})"""
+
+
+# What the page sends, as values.
+NOTED = """() => {
+    const { send } = WebSocket.prototype;
+    window.sent = [];
+    WebSocket.prototype.send = function (text) { window.sent.push(JSON.parse(text)); send.call(this, text); };
+}"""
+TWIN = """() => import('/link.js').then((link) => {
+    const { robots } = link.hello.value, { a } = link.states.value;
+    link.states.value = { a, z: a };
+    link.hello.value = { ...link.hello.value, robots: [...robots, { ...robots[0], name: 'z' }] };
+    link.choose('z');
 })"""
 
 
@@ -68,6 +82,21 @@ async def test_gone_robot_leaves_nothing_drawn(served: Served, open_console: Ope
     page = await open_console()
     await page.wait_for_selector("text=Scan fits map")
     assert await page.evaluate(OTHER_ROBOTS) == ["z", None, None]
+    await page.wait_for_selector(".notice.bad >> text=Robot a is not here any more: this page shows robot z now.")
+
+
+async def test_held_key_does_not_drive_another_robot(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    await page.click("#tab-drive")
+    await page.focus(".pad")
+    await page.evaluate(NOTED)
+    await page.keyboard.down("w")
+    await until(page, "sent.some((one) => one.robot === 'a' && one.x > 0)")
+    await page.evaluate(TWIN)
+    await until(page, "sent.some((one) => one.robot === 'z' && one.x === 0)")
+    await page.keyboard.down("w")  # which repeats
+    assert not await page.evaluate("sent.some((one) => one.robot === 'z' && one.x > 0)")
+    await page.keyboard.up("w")
 
 
 async def test_buttons_say_that_there_is_no_connection(served: Served, open_console: OpenConsole) -> None:

@@ -100,7 +100,9 @@ let drawn = ""; // the robot that scan, map, path and wire are of
 effect(() => {
   const now = current.value;
   if (!now || now === drawn) return;
-  if (drawn) batch(() => { scan.value = null; grid.value = null; path.value = new Float32Array(); exchanges.value = []; seen.value = []; });
+  const left = drawn;
+  if (left && !hello.value.robots.some((r) => r.name === left)) say(t("notice.gone", { name: left, now }), true);
+  if (left) batch(() => { scan.value = null; grid.value = null; path.value = new Float32Array(); exchanges.value = []; seen.value = []; });
   drawn = now;
 });
 

@@ -2,7 +2,7 @@
 import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, fixed, html, lacks, robotWord, t, translated } from "../base.js";
-import { command, drive, padRefused, state } from "../link.js";
+import { command, current, drive, padRefused, state } from "../link.js";
 import { later } from "./later.js";
 
 const Camera = later(() => import("./camera.js").then((m) => m.Camera));
@@ -11,7 +11,7 @@ const hand = signal({ x: 0, y: 0, yaw: 0, held: false });
 const share = signal(0.35);
 const keys = new Set();
 const KEYS = { w: [1, 0, 0], s: [-1, 0, 0], a: [0, 0, 1], d: [0, 0, -1], q: [0, 1, 0], e: [0, -1, 0], arrowup: [1, 0, 0], arrowdown: [-1, 0, 0], arrowleft: [0, 0, 1], arrowright: [0, 0, -1] };
-let timer = 0;
+let timer = 0, changes = 0;
 
 /** Drive so from now on; nothing at all lets go. @param {number} x @param {number} y @param {number} yaw */
 function push(x, y, yaw) {
@@ -61,16 +61,18 @@ function useKeys() {
 
 function useGamepad() {
   useEffect(() => {
-    let driving = false;
+    let driving = false, waits = Boolean(changes++); // another robot is driven once the stick was let go
     const look = setInterval(() => {
       const pad = navigator.getGamepads?.().find(Boolean);
       if (!pad) return;
       const axis = (i) => (Math.abs(pad.axes[i] ?? 0) > 0.15 ? -pad.axes[i] : 0);
       const [x, y, yaw] = [axis(1), axis(0), axis(2)];
+      if (!(x || y || yaw)) waits = false;
+      if (waits) return;
       if (x || y || yaw) { driving = true; push(x, y, yaw); } else if (driving) { driving = false; push(0, 0, 0); }
     }, PERIOD);
     return () => clearInterval(look);
-  }, []);
+  }, [current.value]);
 }
 
 function Pad() {
@@ -131,6 +133,7 @@ function shine(colour) {
 export function Drive() {
   useKeys();
   useGamepad();
+  useEffect(() => letGo, [current.value]); // what is held was meant for the other robot
   const { parts, body, about } = state.value;
   return html`${parts.includes("driving") && html`<div class="card"><h3>${t("pad.title")}</h3><${Pad} />
       ${(lacks("drive") || padRefused.value) && html`<p class="warned">${lacks("drive") || translated(padRefused.value)}</p>`}
