@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from itertools import groupby
 from typing import Any
 
 import pytest
@@ -110,21 +111,33 @@ async def test_lost_and_found_and_its_update(client, app: App, robot, gadget, pa
     shares = [push["progress"] for push in app.of(8010)]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
+    assert [status for status, _ in groupby(push["status"] for push in app.of(8010))] == [0, 3, 5, 7, 9, 1]
     assert await client.ask(8005) == {"success": True, "message": "1.1.0"}
     assert await client.ask(8009) == {"success": False, "message": "there is no newer firmware"}
 
 
-async def test_a_device_lost_during_its_update(client, app, robot, gadget, passing, forward) -> None:
+@pytest.mark.parametrize(("stage", "failed"), [(3, 4), (5, 6), (7, 8), (9, 10)])
+async def test_a_device_lost_during_its_update(client, app, gadget, passing, forward, stage, failed) -> None:
     await client.ask(10001)
     await passing(lambda: app.connected)
     await connect(client, forward)
     await client.ask(8009)
-    await forward(seconds=5)
+    await passing(lambda: app.of(8010) and app.of(8010)[-1]["status"] == stage)
     assert (await client.ask(8009))["success"] is False
     gadget.on = False
-    await passing(lambda: app.of(8010) and app.of(8010)[-1]["status"] == 2)
-    assert 0 < app.of(8010)[-1]["progress"] < 1
+    await passing(lambda: app.of(8010)[-1]["status"] == failed)
+    assert 0 <= app.of(8010)[-1]["progress"] < 1
     assert gadget.firmware == "1.0.3"
+
+
+async def test_a_flat_device_is_not_updated(client, app, gadget, passing, forward) -> None:
+    await client.ask(10001)
+    await passing(lambda: app.connected)
+    await connect(client, forward)
+    gadget.battery = 0.2
+    await client.ask(8009)
+    await passing(lambda: len(app.of(8010)) == 2)
+    assert [push["status"] for push in app.of(8010)] == [0, 2]
 
 
 async def test_the_remote_control_s_gear(client, app, robot, gadget, passing, forward) -> None:

@@ -10,7 +10,7 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.interaction.remote_control import Gear, RemoteControl
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.ultra_wideband import UltraWideband
-from roboglot.model.components.system.bluetooth import Bluetooth, DeviceKind
+from roboglot.model.components.system.bluetooth import Bluetooth, DeviceKind, DeviceUpdate, DeviceUpdateStage
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
 from roboglot.model.events import BluetoothConnected, BluetoothLost, GearChanged
 from roboglot.model.geometry import STILL, Point, Pose
@@ -94,7 +94,8 @@ async def test_updates_the_device(dog):
     assert bluetooth.update_available == "1.1.0"
     action = bluetooth.update_device()
     await dog.clock.advance(10.0)
-    assert action.feedback == pytest.approx(0.5, abs=0.05)
+    assert isinstance(action.feedback, DeviceUpdate)
+    assert (action.feedback.stage, action.feedback.share) == (DeviceUpdateStage.SENDING, pytest.approx(0.5, abs=0.05))
     await dog.clock.advance(11.0)
     assert action.status is ActionStatus.SUCCEEDED
     assert (bluetooth.connected.firmware, bluetooth.update_available) == ("1.1.0", "")

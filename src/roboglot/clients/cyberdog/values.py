@@ -186,7 +186,10 @@ class BluetoothUpdateOffered(Value):
 
 
 class BluetoothUpdateProgress(Value):
-    """8010: ``progress`` 0..1; ``status``: 1 well, 2 failed."""
+    """8010: ``progress`` 0..1; ``status``: 0 begun, 1 well, 2 failed.
+
+    Also 3 unpacking, 5 starting, 7 sending, 9 restarting; one more: failed in that stage.
+    """
 
     status: int
     progress: float

@@ -22,6 +22,23 @@ class DeviceKind(StrEnum):
     DOCK = "dock"
 
 
+class DeviceUpdateStage(StrEnum):
+    """Stage of a device's firmware update, in their order."""
+
+    UNPACKING = "unpacking"
+    STARTING = "starting"  # the device is asked to take it
+    SENDING = "sending"
+    RESTARTING = "restarting"  # the device writes it, and is waited for
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceUpdate:
+    """Progress of a device's firmware update; ``share`` of the whole, 0..1."""
+
+    stage: DeviceUpdateStage
+    share: float
+
+
 @dataclass(frozen=True, slots=True)
 class BluetoothDevice:
     """A device as the radio knows it. ``signal``: last one received, dBm; ``random``: its address changes now and then.
@@ -82,6 +99,6 @@ class Bluetooth(Component):
 
     @abstractmethod
     def update_device(self, *, source: str = "") -> Action:
-        """Update the device's firmware; feedback is 0..1. Aborts with Refused (no device, no update, device battery
-        below a third) or Blocked (connection lost).
+        """Update the device's firmware; feedback is ``DeviceUpdate``. Aborts with Refused (no device, no update, device
+        battery below a third) or Blocked (connection lost); the last feedback then has the stage that failed.
         """

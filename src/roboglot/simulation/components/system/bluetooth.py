@@ -15,6 +15,8 @@ from roboglot.model.components.system.bluetooth import (
     Bluetooth,
     BluetoothDevice,
     DeviceKind,
+    DeviceUpdate,
+    DeviceUpdateStage,
 )
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
@@ -28,7 +30,14 @@ from roboglot.simulation.radio.gadgets import GadgetInWorld, Gadgets
 HISTORY_MAX = 50
 KEY = "bluetooth.history"
 LOOK = 0.5  # s between checks of the connection
-UPDATE_SECONDS = 20.0
+STAGES = {  # of a device's update: s that each takes
+    DeviceUpdateStage.UNPACKING: 1.0,
+    DeviceUpdateStage.STARTING: 1.0,
+    DeviceUpdateStage.SENDING: 16.0,
+    DeviceUpdateStage.RESTARTING: 2.0,
+}
+UPDATE_SECONDS = sum(STAGES.values())
+UPDATE_PERIOD = 0.2  # s between two reports of its progress
 UPDATE_BATTERY = 1 / 3
 
 
@@ -131,11 +140,14 @@ class SimulatedBluetooth(Bluetooth):
                 raise Refused("no device can be updated")
             if gadget.battery < UPDATE_BATTERY:
                 raise Refused("the device's battery is too low for an update")
-            for percent in range(101):
-                if self.gadget is not gadget:
-                    raise Blocked("the device was lost during its update")
-                action.report(percent / 100)
-                await self._robot.clock.sleep(UPDATE_SECONDS / 100)
+            passed = 0.0
+            for stage, seconds in STAGES.items():
+                for _ in range(round(seconds / UPDATE_PERIOD)):
+                    action.report(DeviceUpdate(stage, passed / UPDATE_SECONDS))
+                    await self._robot.clock.sleep(UPDATE_PERIOD)
+                    passed += UPDATE_PERIOD
+                    if self.gadget is not gadget:
+                        raise Blocked("the device was lost during its update")
             gadget.firmware = newest
 
         return self._robot.actions.start("bluetooth update", run, resources=[BLUETOOTH], source=source)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.components.system.bluetooth import Bluetooth
+from roboglot.model.components.system.bluetooth import Bluetooth, DeviceUpdate, DeviceUpdateStage
 from roboglot.model.events import ActionChanged, BluetoothConnected, BluetoothLost, GearChanged
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink
@@ -22,7 +22,13 @@ BRACELET_LOST = push(Code.BLUETOOTH_LOST)
 OFFERED = push(Code.BLUETOOTH_UPDATE_OFFERED)
 PROGRESS = push(Code.BLUETOOTH_UPDATE_PROGRESS)
 GEAR = push(Code.GEAR_CHANGED)
-SUCCEEDED, FAILED, SENDING = 1, 2, 7  # ``status`` of 8010
+BEGUN, SUCCEEDED, FAILED = 0, 1, 2  # ``status`` of 8010, beside those of the stages
+STAGES = {  # … under way; one more: it failed
+    DeviceUpdateStage.UNPACKING: 3,
+    DeviceUpdateStage.STARTING: 5,
+    DeviceUpdateStage.SENDING: 7,
+    DeviceUpdateStage.RESTARTING: 9,
+}
 LEFT = "no app waits for it any more"  # why work ends with its request
 STEP = 0.05  # of the progress between two pushes
 
@@ -33,7 +39,7 @@ class Bracelet:
     def __init__(self, robot: Robot, app: AppLink) -> None:
         self._robot, self._app = robot, app
         self._update: Action | None = None
-        self._pushed = -1.0  # progress of the last push
+        self._pushed: DeviceUpdate | None = None
         self._waiting: Counter[int] = Counter()  # requests, by the number of their scan
         events = robot.events
         self._leave: list[Callable[[], None]] = [
@@ -51,7 +57,8 @@ class Bracelet:
 
     def follow(self, update: Action) -> None:
         """Report the progress of ``update`` until it has ended."""
-        self._update, self._pushed = update, -1.0
+        self._update, self._pushed = update, None
+        self._push(BEGUN, 0.0, "")
 
     @contextmanager
     def waiting_for(self, scan: Action) -> Iterator[None]:
@@ -88,13 +95,20 @@ class Bracelet:
         action = event.action
         if action is not self._update:
             return
+        now, before = action.feedback, self._pushed
         if action.status.ended:
-            well = action.status is ActionStatus.SUCCEEDED
-            self._push(SUCCEEDED if well else FAILED, 1.0 if well else max(0.0, self._pushed), action.reason)
             self._update = None
-        elif isinstance(action.feedback, float) and action.feedback >= self._pushed + STEP:
-            self._pushed = action.feedback
-            self._push(SENDING, action.feedback, "")
+            if action.status is ActionStatus.SUCCEEDED:
+                self._push(SUCCEEDED, 1.0, action.reason)
+            elif isinstance(now, DeviceUpdate):
+                self._push(STAGES[now.stage] + 1, now.share, action.reason)
+            else:
+                self._push(FAILED, 0.0, action.reason)
+        elif isinstance(now, DeviceUpdate) and (
+            before is None or now.stage is not before.stage or now.share >= before.share + STEP
+        ):
+            self._pushed = now
+            self._push(STAGES[now.stage], now.share, "")
 
     def _push(self, status: int, progress: float, message: str) -> None:
         self._app.push(PROGRESS, {"status": status, "progress": progress, "message": message})

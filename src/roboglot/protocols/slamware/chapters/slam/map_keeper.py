@@ -108,9 +108,8 @@ class MapKeeper:
         """Use the map of a file's start floor from now on, in memory only."""
         floor = self._start_of(await self._parse(data))
         async with self._turn:
-            await self._use(
-                floor, pose, _put_drawings(self._robot, floor, {})
-            )  # the present drawings belong to no file
+            draw = _put_drawings(self._robot, floor, {})  # the present drawings belong to no file
+            await self._use(floor, pose, draw)
 
     async def upload(self, data: bytes) -> None:
         """Store the file on disk unchanged, without loading it. Raises InvalidGoal unless it is a composite map."""
