@@ -7,7 +7,7 @@ import contextlib
 import json
 import socket
 import ssl
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Collection
 from dataclasses import replace
 from ipaddress import ip_address
 from pathlib import Path
@@ -20,7 +20,7 @@ from roboglot.access.store import Grant, open_store
 from roboglot.access.trail import open_trail
 from roboglot.access.tunnel import connector, heartbeat
 from roboglot.access.tunnel import tunnel as carrying
-from roboglot.access.tunnel.connector import Connector, KnownGateways, NotTrusted, Refused
+from roboglot.access.tunnel.connector import APPS, Connector, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.frames import HEAD, FrameKind, encode
 from roboglot.access.tunnel.link import TunnelLink
 from roboglot.config import AccessConfig, RobotConfig, load_config
@@ -71,11 +71,13 @@ async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[
 
 
 @contextlib.asynccontextmanager
-async def connected(runtime: Runtime, token: str, folder: Path, robot: str = "a") -> AsyncIterator[list[int]]:
+async def connected(
+    runtime: Runtime, token: str, folder: Path, robot: str = "a", apps: Collection[int] = APPS
+) -> AsyncIterator[list[int]]:
     """Yield the robot's ports at HERE, while inside."""
     assert runtime._gateway is not None
     known = KnownGateways(folder / "gateways.json")
-    link = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known)
+    link = Connector("127.0.0.1", runtime._gateway.port, robot, token, HERE, known, apps)
     opened: asyncio.Future[list[int]] = asyncio.get_running_loop().create_future()
     running = asyncio.ensure_future(link.run(lambda ports, _fingerprint, _new: opened.set_result(ports)))
     waited: tuple[asyncio.Future[Any], ...] = opened, running
@@ -182,6 +184,33 @@ async def test_no_server_beside_client_is_reached_but_app(gateway: tuple[Runtime
                 await asyncio.open_connection(own, port)
         _, writer = await asyncio.open_connection(own, 8981)
         writer.close()
+
+
+async def test_gateway_reaches_only_ports_the_client_allows(
+    gateway: tuple[Runtime, str], tmp_path: Path, vendor_ports: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    runtime, _ = gateway
+    assert runtime.guard is not None
+    loop = asyncio.get_running_loop()
+    called = list[bytes]()
+
+    class Inbox(asyncio.DatagramProtocol):
+        def datagram_received(self, data: bytes, _: object) -> None:
+            called.append(data)
+
+    inbox, _ = await loop.create_datagram_endpoint(Inbox, ("127.0.0.1", 40924))
+    app = await asyncio.start_server(lambda *_: called.append(b"a call"), "127.0.0.1", 8981)
+    async with asyncio.timeout(60), connected(*gateway, tmp_path, apps=[40926]), app:
+        [own] = runtime.guard.tunnels
+        reader, writer = await asyncio.open_connection(own, 8981)
+        assert await reader.read() == b""
+        writer.close()
+        runtime.fleet.robots["a"].tap.push("robomaster", f"{own}:40924", "push", b"x")
+        while "port 40924" not in caplog.text:  # noqa: ASYNC110 - a few looks
+            await asyncio.sleep(0.01)
+    assert "port 8981 here: --callback 8981 allows it" in caplog.text
+    assert called == []
+    inbox.close()
 
 
 async def test_strangers_get_no_tunnel(gateway: tuple[Runtime, str], tmp_path: Path) -> None:

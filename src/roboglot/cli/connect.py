@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 import typer
 
-from roboglot.access.tunnel.connector import AnnouncedGateway, KnownGateways, NotTrusted, Refused
+from roboglot.access.tunnel.connector import APPS, AnnouncedGateway, KnownGateways, NotTrusted, Refused
 from roboglot.access.tunnel.dialling import Dialling, Ended, OnePlace, Place, Places, Unusable
 from roboglot.config import ROBOTS_MAX, is_loopback
 from roboglot.hosting.error_text import in_words
@@ -48,6 +48,15 @@ def command(
     registry: Annotated[
         str, typer.Option(help="URL or file of a registry, instead of a gateway; follows robots that move.")
     ] = "",
+    callback: Annotated[
+        list[int] | None,
+        typer.Option(
+            help="Port of an app on this machine that the gateway may reach, by TCP or UDP; repeat for more. "
+            "Default: 8981, 40924, 40926.",
+            min=1,
+            max=65535,
+        ),
+    ] = None,
     once: Annotated[bool, typer.Option("--once", help="End with status 1 when a tunnel is lost.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every connection.")] = False,
 ) -> None:
@@ -70,7 +79,8 @@ def command(
         if not is_loopback(place):
             print(f"roboglot connect: anyone who can reach {place} acts with your token", file=sys.stderr)
     try:
-        run(_keep_all(where, dict(zip(names, places, strict=True)), token.strip(), once=once))
+        robots = dict(zip(names, places, strict=True))
+        run(_keep_all(where, robots, token.strip(), frozenset(callback or APPS), once=once))
     except KeyboardInterrupt:
         sys.exit(130)
     except (NotTrusted, Refused, Unusable, Ended, OSError, ValueError, sqlite3.Error) as refused:
@@ -92,12 +102,14 @@ def addresses(count: int, first: str, network: str) -> list[str]:
     return [str(host) for host in hosts]
 
 
-async def _keep_all(places: AbstractContextManager[Places], robots: dict[str, str], token: str, *, once: bool) -> None:
+async def _keep_all(
+    places: AbstractContextManager[Places], robots: dict[str, str], token: str, apps: frozenset[int], *, once: bool
+) -> None:
     """Keep each robot's ports on its address."""
     with places as known:
         await together(
             *(
-                Dialling(known, name, token, address, partial(_ready, address), _print).keep(once=once)
+                Dialling(known, name, token, address, partial(_ready, address), _print, apps).keep(once=once)
                 for name, address in robots.items()
             )
         )

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from roboglot.wire.slamware.chapters.slam import stcm, stcm_layers
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap, ExploreMap
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
-from roboglot.wire.slamware.chapters.slam.stcm_layers import AreaEntry, LineEntry, PoseEntry
+from roboglot.wire.slamware.chapters.slam.stcm_layers import AreaEntry, Budget, LineEntry, PoseEntry
 
 TEXTS = st.binary(max_size=20).map(lambda data: data.decode("utf-8", "surrogateescape"))
 PAIRS = st.lists(st.tuples(TEXTS, TEXTS), max_size=4).map(tuple)
@@ -96,14 +96,14 @@ def test_grids() -> None:
 @given(st.lists(st.builds(LineEntry, TEXTS, SINGLE, SINGLE, SINGLE, SINGLE, PAIRS), max_size=4))
 def test_lines(lines: list[LineEntry]) -> None:
     layer = stcm_layers.line_layer(stcm_layers.WALLS, lines)
-    assert stcm_layers.read_lines(layer, stcm_layers.WALLS) == lines
-    assert stcm_layers.read_lines(layer, stcm_layers.TRACKS) is None
+    assert stcm_layers.read_lines(layer, stcm_layers.WALLS, Budget()) == lines
+    assert stcm_layers.read_lines(layer, stcm_layers.TRACKS, Budget()) is None
 
 
 @given(st.lists(st.builds(PoseEntry, TEXTS, SINGLE, SINGLE, SINGLE, PAIRS, st.integers(0, 255)), max_size=4))
 def test_poses(poses: list[PoseEntry]) -> None:
     layer = stcm_layers.pose_layer(stcm_layers.DOCKS, poses)
-    assert stcm_layers.read_poses(layer, stcm_layers.DOCKS) == poses
+    assert stcm_layers.read_poses(layer, stcm_layers.DOCKS, Budget()) == poses
 
 
 @given(st.binary(max_size=60))
@@ -112,7 +112,7 @@ def test_entries_written_in_another_way_are_not_understood(payload: bytes) -> No
         (stcm_layers.WALLS, stcm_layers.LINES, stcm_layers.read_lines),
         (stcm_layers.PLACES, stcm_layers.POSES, stcm_layers.read_poses),
     ):
-        entries = read(Layer((("usage", usage), ("type", kind)), payload), usage)
+        entries = read(Layer((("usage", usage), ("type", kind)), payload), usage, Budget())
         assert entries is None or payload == b"" or entries
 
 

@@ -10,7 +10,7 @@ import logging
 import os
 import socket
 import ssl
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Protocol, cast
@@ -22,16 +22,20 @@ from roboglot.access.tunnel.frames import FrameKind
 from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.tunnel import Tunnel
 from roboglot.transport.listening import listen
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.transport.tls import TlsCall
 from roboglot.validation import decode_json, why_invalid
 
 log = logging.getLogger(__name__)
+limited_log = LogLimiter(log)
 
 CALL_SECONDS_MAX = 5.0
 GREETING_SECONDS_MAX = 10.0
 BESIDE_AGAIN = 1.0  # s between attempts to open the second connection
 BROADCAST = "127.255.255.255"
 ROBOT_IP = b"robot ip "
+# Ports of the vendors' clients, which robots call or send to: a CyberDog app's, RoboMaster's pushes and discovery.
+APPS = frozenset({8981, 40924, 40926})
 
 
 Ports = Annotated[list[Annotated[int, Meta(ge=1, le=65535)]], Meta(max_length=64)]
@@ -105,9 +109,19 @@ class AnnouncedGateway:
 class Connector:
     """Opens the robot's ports at ``address`` and carries them to the gateway; ``run`` ends when the tunnel is lost."""
 
-    def __init__(self, gateway: str, port: int, robot: str, token: str, address: str, known: Trust) -> None:
+    def __init__(
+        self,
+        gateway: str,
+        port: int,
+        robot: str,
+        token: str,
+        address: str,
+        known: Trust,
+        apps: Collection[int] = APPS,
+    ) -> None:
+        """``apps``: ports of this machine, TCP and UDP, that the gateway may reach."""
         self._gateway, self._port, self._robot, self._token = gateway, port, robot, token
-        self._address, self._known = address, known
+        self._address, self._known, self._apps = address, known, apps
 
     async def run(self, ready: Callable[[list[int], str, bool], None]) -> None:
         """Carry the ports; call ``ready`` with the open ports, the fingerprint, and whether that is new.
@@ -168,23 +182,31 @@ class Connector:
                 f"the gateway's greeting is none of roboglot's: {why_invalid(error, wanted=Welcome)}"
             ) from None
 
+    def _is_app(self, port: int) -> bool:
+        """Return whether the gateway may reach this port of the machine; if not, log which option would allow it."""
+        if port not in self._apps:
+            words = "the gateway may not reach port %d here: --callback %d allows it"
+            limited_log.warning(str(port), words, port, port)
+        return port in self._apps
+
     async def _carry(self, link: TunnelLink, words: Welcome, ready: Callable[[list[int]], None]) -> None:
         loop = asyncio.get_running_loop()
         broadcasts = set(words.broadcasts)
-        callbacks = set(words.callbacks)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.setblocking(False)
             sender.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
             sender.bind((self._address, 0))  # clients check the source of a datagram
 
             def pass_on(port: int, data: bytes) -> None:
+                if not self._is_app(port):
+                    return
                 if port in broadcasts and data.startswith(ROBOT_IP):  # on this machine, the robot is here
                     data = ROBOT_IP + self._address.encode()
                 with contextlib.suppress(OSError):
                     sender.sendto(data, (BROADCAST if port in broadcasts else "127.0.0.1", port))
 
             async def call_back(port: int, protocol: Callable[[], asyncio.Protocol]) -> object:
-                if port not in callbacks:
+                if not self._is_app(port):
                     raise OSError(f"{port} is not a port of an app")
                 return await loop.create_connection(protocol, "127.0.0.1", port)
 

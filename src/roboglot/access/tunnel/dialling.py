@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import errno
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from ipaddress import IPv4Network
 from typing import Protocol
 
-from roboglot.access.tunnel.connector import Connector, NotTrusted, Refused, Trust
+from roboglot.access.tunnel.connector import APPS, Connector, NotTrusted, Refused, Trust
 from roboglot.hosting.error_text import in_words
 from roboglot.values import dataclass
 
@@ -70,9 +70,10 @@ class Dialling:
         address: str,
         ready: Callable[[str, list[int], str, bool], None],
         say: Callable[[str], None],
+        apps: Collection[int] = APPS,
     ) -> None:
         self._places, self._robot, self._token, self._address = places, robot, token, address
-        self._ready, self._say = ready, say
+        self._ready, self._say, self._apps = ready, say, apps
         self._said = ""
 
     async def keep(self, *, once: bool = False) -> None:
@@ -100,7 +101,8 @@ class Dialling:
 
     async def _carry(self, place: Place) -> str:
         """Carry the ports until the tunnel is lost or the robot has moved; return why it is lost, "" if it moved."""
-        connector = Connector(place.host, place.port, self._robot, self._token, self._address, place.trust)
+        robot, token, address = self._robot, self._token, self._address
+        connector = Connector(place.host, place.port, robot, token, address, place.trust, self._apps)
         running = asyncio.ensure_future(connector.run(self._open))
         moving = asyncio.ensure_future(self._places.moved(self._robot, place))
         try:

@@ -30,7 +30,7 @@ from roboglot.protocols.slamware.chapters.slam.composite import (
 from roboglot.wire.slamware.chapters.slam import stcm_layers
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
-from roboglot.wire.slamware.chapters.slam.stcm_layers import LineEntry
+from roboglot.wire.slamware.chapters.slam.stcm_layers import LineEntry, PoseEntry
 
 MULTI, POIS = "/api/multi-floor/map/v1", "/api/core/artifact/v1/pois"
 SINGLE = st.floats(-1e4, 1e4, width=32)
@@ -100,11 +100,25 @@ def test_too_much_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
         composite_of(FloorMap(annotations=many))
 
 
+def test_pairs_of_all_entries_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sixteen MB of empty pairs, a thousand to an entry, took eight seconds."""
+    walls = stcm_layers.line_layer(stcm_layers.WALLS, [LineEntry("1", 0, 0, 1, 0, (("", ""),) * 10)] * 3)
+    docks = stcm_layers.pose_layer(stcm_layers.DOCKS, [PoseEntry("1", 0, 0, 0, (("", ""),) * 10)])
+    monkeypatch.setattr(stcm_layers, "PAIRS_MAX", 40)
+    assert len(floors_of(CompositeMap((walls, docks)))[0].annotations.lines) == 3
+    monkeypatch.setattr(stcm_layers, "PAIRS_MAX", 39)
+    with pytest.raises(BadMap, match="39 pairs"):
+        floors_of(CompositeMap((walls, docks)))
+    line = Line(0, LineKind.WALL, Point(0, 0), Point(1, 0), metadata={str(n): "" for n in range(40)})
+    with pytest.raises(BadMap, match="39 pairs"):  # not written, either
+        composite_of(FloorMap(annotations=Annotations().with_new(line)))
+
+
 def test_layers_beyond_the_limit_are_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     """Thirty layers of 20,000 lines took six seconds before they were counted."""
     read: list[Layer] = []
 
-    def read_lines(layer: Layer, _usage: str) -> list[LineEntry]:
+    def read_lines(layer: Layer, _usage: str, _budget: stcm_layers.Budget) -> list[LineEntry]:
         read.append(layer)
         return [LineEntry("1", 0.0, 0.0, 1.0, 1.0)]
 

@@ -86,6 +86,9 @@ def grid_of(explored: ExploreMap) -> OccupancyGrid:
 def composite_of(floor: FloorMap) -> CompositeMap:
     """Return the layers of a floor, without empty ones. Raises BadMap for content that could not be read back."""
     notes, label = floor.annotations, floor.name.pairs
+    stcm_layers.Budget().take(
+        sum(len(e.metadata) for e in notes.lines) + sum(len(m.metadata) for m in (*floor.places, *notes.docks))
+    )
     layers = [stcm_layers.grid_layer(explore_map(floor.grid), label)] if floor.grid is not None else []
     for usage, kind in LINE_LAYERS.items():
         lines = [
@@ -118,6 +121,7 @@ def floors_of(composite: CompositeMap) -> list[FloorMap]:
     Layers that name no floor belong to the default one.
     """
     names: dict[tuple[str, str], FloorName] = {}
+    budget = stcm_layers.Budget()
     _check_size(composite)
     for layer in composite.layers:
         values = layer.metadata
@@ -125,7 +129,7 @@ def floors_of(composite: CompositeMap) -> list[FloorMap]:
             key = (clean(values.get("building", "")), clean(values["floor"]))
             names.setdefault(key, _floor_name(*key, values.get("order", ""), values.get("default", "")))
     if not names:
-        return _bounded([_read(FloorName(), list(composite.layers))])
+        return _bounded([_read(FloorName(), list(composite.layers), budget)])
     default = next((name for name in names.values() if name.default), next(iter(names.values())))
     layers: dict[FloorName, list[Layer]] = {replace(n, default=n is default): [] for n in names.values()}
     by_key = {(name.building, name.floor): name for name in layers}
@@ -133,7 +137,7 @@ def floors_of(composite: CompositeMap) -> list[FloorMap]:
         values = layer.metadata
         key = (clean(values.get("building", "")), clean(values.get("floor", "")))
         layers[by_key.get(key, by_key[default.building, default.floor])].append(layer)
-    return _bounded(_read(name, layers[name]) for name in sorted(layers, key=lambda name: name.order))
+    return _bounded(_read(name, layers[name], budget) for name in sorted(layers, key=lambda name: name.order))
 
 
 def _check_size(composite: CompositeMap) -> None:
@@ -164,7 +168,7 @@ def _floor_name(building: str, floor: str, order: str, default: str) -> FloorNam
     return FloorName(building, floor, max(-ORDER_MAX, min(number, ORDER_MAX)), default.lower() in ("true", "1"))
 
 
-def _read(name: FloorName, layers: Sequence[Layer]) -> FloorMap:
+def _read(name: FloorName, layers: Sequence[Layer], budget: stcm_layers.Budget) -> FloorMap:
     """Return the floor of these layers."""
     grid: OccupancyGrid | None = None
     lines: list[Line] = []
@@ -176,9 +180,9 @@ def _read(name: FloorName, layers: Sequence[Layer]) -> FloorMap:
         usage = layer.metadata.get("usage", "")
         if grid is None and (explored := stcm_layers.read_grid(layer)) is not None:
             grid = grid_of(explored)
-        elif usage in LINE_LAYERS and (found := stcm_layers.read_lines(layer, usage)) is not None:
+        elif usage in LINE_LAYERS and (found := stcm_layers.read_lines(layer, usage, budget)) is not None:
             lines += [_line(usage, entry) for entry in found]
-        elif usage in marks and (poses := stcm_layers.read_poses(layer, usage)) is not None:
+        elif usage in marks and (poses := stcm_layers.read_poses(layer, usage, budget)) is not None:
             marks[usage] += [_mark(p.name, Pose(p.x, p.y, p.yaw), dict(p.metadata)) for p in poses]
         elif (entries := stcm_layers.read_areas(layer)) is not None:
             areas += [_area(entry) for entry in entries]

@@ -29,6 +29,7 @@ EXPLORE, WALLS, TRACKS = "explore", "virtual_walls", "virtual_tracks"
 PLACES, DOCKS, AREAS, LANDMARKS = "point_of_interest", "home_dock_pose", "rectangle_area", "landmark"
 T = TypeVar("T")
 ENTRIES_MAX = 20_000  # per layer
+PAIRS_MAX = 400_000  # of all entries of a file
 _ENDS, _POSE = struct.Struct("<4f"), struct.Struct("<3f")
 
 
@@ -129,16 +130,41 @@ def line_layer(usage: str, lines: list[LineEntry]) -> Layer:
     return Layer(_named(usage, LINES, ("count", str(len(lines)))), b"".join(entries))
 
 
-def read_lines(layer: Layer, usage: str) -> list[LineEntry] | None:
-    """Return the lines in ``layer``; None for another layer or encoding."""
+class TooManyPairs(BadMap):
+    """A file's entries have more metadata than anyone could mean; unlike a strange layer, it is read no further."""
+
+
+class Budget:
+    """Number of pairs that the entries of one file may still have."""
+
+    def __init__(self) -> None:
+        self._left = PAIRS_MAX
+
+    def pairs(self, reader: Reader) -> Pairs:
+        """Read an entry's pairs. Raises BadMap, TooManyPairs."""
+        pairs = reader.pairs()
+        self.take(len(pairs))
+        return pairs
+
+    def take(self, count: int) -> None:
+        """Count further pairs. Raises TooManyPairs."""
+        self._left -= count
+        if self._left < 0:
+            raise TooManyPairs(f"places and lines have more than {PAIRS_MAX} pairs of metadata")
+
+
+def read_lines(layer: Layer, usage: str, budget: Budget) -> list[LineEntry] | None:
+    """Return the lines in ``layer``; None for another layer or encoding. Raises TooManyPairs."""
     if not _is(layer, usage, "line-map"):
         return None
     reader, lines = Reader(layer.payload), []
     try:
         while reader.at < len(layer.payload):
             id, (x1, y1, x2, y2) = reader.text(), _ENDS.unpack(reader.take(_ENDS.size))
-            lines.append(LineEntry(id, x1, y1, x2, y2, reader.pairs()))
+            lines.append(LineEntry(id, x1, y1, x2, y2, budget.pairs(reader)))
             _check((x1, y1, x2, y2), len(lines))
+    except TooManyPairs:
+        raise
     except BadMap:
         return None
     return lines
@@ -153,8 +179,8 @@ def pose_layer(usage: str, poses: list[PoseEntry]) -> Layer:
     return Layer(_named(usage, POSES, ("count", str(len(poses)))), b"".join(entries))
 
 
-def read_poses(layer: Layer, usage: str) -> list[PoseEntry] | None:
-    """Return the poses in ``layer``; None for another layer or encoding."""
+def read_poses(layer: Layer, usage: str, budget: Budget) -> list[PoseEntry] | None:
+    """Return the poses in ``layer``; None for another layer or encoding. Raises TooManyPairs."""
     if not _is(layer, usage, "pose-map"):
         return None
     reader, poses = Reader(layer.payload), []
@@ -162,10 +188,12 @@ def read_poses(layer: Layer, usage: str) -> list[PoseEntry] | None:
         while reader.at < len(layer.payload):
             name, unknown = reader.text(), reader.take(1)
             x, y, yaw = _POSE.unpack(reader.take(_POSE.size))
-            poses.append(PoseEntry(name, x, y, yaw, reader.pairs(), reader.take(1)[0]))
+            poses.append(PoseEntry(name, x, y, yaw, budget.pairs(reader), reader.take(1)[0]))
             _check((x, y, yaw), len(poses))
             if unknown != b"\0":
                 return None
+    except TooManyPairs:
+        raise
     except BadMap:
         return None
     return poses
