@@ -35,15 +35,16 @@ def used_by(handler: Callable[..., Any]) -> frozenset[type[Component]]:
         if not isinstance(function, FunctionType) or function in seen or depth > DEPTH_MAX:
             continue
         seen.add(function)
-        for node in ast.walk(_tree(function)):
+        for node in _nodes(function):
             required |= set(_subscripts(node, function))
             optional |= set(_questions(node, function))
             waiting += [(called, depth + 1) for called in _calls(node, function)]
     return frozenset(required - optional)
 
 
-def _tree(function: FunctionType) -> ast.AST:
-    return ast.parse(textwrap.dedent(inspect.getsource(function)))
+@cache
+def _nodes(function: FunctionType) -> list[ast.AST]:
+    return list(ast.walk(ast.parse(textwrap.dedent(inspect.getsource(function)))))
 
 
 def _subscripts(node: ast.AST, function: FunctionType) -> Iterator[type[Component]]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
-from roboglot.config import RobotConfig
-from roboglot.fleet import Fleet, build_fleet
 from roboglot.model.actions import Action
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.localization import Localization
@@ -20,7 +17,6 @@ from roboglot.model.events import BumperPressed, PathBlocked
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
-from roboglot.storage.database import Database
 
 
 @dataclass
@@ -70,17 +66,6 @@ class Tour:
 
     async def go(self, *spots: tuple[float, float], deg: float | None = None, **options: Any) -> Action:
         return await self.end_of(self.head_for(*spots, deg=deg, **options))
-
-
-@asynccontextmanager
-async def delivering(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    """Yield the delivery robot, which has a lift radio, in the office, with a database."""
-    database = Database(":memory:")
-    fleet = build_fleet("office", [RobotConfig(body="hermes")], clock=clock, seed=1, database=database)
-    await fleet.start(wait=True)
-    yield fleet
-    await fleet.close()
-    database.close()
 
 
 @pytest.fixture

@@ -10,12 +10,13 @@ from roboglot.fleet import Fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
 from roboglot.model.components.sensing.sensor_masks import SensorKind, SensorMasks
-from tests.autonomy.conftest import Tour, delivering
+from tests.autonomy.conftest import Tour
+from tests.autonomy.delivery_robot import delivery_robot
 
 
 @pytest.fixture
 async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    async with delivering(clock) as built:
+    async with delivery_robot(clock) as built:
         yield built
 
 

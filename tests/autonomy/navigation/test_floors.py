@@ -35,13 +35,14 @@ from roboglot.model.events import ActionChanged, FloorReached, MapReplaced
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.simulation.components.sensing.lidar import SimulatedLidar
-from tests.autonomy.conftest import Tour, delivering
+from tests.autonomy.conftest import Tour
+from tests.autonomy.delivery_robot import delivery_robot
 from tests.narrowing import known
 
 
 @pytest.fixture
 async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    async with delivering(clock) as built:
+    async with delivery_robot(clock) as built:
         yield built
 
 

@@ -1,7 +1,7 @@
 """A server of tasks whose robot speaks into a file, for tests that kill it.
 
 python killed_robot.py DATABASE FILE TASKS BEGIN PARENT: keeps so many tasks running, recovers those that a killed
-server left behind, and prints its requests and their acknowledgements. With 0 for BEGIN it starts
+server left behind, and prints its requests, their acknowledgements and refusals. With 0 for BEGIN it starts
 nothing new and says "over" when nothing is under way any more. It ends with PARENT, also if that is killed. Each run
 has a number of its own, and says it with each step.
 """
@@ -9,7 +9,6 @@ has a number of its own, and says it with each step.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import os
 import sys
 from pathlib import Path
@@ -66,11 +65,12 @@ async def main(database: str, file: str, tasks: int, begin: int) -> None:
     for number in range(tasks):
         if await service.get(f"t{number}") is None:
             await service.save(StoredProgram(f"t{number}", "", "", "single", "now", BODY, ""))
+    refusals = set[str]()
     while True:
         under_way = 0
         for task in await service.tasks():
             under_way += task.state in (TaskState.RUN, TaskState.SUSPEND, TaskState.RUN_WAIT)
-            with contextlib.suppress(ProgramError):  # it may have ended meanwhile
+            try:
                 if task.state == TaskState.SUSPEND:
                     await service.recover(task.id)
                     print("recovered", task.id, flush=True)
@@ -78,6 +78,10 @@ async def main(database: str, file: str, tasks: int, begin: int) -> None:
                     print("asked", task.id, flush=True)
                     await service.run(task.id)
                     print("begun", task.id, flush=True)
+            except ProgramError as error:  # it may have ended meanwhile
+                if (refusal := f"refused {task.id} {error}") not in refusals:
+                    refusals.add(refusal)
+                    print(refusal, flush=True)
         if not begin and not under_way:
             print("over", flush=True)
             return

@@ -36,12 +36,17 @@ async def life(database: Path, words: Path, seconds: float | None) -> Counter[tu
     pipe = asyncio.subprocess.PIPE
     server = await asyncio.create_subprocess_exec(*KILLED_ROBOT, *arguments, stdout=pipe, cwd=ROOT)
     assert server.stdout
-    reported = []
-    if seconds is not None:
-        reported.append(await asyncio.wait_for(server.stdout.readline(), PATIENCE))
-        await asyncio.sleep(seconds)
-        server.kill()
-    reported += (await asyncio.wait_for(server.stdout.read(), PATIENCE)).splitlines()
+    reported: list[bytes] = []
+    try:
+        async with asyncio.timeout(PATIENCE):
+            if seconds is not None:
+                reported.append(await server.stdout.readline())
+                await asyncio.sleep(seconds)
+                server.kill()
+            while line := await server.stdout.readline():
+                reported.append(line)
+    except TimeoutError:
+        raise AssertionError(f"not over within {PATIENCE:g} s, after {reported[-10:]}") from None
     await server.wait()
     return Counter(tuple(line.decode().split()) for line in reported)
 

@@ -10,15 +10,14 @@ from typing import Any
 import httpx
 import pytest
 
-from roboglot.config import RobotConfig
-from roboglot.fleet import Fleet, build_fleet
+from roboglot.fleet import Fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
-from roboglot.storage.database import Database
 from roboglot.testing import Forward
+from tests.autonomy.delivery_robot import delivery_robot
 from tests.protocols.slamware.maps.test_elevators import ACTIONS, MULTI, drive_to, on_map, start, two_floors
 from tests.protocols.witness import Witness
 
@@ -27,12 +26,8 @@ MAPS = ("ground", "first")  # loaded; the third floor has none
 
 @pytest.fixture
 async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    database = Database(":memory:")
-    built = build_fleet("office", [RobotConfig(name="a", body="hermes")], clock=clock, seed=1, database=database)
-    await built.start(wait=True)
-    yield built
-    await built.close()
-    database.close()
+    async with delivery_robot(clock) as fleet:
+        yield fleet
 
 
 class RideWalk:

@@ -9,16 +9,15 @@ import httpx
 import pytest
 
 from roboglot.cli.maps.survey import surveyed
-from roboglot.config import RobotConfig
-from roboglot.fleet import Fleet, build_fleet
+from roboglot.fleet import Fleet
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.simulation.world.world_files import load_world
-from roboglot.storage.database import Database
 from roboglot.testing import Forward
+from tests.autonomy.delivery_robot import delivery_robot
 
 SHIPPED = Path(__file__).parents[4] / "examples" / "maps" / "office.stcm"
 MULTI, ACTIONS = "/api/multi-floor/map/v1", "/api/core/motion/v1/actions"
@@ -26,12 +25,8 @@ MULTI, ACTIONS = "/api/multi-floor/map/v1", "/api/core/motion/v1/actions"
 
 @pytest.fixture
 async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    database = Database(":memory:")
-    built = build_fleet("office", [RobotConfig(name="a", body="hermes")], clock=clock, seed=1, database=database)
-    await built.start(wait=True)
-    yield built
-    await built.close()
-    database.close()
+    async with delivery_robot(clock) as fleet:
+        yield fleet
 
 
 def test_the_shipped_map_is_of_the_shipped_office() -> None:
