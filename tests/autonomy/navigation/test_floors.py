@@ -212,7 +212,10 @@ async def test_closing_server_begins_no_stay(tour: Tour, aboard: LiftFloors) -> 
     assert aboard._stay is None
 
 
-async def test_given_up_ride_mixes_no_floors(tour: Tour, aboard: LiftFloors, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("closing", [False, True])
+async def test_given_up_ride_mixes_no_floors(
+    tour: Tour, aboard: LiftFloors, monkeypatch: pytest.MonkeyPatch, *, closing: bool
+) -> None:
     await tour.robot[MapAnnotations].change(
         lambda now: now.with_new(Area(0, AreaKind.DANGEROUS, Point(1.0), Point(2.0), 0.5))
     )
@@ -222,11 +225,15 @@ async def test_given_up_ride_mixes_no_floors(tour: Tour, aboard: LiftFloors, mon
     async def given_up_meanwhile(*arguments: Any) -> None:
         action.cancel("the client thinks better of it")
         await asyncio.sleep(0)
+        if closing:  # in that very moment the loop closes, too
+            known(action._task).cancel()
+            await asyncio.sleep(0)
         await change(*arguments)
 
     monkeypatch.setattr(store, "change", given_up_meanwhile)
     await tour.end_of(action)
-    assert (action.status, aboard.current) == (ActionStatus.CANCELED, 1)
+    await tour.until(lambda: aboard.current == 1, 1.0)
+    assert action.status is ActionStatus.CANCELED
     assert tour.robot[MapAnnotations].current.areas == ()
 
 

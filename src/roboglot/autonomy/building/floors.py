@@ -55,6 +55,7 @@ class LiftFloors(Floors):
         self._course = course
         self._others = StoreyShelf(robot)
         self._current = 0
+        self._changing = asyncio.Lock()  # one exchange of floors at a time
         self._places: tuple[Pose, Pose] | None = None  # the waiting place, and the place inside the car
         self._stay: asyncio.Task[None] | None = None  # in the car, after a ride that was given up there …
         self._maps_outside = False  # … and that the robot mapped before
@@ -265,10 +266,15 @@ class LiftFloors(Floors):
         try:
             await asyncio.shield(exchange)
         except asyncio.CancelledError:
-            await exchange
+            await asyncio.wait([exchange])  # unlike awaiting it, a second cancellation does not end it
             raise
 
     async def _exchange(self, floor: int, redraw: bool) -> None:
+        async with self._changing:
+            if floor != self._current:  # else a ride that was given up has brought it
+                await self._restore(floor, redraw)
+
+    async def _restore(self, floor: int, redraw: bool) -> None:
         """Store the present floor's state and restore that of ``floor``, keeping the robot's place in the car."""
         assert self._places is not None
         robot, belief = self.robot, self.belief
