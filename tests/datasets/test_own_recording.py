@@ -34,6 +34,7 @@ async def test_our_own_recording_becomes_a_map(tmp_path: Path) -> None:
     log = read_drive_log(path)
     assert len(log.scans) >= 60
     first, last = log.scans[0], log.scans[-1]
+    assert (last.scan.range_min, last.scan.range_max) == pytest.approx((0.15, 12.0), abs=0.002)
     assert last.odometry.distance_to(first.odometry) == pytest.approx(2.0, abs=0.1)
     build(path, tmp_path / "out", None)
     assert {"map.yaml", "map.stcm", "trajectory.tum", "map.png", "report.md"} <= {

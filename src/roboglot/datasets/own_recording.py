@@ -1,6 +1,6 @@
 """Our own recordings (``roboglot up --record``): scans and odometry of one robot from the MCAP file.
 
-Of several robots, the one with most scans is read. As the file has no limits of the lidar, the farthest echo counts.
+Of several robots, the one with most scans is read. In a file without the lidar's limits, the farthest echo counts.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
 from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
@@ -26,8 +27,17 @@ if TYPE_CHECKING:
     from google.protobuf.timestamp_pb2 import Timestamp
 
 MAGIC = b"\x89MCAP0"
-SCAN, TRANSFORMS = "foxglove.LaserScan", "foxglove.FrameTransforms"
+SCAN, TRANSFORMS, LIMITS = "foxglove.LaserScan", "foxglove.FrameTransforms", "roboglot.Lidar"
 RANGE_MIN = 0.05  # m
+
+
+class _Limits(msgspec.Struct, frozen=True):
+    """Limits that a scan's own message has no fields for; see ``LaserScan``."""
+
+    range_max: float
+    range_min: float = RANGE_MIN
+    clear_range: float = 4.0
+    time_increment: float = 0.0
 
 
 def read_own_recording(path: Path) -> DriveLog:
@@ -39,25 +49,28 @@ def read_own_recording(path: Path) -> DriveLog:
     scans: dict[str, list[ScanMessage]] = {}
     tracks: dict[str, Track] = {}
     mounts: dict[str, Pose] = {}
+    limits: dict[str, _Limits] = {}
     unread: Counter[str] = Counter()
-    for schema, data in _messages(path):
+    for topic, schema, data in _messages(path):
         try:
-            if schema == SCAN:
+            if schema == LIMITS:
+                limits[topic.lstrip("/").partition("/")[0]] = msgspec.json.decode(data, type=_Limits)
+            elif schema == SCAN:
                 message = ScanMessage.FromString(data)
                 _keep(scans.setdefault(message.frame_id.removesuffix("/laser"), []), message, path)
             else:
                 for transform in FrameTransforms.FromString(data).transforms:
                     _take(transform, tracks, mounts)
-        except decoding.DecodeError:
+        except (decoding.DecodeError, msgspec.MsgspecError):
             unread["damaged messages"] += 1
     if not scans:
         raise BadDriveLog(f"{path.name}: no scans; a folder of rosbag2 is read by its folder")
     robot = max(sorted(scans), key=lambda name: len(scans[name]))
     unread.update({f"scans of {name}": len(found) for name, found in scans.items() if name != robot})
     track, mount = tracks.get(robot, Track()), mounts.get(robot, ORIGIN)
-    reach = max((_farthest(message) for message in scans[robot]), default=0.0) or RANGE_MIN
+    known = limits.get(robot) or _Limits(max(map(_farthest, scans[robot])) or RANGE_MIN)
     recorded = [
-        RecordedScan(_scan(message, stamp, reach, mount), odometry)
+        RecordedScan(_scan(message, stamp, known, mount), odometry)
         for message, stamp, odometry in with_odometry(scans[robot], _stamp_of, track, unread)
     ]
     if not recorded:
@@ -65,24 +78,26 @@ def read_own_recording(path: Path) -> DriveLog:
     return DriveLog(path.stem, recorded, dict(unread))
 
 
-def _messages(path: Path) -> Iterator[tuple[str, bytes]]:
-    """Yield schema and bytes of scans and transforms."""
+def _messages(path: Path) -> Iterator[tuple[str, str, bytes]]:
+    """Yield topic, schema and bytes of scans, lidars' limits and transforms."""
     with explaining("reading recordings", "recording"):
         from mcap.records import Channel, Message, Schema
 
         from roboglot.wire.mcap_chunks import stream_of
         from roboglot.wire.mcap_damage import DAMAGE
     schemas: dict[int, str] = {}
-    channels: dict[int, str] = {}
+    channels: dict[int, tuple[str, str]] = {}  # topic and schema
     with path.open("rb") as file:
         try:
             for record in stream_of(file):
                 if isinstance(record, Schema):
                     schemas[record.id] = record.name
                 elif isinstance(record, Channel):
-                    channels[record.id] = schemas.get(record.schema_id, "")
-                elif isinstance(record, Message) and (kind := channels.get(record.channel_id)) in (SCAN, TRANSFORMS):
-                    yield str(kind), record.data
+                    kind = schemas.get(record.schema_id, "")
+                    if kind in (SCAN, LIMITS, TRANSFORMS):
+                        channels[record.id] = record.topic, kind
+                elif isinstance(record, Message) and record.channel_id in channels:
+                    yield *channels[record.channel_id], record.data
         except DAMAGE:
             return  # the program was killed; the complete records count
 
@@ -111,13 +126,23 @@ def _farthest(message: ScanMessage) -> float:
     return float(ranges[np.isfinite(ranges)].max(initial=0.0))
 
 
-def _scan(message: ScanMessage, stamp: float, reach: float, mount: Pose) -> LaserScan:
+def _scan(message: ScanMessage, stamp: float, limits: _Limits, mount: Pose) -> LaserScan:
     ranges = np.array(message.ranges, np.float32)
     with np.errstate(invalid="ignore"):
-        ranges[ranges < RANGE_MIN] = np.nan
+        ranges[ranges < limits.range_min] = np.nan
     ranges.setflags(write=False)
     increment = (message.end_angle - message.start_angle) / max(1, len(ranges) - 1)
-    return LaserScan(stamp, ranges, message.start_angle, increment, RANGE_MIN, reach + 1e-3, mount=mount)
+    return LaserScan(
+        stamp,
+        ranges,
+        message.start_angle,
+        increment,
+        limits.range_min,
+        limits.range_max + 1e-3,  # ranges are recorded to a millimetre
+        mount=mount,
+        time_increment=limits.time_increment,
+        clear_range=limits.clear_range,
+    )
 
 
 def _stamp_of(message: ScanMessage) -> float:

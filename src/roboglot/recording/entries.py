@@ -62,6 +62,7 @@ KINDS = {
     "event": EntryKind("roboglot.Event", _plain),
     "action": EntryKind("roboglot.Action", _plain),
     "battery": EntryKind("roboglot.Battery", _plain),
+    "lidar": EntryKind("roboglot.Lidar", _plain),
     "state": EntryKind("roboglot.State", _plain),
     "mark": EntryKind("roboglot.Mark", _plain),
     "pose": EntryKind("foxglove.PoseInFrame", foxglove.encode_pose),

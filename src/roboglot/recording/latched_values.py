@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from roboglot.recording.entries import Entry
 
-STANDING = frozenset({"state", "battery", "grid", "scene"})  # kinds whose last value holds until the next
+STANDING = frozenset({"state", "battery", "lidar", "grid", "scene"})  # kinds whose last value holds until the next
 STANDING_MAX = 1000  # topics
 REPEATED = 0  # the sequence number of messages repeated from an earlier part
 

@@ -195,6 +195,14 @@ SCHEMAS = {  # JSON schemas, by name
     "roboglot.Battery": _schema(
         "roboglot.Battery", percentage=_NUMBER, voltage=_NUMBER, current=_NUMBER, charging={"type": "boolean"}
     ),
+    "roboglot.Lidar": _schema(
+        "roboglot.Lidar",
+        range_min=_NUMBER,
+        range_max=_NUMBER,
+        clear_range=_NUMBER,
+        time_increment=_NUMBER,
+        rate=_NUMBER,
+    ),
     "roboglot.State": _schema("roboglot.State"),
     "roboglot.Input": _schema(
         "roboglot.Input",

@@ -9,6 +9,7 @@ from typing import Any
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease
@@ -121,8 +122,19 @@ class Sampler:
                 self._send("events", "event", {"event": type(event).__name__, **plain(event)}, at, wall)
 
     def _note_scan(self, scan: LaserScan, wall: int) -> None:
-        self._scan_mount = scan.mount
-        self._put(Entry(self._scan_topic, "scan", self._stamps.at(scan.stamp), wall, (self._laser, scan)))
+        at, self._scan_mount = self._stamps.at(scan.stamp), scan.mount
+        self._send_changed("lidar", "lidar", self._limits_of(scan), at, wall)
+        self._put(Entry(self._scan_topic, "scan", at, wall, (self._laser, scan)))
+
+    def _limits_of(self, scan: LaserScan) -> dict[str, float]:
+        """Return what Foxglove's message of a scan has no fields for: m, s from ray to ray, and turns a second."""
+        return {
+            "range_min": scan.range_min,
+            "range_max": scan.range_max,
+            "clear_range": scan.clear_range,
+            "time_increment": scan.time_increment,
+            "rate": self._robot[Lidar].rate if Lidar in self._robot else 0.0,
+        }
 
     async def _film(self) -> None:
         from roboglot.media.video import VideoStream  # the libraries are an extra

@@ -98,6 +98,7 @@ async def test_topics_come_with_the_robots_values(opened: Opened) -> None:
     scan = peer.heard["/a/scan"][-1]
     assert scan.header.frame_id == "a/laser"
     assert len(scan.ranges) > 100
+    assert scan.range_max == 12.0
     pairs = {(t.header.frame_id, t.child_frame_id) for message in peer.heard["/tf"] for t in message.transforms}
     assert pairs == {("a/map", "a/odom"), ("a/odom", "a/base_link")}
     grid = peer.heard["/a/map"][-1]

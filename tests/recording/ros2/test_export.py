@@ -17,6 +17,7 @@ from roboglot.datasets.rosbag import read_bag
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.geometry import Twist
+from roboglot.recording.foxglove import TYPES
 from roboglot.recording.reader import Record, read_messages
 from roboglot.runtime import Runtime
 from tests.recording.test_recorder import advance, config
@@ -25,7 +26,7 @@ pytest.importorskip("rosbags", reason="needs roboglot[logs]")
 from rosbags.highlevel import AnyReader
 
 from roboglot.recording.ros2.bag import export
-from roboglot.recording.ros2.translation import Ros2Words
+from roboglot.recording.ros2.translation import Ros2Words, read_cdr
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -65,6 +66,7 @@ async def test_a_bag_has_what_was_recorded(drive: tuple[Path, float], tmp_path: 
     scan = found["/a/scan"][-1][1]
     assert scan.header.frame_id == "a/laser"
     assert len(scan.ranges) == round((scan.angle_max - scan.angle_min) / scan.angle_increment) + 1
+    assert [round(value, 3) for value in (scan.range_min, scan.range_max, scan.scan_time)] == [0.15, 12.0, 0.1]
     odometry = [message for _, message in found["/a/odom"]]
     assert odometry[-1].pose.pose.position.x == pytest.approx(x, abs=1e-6)
     assert max(message.twist.twist.linear.x for message in odometry) == pytest.approx(0.3, abs=0.05)
@@ -107,6 +109,15 @@ async def test_impossible_exports_are_refused(drive: tuple[Path, float], tmp_pat
 def test_a_damaged_message_is_an_error() -> None:
     with pytest.raises(ValueError, match="/a/scan"):
         list(Ros2Words().translate(Record("/a/scan", "foxglove.LaserScan", 0, b"\xff\xff\xff")))
+
+
+def test_scan_without_known_limits_fits_its_echoes() -> None:
+    words = Ros2Words()
+    for echoes, farthest in (([1.0, math.inf, 3.0], 3.0), ([2.0, math.nan], 3.0)):
+        scan = TYPES["foxglove.LaserScan"](frame_id="a/laser", ranges=echoes).SerializeToString()
+        [message] = words.translate(Record("/a/scan", "foxglove.LaserScan", 0, scan))
+        decoded: Any = read_cdr(message.data, message.type)
+        assert decoded.range_max == pytest.approx(farthest, abs=0.002)
 
 
 def test_a_battery_that_says_little_is_translated() -> None:

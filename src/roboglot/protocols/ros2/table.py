@@ -15,6 +15,7 @@ PUBLISHED = {
     "pose": ("pose",),
     "grid": ("map",),
     "battery": ("battery_state",),
+    "lidar": (),  # limits, in each scan
     **{reading.topic: (reading.topic,) for reading in READINGS},
 }
 NOT_RECORDED = ("rosout", "image/compressed")  # topics that the door makes itself

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from foxglove_schemas_protobuf.Log_pb2 import Log
     from foxglove_schemas_protobuf.Pose_pb2 import Pose as PoseMessage
     from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+    from numpy.typing import NDArray
     from rosbags.typesys.store import Msg, Msgarg
 
 JSON = "std_msgs/msg/String"
@@ -46,6 +47,15 @@ class _Battery(TypedDict, total=False):
     voltage: float | None
     current: float | None
     percentage: float
+
+
+class _Limits(TypedDict, total=False):
+    """The fields of ``roboglot.Lidar`` that ROS has in each scan."""
+
+    range_min: float
+    range_max: float
+    time_increment: float
+    rate: float
 
 
 class RosMessage(NamedTuple):
@@ -91,6 +101,11 @@ def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Msg:
     return _new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
 
 
+def _robot_of(record: Record) -> str:
+    """Return the name of the robot of a topic (``/a/scan``)."""
+    return record.topic.lstrip("/").partition("/")[0]
+
+
 class Ros2Words:
     """Translates one recording, in its order, as speeds and ranges depend on earlier messages.
 
@@ -99,7 +114,8 @@ class Ros2Words:
 
     def __init__(self, robot: str = "") -> None:
         self._robot = robot
-        self._reach: dict[str, float] = {}
+        self._limits: dict[str, _Limits] = {}  # of lidars, by robot
+        self._farthest: dict[str, float] = {}  # m, by robot: for recordings without the lidar's limits
         self._past: dict[str, deque[tuple[int, Pose]]] = {}
         self._mounts: dict[str, tuple[float, ...]] = {}
         self._by_schema: Mapping[str, Callable[[Record, Any], Iterator[RosMessage]]] = {
@@ -109,27 +125,32 @@ class Ros2Words:
             "foxglove.Grid": self._grid,
             "foxglove.CompressedVideo": self._video,
             "foxglove.Log": self._log,
-            "roboglot.Battery": self._battery,
         }
 
     def translate(self, record: Record) -> Iterator[RosMessage]:
         """Yield the ROS messages of ``record``. Raises ValueError for a damaged one."""
         if self._robot and record.topic != "/tf" and self._robot not in record.topic.split("/")[1:3]:
             return
-        if record.schema in TYPES:
-            try:
-                message = TYPES[record.schema].FromString(record.data)
-            except DecodeError as error:
-                raise ValueError(f"{record.topic}: {error}") from None
-            handler = self._by_schema.get(record.schema)
-            if handler is not None:
-                yield from handler(record, message)
-        elif record.schema == "roboglot.Battery":
-            yield from self._battery(record, msgspec.json.decode(record.data))
+        try:
+            if record.schema in TYPES:
+                handler = self._by_schema.get(record.schema)
+                if handler is not None:
+                    yield from handler(record, TYPES[record.schema].FromString(record.data))
+            else:
+                yield from self._own(record)
+        except (DecodeError, msgspec.MsgspecError) as error:
+            raise ValueError(f"{record.topic}: {error}") from None
+
+    def _own(self, record: Record) -> Iterator[RosMessage]:
+        """Yield the messages of a record in our own JSON."""
+        if record.schema == "roboglot.Battery":
+            yield from self._battery(record, msgspec.json.decode(record.data, type=_Battery))
             yield self._json(record, f"{record.topic}/state")
         elif (reading := BY_SCHEMA.get(record.schema)) is not None:
             yield self._reading(record, reading)
         else:
+            if record.schema == "roboglot.Lidar":
+                self._limits[_robot_of(record)] = msgspec.json.decode(record.data, type=_Limits)
             yield self._json(record, record.topic)
 
     def _made(self, topic: str, type: str, at: int, message: object, *, kept: bool = False) -> RosMessage:
@@ -141,22 +162,30 @@ class Ros2Words:
 
     def _scan(self, record: Record, message: LaserScan) -> Iterator[RosMessage]:
         ranges = np.array(message.ranges, np.float32)
-        farthest = float(ranges[np.isfinite(ranges)].max(initial=0.0))
-        reach = self._reach[record.topic] = max(self._reach.get(record.topic, 0.0), farthest)
+        limits = self._limits.get(_robot_of(record)) or self._limits_so_far(record, ranges)
+        reach, rate = limits.get("range_max", math.inf), limits.get("rate", 0.0)
+        ranges[np.isfinite(ranges)] = ranges[np.isfinite(ranges)].clip(max=reach)  # recorded to a millimetre
         scan = _new(
             "sensor_msgs/msg/LaserScan",
             header=_header(record.at, message.frame_id),
             angle_min=message.start_angle,
             angle_max=message.end_angle,
             angle_increment=(message.end_angle - message.start_angle) / max(1, len(ranges) - 1),
-            time_increment=0.0,
-            scan_time=0.0,
-            range_min=0.0,
-            range_max=reach + 1e-3,
+            time_increment=limits.get("time_increment", 0.0),
+            scan_time=1.0 / rate if rate > 0.0 else 0.0,
+            range_min=limits.get("range_min", 0.0),
+            range_max=reach,
             ranges=ranges,
             intensities=np.array([], np.float32),
         )
         yield self._made(record.topic, "sensor_msgs/msg/LaserScan", record.at, scan)
+
+    def _limits_so_far(self, record: Record, ranges: NDArray[np.float32]) -> _Limits:
+        """Return limits that fit the echoes of a robot so far."""
+        robot = _robot_of(record)
+        farthest = ranges[np.isfinite(ranges)].max(initial=self._farthest.get(robot, 0.0))
+        self._farthest[robot] = float(farthest)
+        return {"range_max": self._farthest[robot] + 1e-3}
 
     def _transforms(self, record: Record, message: FrameTransforms) -> Iterator[RosMessage]:
         moving = []
@@ -284,7 +313,7 @@ class Ros2Words:
         return self._made("/rosout", type, at, line)
 
     def _reading(self, record: Record, reading: Reading) -> RosMessage:
-        header = _header(record.at, f"{record.topic.split('/')[1]}/base_link")
+        header = _header(record.at, f"{_robot_of(record)}/base_link")
         values = reading.ros_fields(msgspec.json.decode(record.data, type=dict[str, float]))
         return self._made(record.topic, reading.ros, record.at, _new(reading.ros, header=header, **values))
 
