@@ -36,7 +36,7 @@ from roboglot.storage.members import StoredMembers
 from roboglot.storage.opening import open_database
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.places import StoredPlaces
-from roboglot.storage.postgresql import PostgreSQL, in_one_line
+from roboglot.storage.postgresql import PostgreSQL, in_one_line, is_exposed
 from roboglot.storage.programs import DatabaseProgramStore
 from roboglot.storage.settings import StoredSettings
 from roboglot.storage.transactions import Connection, DatabaseError, DiskFull, Transactions
@@ -218,6 +218,30 @@ def test_errors_of_bad_urls_show_no_password(monkeypatch: pytest.MonkeyPatch, ur
     with pytest.raises(OSError, match=r"URI|resolve|percent") as raised:
         PostgreSQL(url)
     assert "S3cret" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("address", "mode", "exposed"),
+    [
+        ("", "prefer", False),
+        ("127.0.0.1", "disable", False),
+        ("::1", "prefer", False),
+        ("192.0.2.7", "prefer", True),
+        ("fe80::1%eth0", "require", True),
+        ("192.0.2.7", "verify-full", False),
+    ],
+)
+def test_only_a_checked_certificate_protects(address: str, mode: str, exposed: bool) -> None:
+    assert is_exposed(address, mode) is exposed
+
+
+@needs_postgresql
+async def test_exposed_database_is_logged(
+    db_server: PostgreSQLServer, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(postgresql, "is_exposed", lambda *where: where == ("", "allow"))
+    PostgreSQL(f"{db_server.url}&sslmode=allow").close()
+    assert postgresql.EXPOSED in caplog.messages
 
 
 @needs_postgresql

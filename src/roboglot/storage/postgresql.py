@@ -16,6 +16,7 @@ import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
+from ipaddress import ip_address
 from typing import Any, TypeVar
 
 import psycopg
@@ -34,6 +35,11 @@ CLAIM_MAX = 6000  # ms; the server notices within five seconds that a machine is
 CLAIM_LOCKS = 0x626F74  # the class of the locks by which a program claims its robots
 PIECE_MIN = 3  # characters of a password that an error may not show
 ESCAPE = "\ue000"  # of Unicode's private use
+CHECKING = "verify-ca", "verify-full"  # values of libpq's sslmode that check the server's certificate
+EXPOSED = (
+    "the database's certificate is not checked: others on the network may read and change the robots' data; "
+    "add sslmode=verify-full to its URL"
+)
 MIGRATION_LOCK = 0x726F626F  # the program that opens an empty database first creates the tables; others wait
 
 
@@ -69,6 +75,8 @@ class PostgreSQL:
             if isinstance(error, psycopg.Error | DatabaseError):
                 raise OSError(in_one_line(error)) from None
             raise
+        if is_exposed(self._opened[0].pgconn.hostaddr.decode(), _option(self._opened[0], b"sslmode")):
+            log.warning(EXPOSED)
         self._patience = 0  # who loses a robot later must not wait for it
 
     def on(self, disk: Disk) -> PostgreSQL:
@@ -264,6 +272,19 @@ def without_password(text: str, url: str) -> str:
     for piece in (url, *sorted(pieces, key=len, reverse=True)):
         text = text.replace(piece, "…")
     return text
+
+
+def is_exposed(address: str, ssl_mode: str) -> bool:
+    """Return whether others on the way to a server may read and change what passes.
+
+    ``address``: the server's IP address; empty for a Unix socket. ``ssl_mode``: libpq's ``sslmode``.
+    """
+    return bool(address) and not ip_address(address).is_loopback and ssl_mode not in CHECKING
+
+
+def _option(connection: psycopg.Connection[object], name: bytes) -> str:
+    """Return an option of an open connection, from its URL, a service file or the environment."""
+    return next((o.val or b"" for o in connection.pgconn.info if o.keyword == name), b"").decode()
 
 
 def in_one_line(error: Exception) -> str:
