@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.browser.served import PATIENCE, OpenConsole, Served, becomes
+from roboglot.shards.overview import Overview
+from roboglot.shards.snapshots import Snapshots
+from tests.browser.served import PAGE_PATIENCE, PATIENCE, STILL, OpenConsole, Served, becomes
+from tests.shards.test_overview import Console, fleet_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
@@ -125,3 +129,24 @@ async def test_axe_finds_nothing_serious(theme: str, served: Served, open_consol
                 if violation["impact"] in ("serious", "critical") or violation["id"] == "heading-order"
             ]
             assert serious == [], (view, tab, theme)
+
+
+async def test_fleet_page_filters_its_robots(browser: Any, tmp_path: Path) -> None:
+    fleet = Overview(fleet_of(9, tmp_path), "127.16.3.1", 0)
+    fleet._snapshots = Snapshots(fleet._fleet_host, Console)
+    fleet.open()
+    await fleet.ready()
+    context = await browser.new_context(viewport={"width": 390, "height": 844}, **STILL)
+    page = await context.new_page()
+    page.set_default_timeout(PAGE_PATIENCE)
+    await page.goto(fleet.address)
+    tiles = page.locator("li.tile h2")
+    await becomes(tiles.count, 9)
+    await page.locator("input[type=search]").fill(" A7")
+    await becomes(tiles.all_inner_texts, ["Robot a7\nuniversal · 127.16.3.7"])
+    assert await page.get_by_role("status").inner_text() == "Robots shown: 1 of 9"
+    await page.locator("input[type=search]").fill("FAILED")
+    await becomes(tiles.count, 1)
+    assert await page.evaluate(SMALL_TARGETS) == []
+    await context.close()
+    await fleet.close()

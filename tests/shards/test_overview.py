@@ -6,6 +6,7 @@ import asyncio
 import io
 import json
 from email.message import Message
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar
 from unittest.mock import patch
@@ -38,15 +39,21 @@ class Console(ConsoleClient):
         return PICTURE if path[-1] == "map.png" else b'{"battery": {"charge": 0.5}, "history": ["long"]}'
 
 
-@pytest.fixture
-def fleet_host(tmp_path) -> Any:
-    plan = plan_fleet(3, 1, {}, tmp_path, first="127.16.3.1")
-    shards = {p.name: Shard(number, p, tmp_path) for number, p in enumerate(plan.shards, start=1)}
-    for shard in list(shards.values())[:2]:
+def fleet_of(worlds: int, folder: Path) -> Any:
+    """Return a fleet whose last world has failed."""
+    plan = plan_fleet(worlds, 1, {}, folder, first="127.16.3.1")
+    shards = {p.name: Shard(number, p, folder) for number, p in enumerate(plan.shards, start=1)}
+    *up, failed = shards.values()
+    for shard in up:
         shard.state, shard.ready, shard.beat = State.READY, Ready({}, "http://127.16.3.1:50080"), Beat(1.0, 0, 0.0)
-    shards["w3"].state, shards["w3"].reason = State.FAILED, "the disk is full"
+    failed.state, failed.reason = State.FAILED, "the disk is full"
     Console.asked = []
     return SimpleNamespace(plan=plan, shards=shards)
+
+
+@pytest.fixture
+def fleet_host(tmp_path) -> Any:
+    return fleet_of(3, tmp_path)
 
 
 async def test_many_pages_cost_a_world_one_request(fleet_host) -> None:

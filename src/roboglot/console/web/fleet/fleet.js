@@ -6,6 +6,7 @@ import { Button, Icon, html, language, loadWords, robotWord, t, theme } from "..
 
 const LOOK = 1000; // ms between two looks
 const SEEN_MAX = 100; // robots that are asked for at once
+const FEW = 8; // robots that need no filter
 
 /** @type {import("@preact/signals").Signal<any[] | null>} */
 const worlds = signal(null);
@@ -13,6 +14,7 @@ const worlds = signal(null);
 const states = signal({});
 const beat = signal(0);
 const lost = signal(false);
+const wanted = signal("");
 /** Names of the robots on the screen. @type {Set<string>} */
 const seen = new Set();
 
@@ -65,16 +67,25 @@ function Tile({ robot, world }) {
     ${up && world.console && html`<div class="buttons"><a class="button main" href=${`${world.console}/#/live`} target="_blank" rel="noopener"><span>${t("show")}</span></a></div>`}</li>`;
 }
 
+/** Whether a robot fits the filter: by its name, body or address, or its world's name or state. @param {{robot: any, world: any}} row */
+function fits({ robot, world }) {
+  const words = [robot.name, robot.body, robot.address, world.name, world.state === "ready" ? "" : t(`fleet.${world.state}`)];
+  return words.join(" ").toLowerCase().includes(wanted.value.trim().toLowerCase());
+}
+
 function Page() {
   const all = worlds.value ?? [], robots = all.flatMap((world) => world.robots.map((/** @type {any} */ robot) => ({ robot, world })));
+  const shown = robots.filter(fits);
   const down = all.filter((world) => world.state !== "ready").length;
   return html`<header><a class="brand" href="/fleet/"><img src="/icon.svg" alt="" width="28" height="28" /><b>roboglot</b></a><span class="grow"></span>
       <button type="button" class="button plain" lang=${language.value === "zh" ? "en" : "zh-CN"} onClick=${() => { language.value = language.value === "zh" ? "en" : "zh"; }}>${language.value === "zh" ? "EN" : "中文"}</button>
       <${Button} compact kind="plain" icon=${theme.value === "dark" ? "sun" : "moon"} label=${t("theme")} onClick=${() => { theme.value = theme.value === "dark" ? "light" : "dark"; }} /></header>
     ${lost.value && html`<div class="banner bad" role="alert">${t("fleet.lost")}</div>`}
     <main class="lone"><section class="robots" aria-label=${t("view.robots")}><div class="bar"><h1>${t("fleet.all", { robots: robots.length, worlds: all.length })}</h1>
-      ${down > 0 && html`<span class="chip bad">${t("fleet.down", { n: down })}</span>`}</div>
-      <ul class="tiles">${robots.map(({ robot, world }) => html`<${Tile} key=${robot.name} robot=${robot} world=${world} />`)}</ul></section></main>`;
+      ${down > 0 && html`<span class="chip bad">${t("fleet.down", { n: down })}</span>`}
+      <span class="muted" role="status">${wanted.value.trim() ? t("fleet.shown", { n: shown.length, all: robots.length }) : ""}</span>
+      ${robots.length > FEW && html`<label class="filter"><span class="unseen">${t("fleet.filter")}</span><input type="search" placeholder=${t("fleet.filter")} value=${wanted.value} onInput=${(/** @type {any} */ e) => { wanted.value = e.target.value; }} /></label>`}</div>
+      <ul class="tiles">${shown.map(({ robot, world }) => html`<${Tile} key=${robot.name} robot=${robot} world=${world} />`)}</ul></section></main>`;
 }
 
 loadWords("/words", "/fleet/words").then(() => {
