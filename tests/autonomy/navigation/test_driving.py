@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboglot.autonomy.navigation.driving import MOVE_MAX, OdometryDriving
+from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.autonomy.navigation.speed_profile import cruise_speed, trapezoid_time
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base, BaseLimits, WheelSpeeds
-from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.driving import BASE, MOVE_MAX, Driving
 from roboglot.model.components.motion.legs import LEGS, Legs, Posture
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, EmergencyStopped, InvalidGoal

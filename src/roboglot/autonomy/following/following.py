@@ -12,19 +12,18 @@ from roboglot.autonomy.navigation.base_actions import PERIOD, start_on_base
 from roboglot.autonomy.slam.scan_points import ScanReader, sees
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.following import Following, FollowSide
+from roboglot.model.components.motion.following import Following, FollowSide, check_distance
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.sensing.ultra_wideband import TagReading, UltraWideband
 from roboglot.model.components.sensing.vision import Vision
-from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.errors import NotFound
 from roboglot.model.geometry import STILL, Point, Pose, Twist
 from roboglot.model.perception import PersonSeen, Sighting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 from roboglot.values import dataclass
 
-DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
 OUT_OF_SIGHT = 0.6  # s after which the robot stops and searches where the person was last seen
 GIVE_UP_AFTER = 15.0  # s without sight of the person
 SPEED, TURN_RATE = 1.0, 1.5  # m/s, rad/s at most
@@ -86,7 +85,7 @@ class SightFollowing(Following):
         distance: float = 1.0,
         source: str = "",
     ) -> Action:
-        _check(distance)
+        check_distance(distance)
 
         vision = self._robot[Vision]
 
@@ -104,7 +103,7 @@ class SightFollowing(Following):
         return start_on_base(self._robot, "follow", run, goal=goal, source=source)
 
     def follow_tag(self, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = "") -> Action:
-        _check(distance)
+        check_distance(distance)
         radio = self._robot[UltraWideband]
 
         async def run(action: Action) -> None:
@@ -121,7 +120,7 @@ class SightFollowing(Following):
     def follow_thing(
         self, place: Point, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = ""
     ) -> Action:
-        _check(distance)
+        check_distance(distance)
         lidar = self._robot[Lidar]
 
         async def run(action: Action) -> None:
@@ -246,11 +245,6 @@ class SightFollowing(Following):
             return Twist(speed * math.cos(heading), speed * math.sin(heading), turn), free > GAP
         turn = _within(TURN_RATE, TURN_GAIN * heading)
         return Twist(speed * max(0.0, math.cos(heading)) ** 2, 0.0, turn), free > GAP
-
-
-def _check(distance: float) -> None:
-    if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
-        raise InvalidGoal(f"the following distance is {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
 
 
 def _within(limit: float, value: float) -> float:

@@ -15,16 +15,13 @@ from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.displacement import Carried
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base, WheelSpeeds
-from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.driving import Driving, check_command, check_offset, top_speed
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.errors import Blocked, InvalidGoal
+from roboglot.model.errors import Blocked
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
 
-MOVE_MAX = 1000.0  # m in one move
-TURN_MAX = 1000.0  # rad in one move
-LIFETIME_MAX = 86_400.0  # s
 PATIENCE = 2.0  # s without progress before a move gives up
 PROGRESS = 0.005  # m (or rad / TURN_WEIGHT) that count as progress
 TURN_WEIGHT = 0.2  # m per rad, to add the remaining distance and turn into one number
@@ -100,7 +97,7 @@ class OdometryDriving(Driving):
         self._moving: _Moving | None = None
 
     def drive(self, command: Twist | WheelSpeeds, *, lifetime: float | None = None, source: str = "") -> Action:
-        _check_command(command, lifetime)
+        check_command(command, lifetime)
         if any(astuple(command)):
             self._check_free(command)
         wanted = _Command(command, math.inf if lifetime is None else self._robot.clock.time() + lifetime)
@@ -121,10 +118,9 @@ class OdometryDriving(Driving):
         self, offset: Pose, *, speed: float | None = None, yaw_speed: float | None = None, source: str = ""
     ) -> Action:
         limits = self._robot[Base].limits.twist
-        top = _top_speed(speed, limits.x, "speed")
-        top_yaw = _top_speed(yaw_speed, limits.yaw, "yaw speed")
-        if not (math.hypot(offset.x, offset.y) <= MOVE_MAX and abs(offset.yaw) <= TURN_MAX):
-            raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
+        top = top_speed(speed, limits.x, "speed")
+        top_yaw = top_speed(yaw_speed, limits.yaw, "yaw speed")
+        check_offset(offset)
         self._check_free(_way(offset, top))
 
         before = self._moving
@@ -275,20 +271,3 @@ def _way(offset: Pose, speed: float) -> Twist:
     """Return the velocity at the start of a move; STILL if it only turns."""
     way = math.hypot(offset.x, offset.y)
     return Twist(speed * offset.x / way, speed * offset.y / way, 0.0) if way > 0.0 else STILL
-
-
-def _top_speed(wanted: float | None, limit: float, what: str) -> float:
-    """Return ``wanted`` within the base's limit. Raises InvalidGoal."""
-    if wanted is None:
-        return limit
-    if not wanted > 0:
-        raise InvalidGoal(f"the {what} must be above 0, not {wanted}")
-    return min(wanted, limit)
-
-
-def _check_command(command: Twist | WheelSpeeds, lifetime: float | None) -> None:
-    """Raise InvalidGoal for numbers that are not finite, or a lifetime out of range."""
-    if not all(map(math.isfinite, astuple(command))):
-        raise InvalidGoal(f"not a velocity: {command}")
-    if lifetime is not None and not 0 < lifetime <= LIFETIME_MAX:
-        raise InvalidGoal(f"a lifetime must be above 0 and at most {LIFETIME_MAX:g} s, not {lifetime}")

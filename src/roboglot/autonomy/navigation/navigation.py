@@ -17,14 +17,13 @@ from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.pilot import Pilot
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
-from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
+from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions, check_goals
+from roboglot.model.errors import Blocked, Unreachable
 from roboglot.model.events import MapReplaced
-from roboglot.model.geometry import ORIGIN, POSITION_MAX, Path, Point
+from roboglot.model.geometry import ORIGIN, Path, Point
 from roboglot.model.robot import Robot
 
 GOALS_MAX = 500
-RETRIES_MAX = 1000
 RETRY_AFTER = 5.0  # s
 TOUR_PASSES = 30  # of improving a tour
 NO_WAY = 1e6  # m
@@ -136,17 +135,5 @@ class GridNavigation(Navigation):
 
 def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:
     """Return the goal. Raises InvalidGoal."""
-    if not 1 <= len(goals) <= GOALS_MAX:
-        raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
-    for goal in goals:
-        if not math.hypot(goal.x, goal.y) <= POSITION_MAX:
-            raise InvalidGoal(f"not a place on this map: {goal}")
-    if options.yaw is not None and not math.isfinite(options.yaw):
-        raise InvalidGoal("the final yaw is not a number")
-    if not 0.0 < options.speed_ratio <= 1.0:
-        raise InvalidGoal(f"a share of the top speed must be above 0 and at most 1, not {options.speed_ratio}")
-    if not 0.0 < options.tolerance <= POSITION_MAX:
-        raise InvalidGoal(f"a tolerance must be above 0, not {options.tolerance}")
-    if not 0 <= options.retries <= RETRIES_MAX:
-        raise InvalidGoal(f"0 to {RETRIES_MAX} retries, not {options.retries}")
+    check_goals(goals, options, most=GOALS_MAX)
     return Goal(tuple(Point(goal.x, goal.y) for goal in goals), options)

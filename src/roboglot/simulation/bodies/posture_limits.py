@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from itertools import groupby
 
 from roboglot.model.components.motion.feet import FOOTFALL_SECONDS_MIN, FOOTFALLS_MAX, Foot, Footfall, Foothold
-from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN
-from roboglot.model.components.motion.legs import STEPS_MAX, BodyPose, FootLift, LegLimits, Step
+from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX
+from roboglot.model.components.motion.legs import STEPS_MAX, BodyPose, LegLimits, Step, check_lift, check_pose
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import STILL, Orientation, Point, Twist
 from roboglot.simulation.bodies.performing import Body
 
 STEP_SECONDS_MAX = 60.0
-INWARD_MAX = 0.05  # m
 ON_TWO_FEET_MAX, ON_FEWER_MAX = 0.6, 0.3  # s for which a robot keeps its balance; on three feet, forever
 TAUT, GIVING = 3.0, 0.05  # N of a pull that it notices, and m/s by which it yields per further N
 
@@ -31,28 +30,6 @@ def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
         Orientation(*(cut(x + y, limits.angle) for x, y in ((a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)))),
         Point(cut(now.shift.x + by.shift.x, limits.shift), cut(now.shift.y + by.shift.y, limits.shift)),
     )
-
-
-def check_pose(body: BodyPose, limits: LegLimits) -> None:
-    """Raise InvalidGoal for a pose that the legs cannot hold."""
-    a = body.attitude
-    numbers = (a.roll, a.pitch, a.yaw, body.shift.x, body.shift.y, body.height or 0.0)
-    if not all(map(math.isfinite, numbers)):
-        raise InvalidGoal("a body pose must be finite")
-    if body.height is not None and not limits.lowest <= body.height <= limits.highest:
-        raise InvalidGoal(f"the belly is held {limits.lowest} to {limits.highest} m above the floor")
-    if max(abs(a.roll), abs(a.pitch), abs(a.yaw)) > limits.angle:
-        raise InvalidGoal(f"the body turns by at most {limits.angle} rad")
-    if max(abs(body.shift.x), abs(body.shift.y)) > limits.shift:
-        raise InvalidGoal(f"the body shifts by at most {limits.shift} m")
-
-
-def check_lift(lift: FootLift) -> None:
-    """Raise InvalidGoal for feet lifted too little or too far."""
-    if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
-        raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
-    if not 0.0 <= lift.inward <= INWARD_MAX:
-        raise InvalidGoal(f"feet come down at most {INWARD_MAX} m nearer to the middle")
 
 
 def check_steps(steps: Sequence[Step], footfalls: Sequence[Footfall], limits: LegLimits, fastest: Twist) -> None:

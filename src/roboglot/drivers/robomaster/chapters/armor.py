@@ -6,8 +6,7 @@ from functools import partial
 
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.supervisor import Supervisor
-from roboglot.model.components.interaction.armor import SENSITIVITY_MAX, Armor, PlatePlace
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.components.interaction.armor import Armor, PlatePlace, check_sensitivity
 
 AROUND = (PlatePlace.REAR, PlatePlace.FRONT, PlatePlace.LEFT, PlatePlace.RIGHT)
 AT_GIMBAL = (PlatePlace.GIMBAL_LEFT, PlatePlace.GIMBAL_RIGHT)
@@ -32,8 +31,7 @@ class RoboMasterArmor(Armor):
         return self._sensitivity
 
     def set_sensitivity(self, sensitivity: int) -> None:
-        if not 0 <= sensitivity <= SENSITIVITY_MAX:
-            raise InvalidGoal(f"a sensitivity is 0 to {SENSITIVITY_MAX}, not {sensitivity}")
+        check_sensitivity(sensitivity)
 
         def set_(value: int) -> None:
             self._sensitivity = value

@@ -7,8 +7,8 @@ from functools import partial
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.clock import Clock
-from roboglot.model.components.interaction.blaster import BEADS_MAX, Blaster
-from roboglot.model.errors import Busy, InvalidGoal, Refused
+from roboglot.model.components.interaction.blaster import Blaster, check_beads
+from roboglot.model.errors import Busy, Refused
 
 
 class RoboMasterBlaster(Blaster):
@@ -29,8 +29,7 @@ class RoboMasterBlaster(Blaster):
         return self._beads
 
     def set_beads(self, beads: int) -> None:
-        if not 1 <= beads <= BEADS_MAX:
-            raise InvalidGoal(f"a shot has 1 to {BEADS_MAX} beads, not {beads}")
+        check_beads(beads)
 
         def set_(value: int) -> None:
             self._beads = value

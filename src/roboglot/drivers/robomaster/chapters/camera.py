@@ -17,8 +17,8 @@ from roboglot.extras import lazy
 from roboglot.media.h264 import VideoPacket
 from roboglot.media.video import VideoStream
 from roboglot.model.clock import Clock
-from roboglot.model.components.sensing.camera import EXPOSURE_MAX, Camera, Frame, Mount
-from roboglot.model.errors import InvalidGoal, Unconnected
+from roboglot.model.components.sensing.camera import Camera, Frame, Mount, check_exposure
+from roboglot.model.errors import Unconnected
 from roboglot.model.feed import Feed, Viewer
 from roboglot.model.geometry import wrap_angle
 
@@ -83,8 +83,7 @@ class RoboMasterCamera(Camera):
 
     def set_exposure(self, stops: float) -> None:
         """Set the nearest of the four exposures of an EP."""
-        if not abs(stops) <= EXPOSURE_MAX:
-            raise InvalidGoal(f"an exposure is up to {EXPOSURE_MAX} stops, not {stops}")
+        check_exposure(stops)
         word = min(EXPOSURES, key=lambda name: abs(EXPOSURES[name] - stops))
         self._supervisor.send("setting the exposure", self._client.camera.exposure(word))
         self._exposure = word

@@ -7,8 +7,8 @@ from roboglot.drivers.robomaster import motion
 from roboglot.drivers.robomaster.vocabulary import gripper_status
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.gripper import GRIPPER, LEVEL_MAX, Gripper, GripperStatus
-from roboglot.model.errors import Blocked, InvalidGoal
+from roboglot.model.components.motion.gripper import GRIPPER, Gripper, GripperStatus, check_level
+from roboglot.model.errors import Blocked
 from roboglot.model.robot import Robot
 
 OPENINGS = {GripperStatus.CLOSED: 0.0, GripperStatus.BETWEEN: 0.05, GripperStatus.OPEN: 0.10}  # m
@@ -48,8 +48,7 @@ class RoboMasterGripper(Gripper):
         self._supervisor.send("stopping the gripper", self._client.robotic_gripper.stop())
 
     def _start(self, goal: GripperStatus, level: int, source: str) -> Action:
-        if not 1 <= level <= LEVEL_MAX:
-            raise InvalidGoal(f"a gripper's level is 1 to {LEVEL_MAX}, not {level}")
+        check_level(level)
         gripper, clock = self._client.robotic_gripper, self._robot.clock
 
         async def run() -> None:

@@ -7,8 +7,18 @@ from enum import StrEnum
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
 
 POWER = "power"  # the resource that changes of the power mode hold
+
+
+DAYS_MAX = 30  # to the end, and to a new start
+
+
+def check_delays(after: float, restart_after: float | None) -> None:
+    """Raise InvalidGoal for seconds of ``shut_down`` below 0 or above DAYS_MAX."""
+    if not all(0.0 <= seconds <= DAYS_MAX * 86_400.0 for seconds in (after, restart_after or 0.0)):
+        raise InvalidGoal(f"the time must be 0 to {DAYS_MAX} days ahead")
 
 
 class PowerMode(StrEnum):

@@ -6,12 +6,13 @@ from abc import abstractmethod
 from enum import StrEnum
 
 from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
 
 SENSITIVITY_MAX = 10
 
 
 class PlatePlace(StrEnum):
-    """Place of an armour plate on the robot."""
+    """Place of an armor plate on the robot."""
 
     REAR = "rear"
     FRONT = "front"
@@ -27,6 +28,12 @@ class HitKind(StrEnum):
     BEAD = "bead"
     COLLISION = "collision"
     HAND = "hand"
+
+
+def check_sensitivity(sensitivity: int) -> None:
+    """Raise InvalidGoal outside 0 to SENSITIVITY_MAX."""
+    if not 0 <= sensitivity <= SENSITIVITY_MAX:
+        raise InvalidGoal(f"a sensitivity is 0 to {SENSITIVITY_MAX}, not {sensitivity}")
 
 
 class Armor(Component):

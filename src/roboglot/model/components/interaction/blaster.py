@@ -5,8 +5,15 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
 
 BEADS_MAX = 8  # per shot
+
+
+def check_beads(beads: int) -> None:
+    """Raise InvalidGoal unless a shot can have so many beads."""
+    if not 1 <= beads <= BEADS_MAX:
+        raise InvalidGoal(f"a shot has 1 to {BEADS_MAX} beads, not {beads}")
 
 
 class Blaster(Component):

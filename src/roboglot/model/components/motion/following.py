@@ -7,7 +7,16 @@ from enum import StrEnum
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
+
+DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
+
+
+def check_distance(distance: float) -> None:
+    """Raise InvalidGoal outside DISTANCE_MIN to DISTANCE_MAX."""
+    if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
+        raise InvalidGoal(f"the following distance is {DISTANCE_MIN} to {DISTANCE_MAX} m, not {distance}")
 
 
 class FollowSide(StrEnum):

@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
 
 GRIPPER = "gripper"  # the resource of all actions that move the jaws
 LEVEL_MAX = 4
@@ -18,6 +19,12 @@ class GripperStatus(StrEnum):
     CLOSED = "closed"
     BETWEEN = "between"  # moving, stopped, or closed around an object
     OPEN = "open"
+
+
+def check_level(level: int) -> None:
+    """Raise InvalidGoal outside 1 to LEVEL_MAX."""
+    if not 1 <= level <= LEVEL_MAX:
+        raise InvalidGoal(f"a gripper's level is 1 to {LEVEL_MAX}, not {level}")
 
 
 class Gripper(Component):

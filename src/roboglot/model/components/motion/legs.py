@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.components.motion.feet import Foot, Footfall, Foothold, FootState
-from roboglot.model.components.motion.gaits import Gait
+from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, Gait
 from roboglot.model.components.motion.motions import Motion
 from roboglot.model.components.motion.posture import Posture
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import LEVEL, STILL, Orientation, Point, Twist
 from roboglot.values import dataclass
 
@@ -18,6 +20,7 @@ __all__ = ["LEGS", "STEPS_MAX", "BodyPose", "Choreography", "FootLift", "LegLimi
 
 LEGS = "legs"  # the resource of posture changes and motions, together with BASE, and of body poses alone
 STEPS_MAX = 1000  # of a choreography
+INWARD_MAX = 0.05  # m
 CENTRED = Point()
 
 
@@ -25,7 +28,7 @@ CENTRED = Point()
 class BodyPose:
     """Pose of the body above its feet.
 
-        ``height``: of the belly above the floor, m (None: as it is); ``attitude``: roll, pitch and yaw against standing
+    ``height``: of the belly above the floor, m (None: as it is); ``attitude``: roll, pitch and yaw against standing
     straight, rad; ``shift``: of the body's middle against the feet, m.
     """
 
@@ -80,6 +83,28 @@ class LegLimits:
     angle: float
     shift: float
     reach: float
+
+
+def check_pose(body: BodyPose, limits: LegLimits, *, relative: bool = False) -> None:
+    """Raise InvalidGoal for a pose that the legs cannot hold; a ``relative`` one may have any finite height."""
+    a = body.attitude
+    numbers = (a.roll, a.pitch, a.yaw, body.shift.x, body.shift.y, body.height or 0.0)
+    if not all(map(math.isfinite, numbers)):
+        raise InvalidGoal("a body pose must be finite")
+    if body.height is not None and not relative and not limits.lowest <= body.height <= limits.highest:
+        raise InvalidGoal(f"the belly is held {limits.lowest} to {limits.highest} m above the floor")
+    if max(abs(a.roll), abs(a.pitch), abs(a.yaw)) > limits.angle:
+        raise InvalidGoal(f"the body turns by at most {limits.angle} rad")
+    if max(abs(body.shift.x), abs(body.shift.y)) > limits.shift:
+        raise InvalidGoal(f"the body shifts by at most {limits.shift} m")
+
+
+def check_lift(lift: FootLift) -> None:
+    """Raise InvalidGoal for feet lifted too little or too far."""
+    if not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
+        raise InvalidGoal(f"feet are lifted by {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
+    if not 0.0 <= lift.inward <= INWARD_MAX:
+        raise InvalidGoal(f"feet come down at most {INWARD_MAX} m nearer to the middle")
 
 
 class Legs(Component):

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from enum import StrEnum
 
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
-from roboglot.model.geometry import Path, Point
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.geometry import POSITION_MAX, Path, Point
 from roboglot.values import dataclass
+
+RETRIES_MAX = 1000
 
 
 class Tracks(StrEnum):
@@ -43,6 +47,23 @@ class NavigationFeedback:
     remaining: Path
     milestones: tuple[Point, ...]
     time_to_goal: float
+
+
+def check_goals(goals: Sequence[Point], options: NavigationOptions, *, most: int) -> None:
+    """Raise InvalidGoal for more goals than ``most`` or none, places off any map, and impossible options."""
+    if not 1 <= len(goals) <= most:
+        raise InvalidGoal(f"1 to {most} goals, not {len(goals)}")
+    for goal in goals:
+        if not math.hypot(goal.x, goal.y) <= POSITION_MAX:
+            raise InvalidGoal(f"not a place on this map: {goal}")
+    if options.yaw is not None and not math.isfinite(options.yaw):
+        raise InvalidGoal("the final yaw is not a number")
+    if not 0.0 < options.speed_ratio <= 1.0:
+        raise InvalidGoal(f"a share of the top speed must be above 0 and at most 1, not {options.speed_ratio}")
+    if not 0.0 < options.tolerance <= POSITION_MAX:
+        raise InvalidGoal(f"a tolerance must be above 0, not {options.tolerance}")
+    if not 0 <= options.retries <= RETRIES_MAX:
+        raise InvalidGoal(f"0 to {RETRIES_MAX} retries, not {options.retries}")
 
 
 class Navigation(Component):

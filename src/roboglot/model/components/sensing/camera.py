@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from roboglot.extras import lazy
 from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.feed import Viewer
 from roboglot.values import dataclass
 
@@ -17,6 +18,12 @@ else:
     np = lazy("numpy")
 
 EXPOSURE_MAX = 3.0  # stops, up and down
+
+
+def check_exposure(stops: float) -> None:
+    """Raise InvalidGoal beyond EXPOSURE_MAX."""
+    if not abs(stops) <= EXPOSURE_MAX:
+        raise InvalidGoal(f"exposure is corrected by up to {EXPOSURE_MAX:g} stops, not {stops:g}")
 
 
 @dataclass(frozen=True, slots=True)

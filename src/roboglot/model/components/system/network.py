@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from roboglot.model.action import Action
 from roboglot.model.components.component import Component
+from roboglot.model.errors import InvalidGoal
 from roboglot.values import dataclass
 
 WIFI = "wifi"  # the resource of joining a network
@@ -15,6 +16,14 @@ SSID_MAX = 32  # bytes
 PASSWORD_MIN, PASSWORD_MAX = 8, 63  # characters; "" is an open network
 APN_MAX = 100  # characters
 KNOWN_MAX = 32  # networks that the robot remembers
+
+
+def check_network(ssid: str, password: str) -> None:
+    """Raise InvalidGoal for a name or password that no network has."""
+    if not 1 <= len(ssid.encode()) <= SSID_MAX:
+        raise InvalidGoal(f"the name of a network has 1 to {SSID_MAX} bytes")
+    if password and not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
+        raise InvalidGoal(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")
 
 
 class NetworkMode(StrEnum):

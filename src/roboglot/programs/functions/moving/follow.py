@@ -7,7 +7,7 @@ import asyncio
 from roboglot.model.actions import Action
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.motion.driving import BASE
-from roboglot.model.components.motion.following import Following
+from roboglot.model.components.motion.following import DISTANCE_MAX, DISTANCE_MIN, Following
 from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, RobotError
 from roboglot.programs.functions.results import StateCode, state
@@ -15,7 +15,7 @@ from roboglot.programs.functions.session import Session
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.worker.values import Record
 
-DISTANCE_MIN, DISTANCE_DEFAULT, DISTANCE_MAX = 0.5, 1.0, 5.0  # m
+DISTANCE_DEFAULT = 1.0  # m
 PERIOD = 0.1  # s
 GIVE_UP_AFTER = 30.0  # s without seeing a person
 SKILL_SEARCHES = 15.0  # part of GIVE_UP_AFTER in which the skill itself searches, s

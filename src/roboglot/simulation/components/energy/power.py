@@ -8,10 +8,10 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action
-from roboglot.model.components.energy.power import POWER, Power, PowerMode
+from roboglot.model.components.energy.power import POWER, Power, PowerMode, check_delays
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.components.system.settings import Settings
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.errors import Refused
 from roboglot.model.events import PowerModeChanged, Rebooted, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.part import Fitting, Part
@@ -22,7 +22,6 @@ from roboglot.simulation.components.motion.legs import SimulatedLegs
 from roboglot.simulation.components.sensing.lidar import SimulatedLidar
 
 AUTOMATIC = "power.automatic"
-AFTER_MAX = 30 * 86_400.0  # s
 _SHARES = {PowerMode.OFF: 0.0, PowerMode.ASLEEP: 0.5, PowerMode.LOW_POWER: 1.0}  # relative to low power
 
 
@@ -108,8 +107,7 @@ class SimulatedPower(Power):
         return self._robot.actions.start("wake up", run, resources=[POWER], source=source)
 
     def shut_down(self, *, source: str = "", after: float = 0.0, restart_after: float | None = None) -> Action:
-        if not (0.0 <= after <= AFTER_MAX and 0.0 <= (restart_after or 0.0) <= AFTER_MAX):
-            raise InvalidGoal("the time is too far ahead")
+        check_delays(after, restart_after)
 
         async def run(action: Action) -> None:
             await self._clock.sleep(after)

@@ -11,8 +11,8 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from roboglot.model.components.interaction.armor import SENSITIVITY_MAX, Armor, HitKind, PlatePlace
-from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.components.interaction.armor import SENSITIVITY_MAX, Armor, HitKind, PlatePlace, check_sensitivity
+from roboglot.model.errors import NotFound
 from roboglot.model.events import ArmorHit, EventStream
 from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
@@ -67,8 +67,7 @@ class SimulatedArmor(Armor):
         return self._sensitivity
 
     def set_sensitivity(self, sensitivity: int) -> None:
-        if not 0 <= sensitivity <= SENSITIVITY_MAX:
-            raise InvalidGoal(f"a sensitivity is 0 to {SENSITIVITY_MAX}, not {sensitivity}")
+        check_sensitivity(sensitivity)
         self._sensitivity = sensitivity
 
     def touch(self, place: PlatePlace) -> None:

@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta, Struct
 
-from roboglot.model.components.interaction.blaster import BEADS_MAX, Blaster
-from roboglot.model.errors import Busy, InvalidGoal, Refused
+from roboglot.model.components.interaction.blaster import Blaster, check_beads
+from roboglot.model.errors import Busy, Refused
 from roboglot.model.events import BeadFired
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
@@ -54,8 +54,7 @@ class SimulatedBlaster(Blaster):
         return self._beads
 
     def set_beads(self, beads: int) -> None:
-        if not 1 <= beads <= BEADS_MAX:
-            raise InvalidGoal(f"a shot has 1 to {BEADS_MAX} beads, not {beads}")
+        check_beads(beads)
         self._beads = beads
 
     @property

@@ -10,9 +10,9 @@ from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action
 from roboglot.model.clock import RealClock
-from roboglot.model.components.interaction.speaker import SPEAKER, TEXT_MAX, Speaker
+from roboglot.model.components.interaction.speaker import SPEAKER, Speaker, check_text, check_volume
 from roboglot.model.components.system.settings import Settings
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.errors import Refused
 from roboglot.model.events import SoundPlayed, Spoke
 from roboglot.model.robot import Robot
 from roboglot.model.sound import Sound
@@ -49,15 +49,13 @@ class SimulatedSpeaker(Speaker):
         return self._volume
 
     def set_volume(self, volume: float) -> None:
-        if not 0.0 <= volume <= 1.0:
-            raise InvalidGoal(f"the volume is 0 to 1, not {volume:g}")
+        check_volume(volume)
         self._volume = volume
         if Settings in self._robot:
             self._keeping = asyncio.get_running_loop().create_task(self._robot[Settings].keep(VOLUME, volume))
 
     def say(self, text: str, *, source: str = "") -> Action:
-        if not text.strip() or len(text) > TEXT_MAX:
-            raise InvalidGoal(f"a text to say has 1 to {TEXT_MAX} characters")
+        check_text(text)
 
         async def run(_action: Action) -> None:
             threaded = isinstance(self._robot.clock, RealClock)

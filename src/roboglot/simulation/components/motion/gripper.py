@@ -7,8 +7,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.gripper import GRIPPER, LEVEL_MAX, Gripper, GripperStatus
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.components.motion.gripper import GRIPPER, Gripper, GripperStatus, check_level
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move
 from roboglot.simulation.bodies.hull import Hull
@@ -77,8 +76,7 @@ class SimulatedGripper(Gripper):
             self.busy.end()
 
     def _start(self, name: str, goal: float, level: int, source: str) -> Action:
-        if not 1 <= level <= LEVEL_MAX:
-            raise InvalidGoal(f"a gripper's level is 1 to {LEVEL_MAX}, not {level}")
+        check_level(level)
 
         async def run(action: Action) -> None:
             def begin() -> None:

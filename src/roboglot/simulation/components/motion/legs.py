@@ -13,7 +13,17 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.feet import Foot, Footfall, FootState
 from roboglot.model.components.motion.gaits import GAITS, Gait
-from roboglot.model.components.motion.legs import LEGS, BodyPose, Choreography, FootLift, Legs, Posture, Step
+from roboglot.model.components.motion.legs import (
+    LEGS,
+    BodyPose,
+    Choreography,
+    FootLift,
+    Legs,
+    Posture,
+    Step,
+    check_lift,
+    check_pose,
+)
 from roboglot.model.components.motion.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.errors import Collided, EmergencyStopped, InvalidGoal, Refused
 from roboglot.model.events import PostureChanged
@@ -32,7 +42,7 @@ from roboglot.simulation.bodies.performing import (
     motion_frames,
     strayed,
 )
-from roboglot.simulation.bodies.posture_limits import STEP_SECONDS_MAX, added, check_lift, check_pose, check_steps, led
+from roboglot.simulation.bodies.posture_limits import STEP_SECONDS_MAX, added, check_steps, led
 from roboglot.simulation.bodies.readiness import check_fit
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.steps import Steps

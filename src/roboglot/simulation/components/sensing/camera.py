@@ -13,12 +13,11 @@ from msgspec import Meta, Struct
 
 from roboglot.model.clock import Clock, RealClock
 from roboglot.model.components.sensing.camera import (
-    EXPOSURE_MAX,
     Camera,
     Frame,
     Mount,
+    check_exposure,
 )
-from roboglot.model.errors import InvalidGoal
 from roboglot.model.feed import Feed, Viewer
 from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
@@ -131,8 +130,7 @@ class SimulatedCamera(Camera):
         return self._exposure
 
     def set_exposure(self, stops: float) -> None:
-        if not abs(stops) <= EXPOSURE_MAX:
-            raise InvalidGoal(f"exposure is corrected by up to {EXPOSURE_MAX:g} stops, not {stops:g}")
+        check_exposure(stops)
         self._exposure = stops
 
     @property

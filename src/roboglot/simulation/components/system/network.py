@@ -17,9 +17,6 @@ from roboglot.model.actions import Action
 from roboglot.model.components.system.network import (
     APN_MAX,
     KNOWN_MAX,
-    PASSWORD_MAX,
-    PASSWORD_MIN,
-    SSID_MAX,
     WIFI,
     MobileState,
     Network,
@@ -27,6 +24,7 @@ from roboglot.model.components.system.network import (
     NetworkState,
     Uplink,
     WifiNetwork,
+    check_network,
 )
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import ComponentMissing, InvalidGoal, NotFound, Refused
@@ -140,7 +138,7 @@ class SimulatedNetwork(Network):
         return MobileState(apn, coverage.signal, registered)
 
     def join(self, ssid: str, password: str = "", *, source: str = "") -> Action:
-        _check(ssid, password)
+        check_network(ssid, password)
 
         async def run(_: Action) -> None:
             self._joining = True
@@ -171,7 +169,7 @@ class SimulatedNetwork(Network):
     async def be_access_point(self, ssid: str | None = None, password: str | None = None) -> None:
         name = self._kept("own_name", self._own_name) if ssid is None else ssid
         key = self._kept("own_password", self._section.password) if password is None else password
-        _check(name, key)
+        check_network(name, key)
         await self._keep(mode=NetworkMode.ACCESS_POINT, own_name=name, own_password=key)
 
     async def switch_off(self) -> None:
@@ -263,13 +261,6 @@ class SimulatedNetwork(Network):
         else:
             self._unsaved.update(changes)
         self._next = -math.inf  # the link follows at the next measurement
-
-
-def _check(ssid: str, password: str) -> None:
-    if not 1 <= len(ssid.encode()) <= SSID_MAX:
-        raise InvalidGoal(f"the name of a network has 1 to {SSID_MAX} bytes")
-    if password and not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
-        raise InvalidGoal(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")
 
 
 def _fit(fit: Fitting) -> SimulatedNetwork:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Begin, Skills
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
-from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
-from roboglot.model.errors import InvalidGoal, Refused
-from roboglot.model.geometry import POSITION_MAX, Path, Point, Pose
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions, check_goals
+from roboglot.model.errors import Refused
+from roboglot.model.geometry import Path, Point, Pose
 
 GOALS_MAX = 100
 FRESH = 1.0  # s: maximum age of a pose for the dog to count as localized
@@ -23,10 +22,7 @@ class CyberDogNavigation(Navigation):
         self._skills = skills
 
     def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
-        if not 1 <= len(goals) <= GOALS_MAX:
-            raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
-        if not all(math.hypot(goal.x, goal.y) <= POSITION_MAX for goal in goals):
-            raise InvalidGoal("not a place on this map")
+        check_goals(goals, options, most=GOALS_MAX)
         yaws = [None] * (len(goals) - 1) + [options.yaw]
 
         def begin(goal: Point, yaw: float | None) -> Begin:

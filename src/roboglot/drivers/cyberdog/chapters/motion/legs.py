@@ -15,10 +15,21 @@ from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.feet import Foot, Footfall, FootState
-from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX, FOOT_LIFT_MIN, GAITS, Gait
-from roboglot.model.components.motion.legs import LEGS, BodyPose, Choreography, FootLift, LegLimits, Legs, Posture, Step
+from roboglot.model.components.motion.gaits import GAITS, Gait
+from roboglot.model.components.motion.legs import (
+    LEGS,
+    BodyPose,
+    Choreography,
+    FootLift,
+    LegLimits,
+    Legs,
+    Posture,
+    Step,
+    check_lift,
+    check_pose,
+)
 from roboglot.model.components.motion.motions import Motion as Figure
-from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.errors import Refused
 from roboglot.model.geometry import LEVEL, STILL, Orientation
 from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
@@ -95,9 +106,9 @@ class CyberDogLegs(Legs):
         self._supervisor.send("emergency stop", self._client.emergency_stop())
 
     def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
-        if lift and not all(FOOT_LIFT_MIN <= height <= FOOT_LIFT_MAX for height in (lift.front, lift.rear)):
-            raise InvalidGoal(f"feet are lifted {FOOT_LIFT_MIN} to {FOOT_LIFT_MAX} m")
-        self._gait, self._lift = gait, lift or FootLift(*STEP)
+        lift = lift or FootLift(*STEP)
+        check_lift(lift)
+        self._gait, self._lift = gait, lift
         self._base.motion = WALKS[gait] if gait else Motion.TROT_SLOW
         self._base.clamp = GAITS[gait].clamp if gait else None
         self._base.lift = (self._lift.front, self._lift.rear)
@@ -105,10 +116,7 @@ class CyberDogLegs(Legs):
     def hold(self, body: BodyPose, *, duration: float = 1.0, relative: bool = False, source: str = "") -> Action:
         turned = (body.attitude.roll, body.attitude.pitch, body.attitude.yaw)
         shifted = (body.shift.x, body.shift.y, body.height or 0.0)
-        if max(map(abs, turned)) > LIMITS.angle or max(map(abs, shifted[:2])) > LIMITS.shift:
-            raise InvalidGoal("the legs cannot reach this body pose")
-        if body.height is not None and not relative and not LIMITS.lowest <= body.height <= LIMITS.highest:
-            raise InvalidGoal(f"the body is held {LIMITS.lowest} to {LIMITS.highest} m high")
+        check_pose(body, LIMITS, relative=relative)
 
         async def run(_: Action) -> None:
             if self.posture is not Posture.STANDING:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.cyberdog.values import ProgramFrame
 from roboglot.drivers.cyberdog.telemetry import StatusPoll
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
-from roboglot.model.components.interaction.speaker import SPEAKER, TEXT_MAX, Speaker
-from roboglot.model.errors import Expired, InvalidGoal, Refused
+from roboglot.model.components.interaction.speaker import SPEAKER, Speaker, check_text, check_volume
+from roboglot.model.errors import Expired, Refused
 from roboglot.model.events import Spoke
 from roboglot.model.feed import Viewer
 from roboglot.model.robot import Robot
@@ -32,8 +30,7 @@ class CyberDogSpeaker(Speaker):
         return (self._status.volume or 0) / 100
 
     def set_volume(self, volume: float) -> None:
-        if not (math.isfinite(volume) and 0.0 <= volume <= 1.0):
-            raise InvalidGoal(f"a volume is 0 to 1, not {volume}")
+        check_volume(volume)
 
         async def change() -> None:
             await self._client.set_volume(round(volume * 100))
@@ -42,8 +39,7 @@ class CyberDogSpeaker(Speaker):
         self._supervisor.send("setting the volume", change())
 
     def say(self, text: str, *, source: str = "") -> Action:
-        if not text.strip() or len(text) > TEXT_MAX:
-            raise InvalidGoal(f"a text has 1 to {TEXT_MAX} characters")
+        check_text(text)
         self._supervisor.link.require()
 
         async def run(_: Action) -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from roboglot.clients.cyberdog import RunningTask, values
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.following import Following, FollowSide
-from roboglot.model.errors import InvalidGoal, NotFound, Refused
+from roboglot.model.components.motion.following import Following, FollowSide, check_distance
+from roboglot.model.errors import NotFound, Refused
 from roboglot.model.feed import Viewer
 from roboglot.model.geometry import Point
 
 SIDES = {FollowSide.BEHIND: 201, FollowSide.LEFT: 202, FollowSide.RIGHT: 203}
-DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m
 SEEN_WITHIN = 10.0  # s for the person to appear in the picture
 
 
@@ -29,7 +28,7 @@ class CyberDogFollowing(Following):
         distance: float = 1.0,
         source: str = "",
     ) -> Action:
-        _check(distance)
+        check_distance(distance)
         skills = self._skills
 
         async def choose(_: RunningTask) -> None:
@@ -50,7 +49,7 @@ class CyberDogFollowing(Following):
         )
 
     def follow_tag(self, *, side: FollowSide = FollowSide.BEHIND, distance: float = 1.0, source: str = "") -> Action:
-        _check(distance)
+        check_distance(distance)
         client = self._skills.client
         return self._skills.start_from_idle(
             "follow the bracelet",
@@ -75,8 +74,3 @@ async def _in_sight(pushes: Viewer[values.Tracking], person: int | None) -> valu
         if seen:
             return max(seen, key=lambda roi: roi.width * roi.height)
     raise NotFound("the robot sends no more detections")
-
-
-def _check(distance: float) -> None:
-    if not DISTANCE_MIN <= distance <= DISTANCE_MAX:
-        raise InvalidGoal(f"the following distance is {DISTANCE_MIN} to {DISTANCE_MAX} m")

@@ -9,13 +9,12 @@ from roboglot.drivers.cyberdog.telemetry import StatusPoll
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
-from roboglot.model.components.energy.power import POWER, Power, PowerMode
+from roboglot.model.components.energy.power import POWER, Power, PowerMode, check_delays
 from roboglot.model.errors import Expired, Refused
 from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.codes import MachineState
 
 MODES: Mapping[int, PowerMode] = {MachineState.LOW_POWER: PowerMode.LOW_POWER, MachineState.SHUT_DOWN: PowerMode.OFF}
-AFTER_MAX = 30 * 86_400.0  # s
 PERIOD, AWAKE_WITHIN = 0.25, 30.0  # s
 
 
@@ -55,8 +54,7 @@ class CyberDogPower(Power):
         return self._start("wake up", self._wake, source)
 
     def shut_down(self, *, source: str = "", after: float = 0.0, restart_after: float | None = None) -> Action:
-        if not 0.0 <= after <= AFTER_MAX:
-            raise Refused("the time is too far ahead")
+        check_delays(after, restart_after)
         if restart_after:
             raise Refused("this dog can only restart at once")
 

@@ -9,22 +9,19 @@ import math
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
-from msgspec.structs import astuple
-
 from roboglot.drivers.slamware.chapters.motion.base import SlamwareBase
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import robot_errors
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import WheelSpeeds
-from roboglot.model.components.motion.driving import BASE, Driving
+from roboglot.model.components.motion.driving import BASE, Driving, check_command, check_offset, top_speed
 from roboglot.model.components.system.link import Link
-from roboglot.model.errors import Blocked, Busy, InvalidGoal, Refused
+from roboglot.model.errors import Blocked, Busy, Refused
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
 
 PERIOD = 0.05  # s between two looks at odometry
-MOVE_MAX, TURN_MAX, LIFETIME_MAX = 1000.0, 1000.0, 86_400.0  # m, rad, s
 GOOD, GOOD_YAW = 0.005, math.radians(0.4)  # m, rad: tolerance of the goal; the latency of the link adds to it
 LEAD = 0.09  # s that braking takes
 SLOW, SLOW_YAW = 0.03, 0.06  # m/s, rad/s: speeds of the last centimetres
@@ -50,10 +47,7 @@ class SlamwareDriving(Driving):
         self._command = _Command(STILL, 0.0)
 
     def drive(self, command: Twist | WheelSpeeds, *, lifetime: float | None = None, source: str = "") -> Action:
-        if not all(map(math.isfinite, astuple(command))):
-            raise InvalidGoal(f"not a velocity: {command}")
-        if lifetime is not None and not 0 < lifetime <= LIFETIME_MAX:
-            raise InvalidGoal(f"a lifetime must be above 0 and at most {LIFETIME_MAX:g} s, not {lifetime}")
+        check_command(command, lifetime)
         if isinstance(command, WheelSpeeds):
             if command != WheelSpeeds():
                 raise Refused("the wheels of a Slamware robot cannot be turned one by one")
@@ -85,9 +79,8 @@ class SlamwareDriving(Driving):
         self, offset: Pose, *, speed: float | None = None, yaw_speed: float | None = None, source: str = ""
     ) -> Action:
         limits = self._base.limits.twist
-        top, top_yaw = _top(speed, limits.x, "speed"), _top(yaw_speed, limits.yaw, "yaw speed")
-        if not (math.hypot(offset.x, offset.y) <= MOVE_MAX and abs(offset.yaw) <= TURN_MAX):
-            raise InvalidGoal(f"a move is at most {MOVE_MAX:g} m and {TURN_MAX:g} rad, not {offset}")
+        top, top_yaw = top_speed(speed, limits.x, "speed"), top_speed(yaw_speed, limits.yaw, "yaw speed")
+        check_offset(offset)
         self._link.require()
 
         async def run(action: Action) -> None:
@@ -203,11 +196,3 @@ class SlamwareDriving(Driving):
     def _give_up_after(self, since: float, what: str) -> None:
         if self._robot.clock.time() - since > PATIENCE:
             raise Blocked(f"no progress for {PATIENCE:g} s, {what}")
-
-
-def _top(wanted: float | None, limit: float, what: str) -> float:
-    if wanted is None:
-        return limit
-    if not wanted > 0:
-        raise InvalidGoal(f"the {what} must be above 0, not {wanted}")
-    return min(wanted, limit)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -12,9 +11,15 @@ from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import location, robot_errors
 from roboglot.extras import lazy
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions, Tracks
+from roboglot.model.components.motion.navigation import (
+    Navigation,
+    NavigationFeedback,
+    NavigationOptions,
+    Tracks,
+    check_goals,
+)
 from roboglot.model.errors import InvalidGoal, Refused, Unreachable
-from roboglot.model.geometry import POSITION_MAX, Path, Point
+from roboglot.model.geometry import Path, Point
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters.motion import (
     ActionInfo,
@@ -43,11 +48,7 @@ class SlamwareNavigation(Navigation):
         self._client, self._runner, self._reported = client, runner, reported
 
     def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
-        if not 1 <= len(goals) <= GOALS_MAX:
-            raise InvalidGoal(f"1 to {GOALS_MAX} goals, not {len(goals)}")
-        for goal in goals:
-            if not math.hypot(goal.x, goal.y) <= POSITION_MAX:
-                raise InvalidGoal(f"not a place on this map: {goal}")
+        check_goals(goals, options, most=GOALS_MAX)
         how = move_options(options)
         wanted: MoveToOptions | SeriesMoveToOptions
         if len(goals) == 1:

@@ -10,15 +10,13 @@ from roboglot.drivers.slamware.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.system.network import (
-    PASSWORD_MAX,
-    PASSWORD_MIN,
-    SSID_MAX,
     WIFI,
     MobileState,
     NetworkMode,
     Uplink,
+    check_network,
 )
-from roboglot.model.errors import Expired, InvalidGoal
+from roboglot.model.errors import Expired
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.chapters.system.network import (
     ApnStatus,
@@ -66,10 +64,7 @@ class SlamwareNetwork(ReportedNetwork):
         return MobileState(self._apn, self.signal_min, registered=False) if self._apn else None
 
     def join(self, ssid: str, password: str = "", *, source: str = "") -> Action:
-        if not 1 <= len(ssid.encode()) <= SSID_MAX:
-            raise InvalidGoal(f"the name of a network has 1 to {SSID_MAX} bytes")
-        if password and not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
-            raise InvalidGoal(f"a password has {PASSWORD_MIN} to {PASSWORD_MAX} characters")
+        check_network(ssid, password)
         self._supervisor.link.require()
 
         async def run(_: Action) -> None:

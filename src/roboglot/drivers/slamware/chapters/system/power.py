@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Awaitable, Callable
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.drivers.slamware.vocabulary import robot_errors
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
-from roboglot.model.components.energy.power import POWER, Power, PowerMode
-from roboglot.model.errors import Expired, InvalidGoal, Refused
+from roboglot.model.components.energy.power import POWER, Power, PowerMode, check_delays
+from roboglot.model.errors import Expired, Refused
 from roboglot.model.events import PowerModeChanged
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.chapters.system.devices import Shutdown
@@ -17,7 +18,6 @@ from roboglot.wire.slamware.chapters.system.devices import Shutdown
 MODES = {"awake": PowerMode.AWAKE, "waking_up": PowerMode.WAKING_UP, "asleep": PowerMode.ASLEEP}
 PERIOD = 0.25  # s between two polls
 CHANGED_WITHIN = 30.0  # s until the robot must be asleep or awake
-MINUTES_MAX = 30 * 24 * 60
 
 
 class SlamwarePower(Power):
@@ -62,9 +62,8 @@ class SlamwarePower(Power):
         return self._start("wake up", self._client.wakeup, PowerMode.AWAKE, source)
 
     def shut_down(self, *, source: str = "", after: float = 0.0, restart_after: float | None = None) -> Action:
-        minutes, restart = (round((seconds or 0.0) / 60 + 0.499) for seconds in (after, restart_after))
-        if not (0 <= minutes <= MINUTES_MAX and 0 <= restart <= MINUTES_MAX):
-            raise InvalidGoal("the time is too far ahead")
+        check_delays(after, restart_after)
+        minutes, restart = (math.ceil((seconds or 0.0) / 60) for seconds in (after, restart_after))
 
         async def command() -> None:
             await self._client.shutdown(Shutdown(minutes, restart))

@@ -9,7 +9,7 @@ from functools import partial
 import msgspec
 
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.following import Following, FollowSide
+from roboglot.model.components.motion.following import DISTANCE_MAX, DISTANCE_MIN, Following, FollowSide
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.operations import BadParameters, Right
@@ -26,7 +26,6 @@ from roboglot.wire.cyberdog.codes import Code, Feedback, TaskResult
 AUTOMATIC = 200  # ``relative_pos`` that leaves the choice to the robot
 SIDES = {AUTOMATIC: FollowSide.BEHIND, 201: FollowSide.BEHIND, 202: FollowSide.LEFT, 203: FollowSide.RIGHT}
 DISTANCE = 1.0  # m, unless the app sets one
-DISTANCE_MIN, DISTANCE_MAX = 0.5, 5.0  # m: requests beyond are clipped
 
 
 class Region(msgspec.Struct):
