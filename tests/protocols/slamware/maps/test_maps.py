@@ -239,6 +239,19 @@ async def test_drawings_stay_where_a_cleared_map_was(robot: Robot, client: httpx
     assert (track["start"]["x"], track["start"]["y"]) == pytest.approx((-1.0, 2.0))
 
 
+async def test_origin_of_an_empty_map_moves_once(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
+) -> None:
+    """No scan has come since the map was cleared."""
+    await ok(await client.delete(f"{SLAM}/maps"))
+    (before,) = robot[MapAnnotations].current.lines
+    await ok(await client.put(f"{SLAM}/maps/origin", json={"new_origin": {"x": 1.0, "y": -0.5}}))
+    assert robot[Mapping].grid.width == 0
+    await forward(seconds=0.1)
+    (after,) = robot[MapAnnotations].current.lines
+    assert (after.end.x, after.end.y) == pytest.approx((before.end.x - 1.0, before.end.y + 0.5))
+
+
 async def test_drawings_stay_where_another_door_clears_map(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:

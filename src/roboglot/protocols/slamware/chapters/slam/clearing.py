@@ -22,7 +22,7 @@ class Clearing:
 
     def __init__(self, robot: Robot, move: Callable[[Pose], Awaitable[None]]) -> None:
         self._robot, self._move = robot, move
-        self._waited_for = False  # this door clears the map, and moves the drawings itself
+        self._waited_for = False  # this door changes the map, and moves the drawings itself
         self._moving: asyncio.Task[None] | None = None
         self._end_watch: Callable[[], None] | None = None
 
@@ -40,7 +40,7 @@ class Clearing:
 
     @contextmanager
     def by_this_door(self) -> Iterator[None]:
-        """Leave the drawings to the caller, who clears the map meanwhile."""
+        """Leave the drawings to the caller, who clears the map or moves its origin meanwhile."""
         self._waited_for = True
         try:
             yield

@@ -267,8 +267,10 @@ class MapKeeper:
             await self._robot[MapMemory].replace(edit)
             self._layers = ()
 
-    async def move_origin(self, origin: Point) -> None:
-        """Move the drawings in memory to the new origin; the grid's origin has been moved already."""
+    async def move_origin(self, point: Point) -> None:
+        """Move the origin of the map in memory to ``point``, by whole cells; drawings keep their places."""
+        with self.clearing.by_this_door():
+            origin = self._robot[Mapping].move_origin(point)
         async with self._turn:
             basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in _basis(self._robot).items()}
             await self._robot[MapMemory].replace(

@@ -86,8 +86,7 @@ async def move_origin_point(context: Context, body: NewOrigin) -> None:
     wanted = Point(body.new_origin.x, body.new_origin.y)
     _check_reach(Point(p.x - wanted.x, p.y - wanted.y) for p in (robot[Mapping].grid.origin, *_drawn(robot)))
     context.actions.abort()
-    origin = robot[Mapping].move_origin(wanted)
-    await context.maps.move_origin(origin)
+    await context.maps.move_origin(wanted)
 
 
 def _check_reach(points: Iterable[Point]) -> None:
