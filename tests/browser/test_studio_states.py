@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import pytest
 
+from roboglot.console.studio.channel import Session
 from tests.browser.served import shows, until
+from tests.browser.test_console_link import QUICKLY
 from tests.browser.test_studio import COUNTING, FOREVER, READY, Open, Page, loaded, phase, prints, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 COLOUR = "name => getComputedStyle(document.querySelector(name)).backgroundColor"
 WORD = "document.querySelector('.phase').textContent"
+ONLINE = "import('/studio/link.js').then(link => link.online.value)"
 
 
 async def opens_text(page: Page, text: str) -> None:
@@ -113,3 +116,15 @@ async def test_two_tabs_show_one_program(studio: Open) -> None:
     await other.evaluate("studio.editor.toggleBreak('say')")
     await shows(page, "studio.editor.breaks.value.join()", "say")
     assert page.errors == other.errors == []
+
+
+async def test_silent_server_counts_as_lost(studio: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = await studio()
+    with monkeypatch.context() as patch:
+        patch.setattr(Session, "post", lambda *_: None)  # the page's other socket is answered
+        await page.evaluate(QUICKLY)
+        await shows(page, ONLINE, "lost")
+        await page.evaluate("delete performance.now")
+    await page.wait_for_selector(".banner.bad")
+    await shows(page, ONLINE, "open")
+    await page.wait_for_selector(".banner.bad", state="detached")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from tests.browser.served import shows, until
@@ -21,6 +23,12 @@ TOO_FAST = {
             }
         ],
     }
+}  # fmt: skip
+STOPPED = {
+    "shadow": {"type": "text", "fields": {"TEXT": "no number"}},
+    "block": {"type": "math_arithmetic", "id": "wrong", "fields": {"OP": "DIVIDE"}, "inputs": {
+        "A": {"shadow": {"type": "math_number", "fields": {"NUM": 1}}},
+        "B": {"shadow": {"type": "math_number", "fields": {"NUM": 0}}}}},
 }  # fmt: skip
 WORD, WHY = "document.querySelector('.phase').textContent", "x_velocity = 5 is outside of -1.6 to 1.6 m/s"
 
@@ -52,4 +60,18 @@ async def test_refusal_is_gone_with_the_next_run(studio: Open) -> None:
     await shows(page, WORD, "Ready")
     await until(page, "!document.querySelector('.notice.bad') && !document.querySelector('.wrong')")
     await prints(page, "on")
+    assert page.errors == []
+
+
+async def test_error_leaves_what_was_refused_before_it(studio: Open) -> None:
+    both = json.loads(json.dumps(TOO_FAST))
+    both["blocks"]["blocks"][0]["next"]["block"]["inputs"]["TEXT"] = STOPPED
+    page = await loaded(await studio(), both)
+    await page.click("#tab-output")
+    await page.keyboard.press("F5")
+    await shows(page, WORD, "Ended with an error")
+    refused = f"The robot could not do this:motion.go_straight (line 1): {WHY}"
+    await shows(page, "document.querySelector('.panel .failure[role=status]')?.textContent ?? ''", refused)
+    await page.wait_for_selector(".panel .failure[role=alert] >> text=ZeroDivisionError")
+    await shows(page, "[...document.querySelectorAll('.wrong')].map((one) => one.dataset.id)", ["fast", "say"])
     assert page.errors == []

@@ -145,7 +145,8 @@ class Desk:
         """Return the right that each verb needs; "all": to admin on all robots."""
         own = {operation.key: str(operation.right or Right.ADMIN) for operation in VERBS}
         of_all = {operation.key: "all" for operation in (*WORLD_VERBS, *CLOCK_VERBS)}
-        return own | of_all | {TAKE: Right.DRIVE, "resend": Right.ADMIN, "record": "all"}
+        of_pages = {"program": Right.PROGRAM, "resend": Right.ADMIN, "record": "all", "teach": "all"}
+        return own | of_all | of_pages | {TAKE: Right.DRIVE}
 
     @staticmethod
     def _rights(robot: Robot) -> list[str]:

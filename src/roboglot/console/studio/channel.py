@@ -21,6 +21,7 @@ import msgspec
 
 from roboglot.console import program_runs
 from roboglot.console.desk import CLIENT, Desk
+from roboglot.console.live import Ping
 from roboglot.console.studio.class_map import draw_map
 from roboglot.console.studio.class_requests import Member
 from roboglot.console.studio.classroom import Room
@@ -106,13 +107,18 @@ def _id_of(text: str) -> str:
         return found[1] if found else ""
 
 
+def _named(message: Message) -> str | int:
+    """Return the id under which the page waits for an answer; 0 if it waits for none."""
+    return _id_of(message.text) if isinstance(message, FrameMessage) else getattr(message, "id", 0)
+
+
 @lru_cache(maxsize=8)
 def _framed(text: str) -> str:
     """Return a frame as a message to pages, which many pages share."""
     return msgspec.json.encode({"type": "frame", "text": text}).decode()
 
 
-Message = Open | FrameMessage | Debug | Check | Fetch | TrialRequest | TrialEnd | Member
+Message = Open | FrameMessage | Debug | Check | Fetch | TrialRequest | TrialEnd | Member | Ping
 _decode = msgspec.json.Decoder(Message).decode
 
 
@@ -207,11 +213,14 @@ class Session:
         if not self._rate.take(""):
             raise ValueError("too many messages")
         message = _decode(text)
+        if isinstance(message, Ping):
+            self.post({"type": "pong", "at": message.at})
+            return
         if isinstance(message, Open):
             self._open(message)
             return
         if len(self._pending) >= PENDING_MAX:
-            self.post({"type": "refused", "why": "too much is being answered"})
+            self.post({"type": "refused", "id": _named(message), "why": "too much is being answered"})
             return
         task = asyncio.get_running_loop().create_task(self._take(message), name=f"studio {type(message).__name__}")
         self._pending.add(task)
@@ -243,7 +252,7 @@ class Session:
         try:
             await self._do(message)
         except (RobotError, ProgramError, ValueError) as error:
-            self.post({"type": "refused", "id": getattr(message, "id", 0), "why": str(error)})
+            self.post({"type": "refused", "id": _named(message), "why": str(error)})
 
     async def _do(self, message: Message) -> None:
         if isinstance(message, Member):

@@ -1,6 +1,7 @@
 // The socket to the runtime: the state of every robot, commands, its own age.
 import { signal, computed, batch, effect } from "@preact/signals";
 import { lacks, notice, person, rights, say, t, kept } from "./base.js";
+import { pulse } from "./pulse.js";
 
 export const status = signal(/** @type {"opening" | "open" | "lost" | "out"} */ ("opening")); // out: a name is needed
 export const me = signal({ name: "", asks: false }); // who signed in here; whether names are asked for
@@ -38,10 +39,9 @@ export const wanted = signal({ wire: false, truth: false, seen: false, moving: t
 
 const KEPT_MAX = 20_000; // exchanges
 const RETRY = 1000; // ms
-const SILENT_MAX = 10_000; // ms without an answer after which the link counts as lost
 let socket = /** @type {WebSocket | null} */ (null);
 const REVOKED = 1008; // the code with which a socket is closed when its person's rights change
-let next = 1, sequence = 0, asked = 0, server = { now: 0, at: 0 };
+let next = 1, sequence = 0, server = { now: 0, at: 0 };
 const waiting = /** @type {Map<number, {resolve: (v: any) => void, reject: (e: Error) => void}>} */ (new Map());
 
 /** Whether this browser may open the socket: it needs no name here, or has one. Fails without a connection. */
@@ -62,15 +62,15 @@ export async function connect() {
   socket = opened;
   opened.binaryType = "arraybuffer";
   opened.onopen = () => {
-    asked = 0;
     batch(() => { status.value = "open"; connections.value += 1; exchanges.value = []; missed.value = 0; truth.value = null; }); // they come again, whole
-    introduce(); watch(); ping();
+    introduce(); watch(); beats.begin();
   };
   opened.onmessage = ({ data }) => (typeof data === "string" ? receive(JSON.parse(data)) : receiveFrame(data));
   opened.onclose = ({ code }) => {
     if (socket !== opened) return;
     socket = null;
     opened.close();
+    beats.end();
     batch(() => { status.value = "lost"; age.value = null; });
     for (const { reject } of waiting.values()) reject(new Error(t("link.lost")));
     waiting.clear();
@@ -122,19 +122,7 @@ export function want(change) {
   watch();
 }
 
-let pinging = 0;
-function ping() {
-  clearTimeout(pinging);
-  const now = performance.now();
-  if (!asked) {
-    asked = now;
-    send({ type: "ping", at: now });
-  } else {
-    age.value = now - asked;
-    if (age.value > SILENT_MAX) { socket?.onclose?.(new CloseEvent("close")); return; } // its own end may take minutes
-  }
-  pinging = window.setTimeout(ping, 1000);
-}
+const beats = pulse(send, () => socket?.onclose?.(new CloseEvent("close")), (ms) => { age.value = ms; });
 
 /** Have a robot (empty: the world) do something; the answer, or an Error in plain words.
  * @param {string} robot @param {string} verb @param {object} [values] @returns {Promise<any>} */
@@ -179,7 +167,7 @@ function receive(message) {
       watch();
       break;
     case "you": you.value = message.client; break;
-    case "pong": asked = 0; age.value = performance.now() - message.at; break;
+    case "pong": beats.answered(message.at); break;
     case "moment":
       batch(() => { clock.value = message.time; poses.value = Object.fromEntries(Object.entries(message.poses).filter(([, p]) => p[0] !== null)); recording.value = message.recording; if (message.truth) truth.value = message.truth; steer(message.pace); });
       break;

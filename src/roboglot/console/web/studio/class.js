@@ -124,5 +124,5 @@ export function Group() {
   return html`<form class="card" onSubmit=${joins}><h3>${t("studio.class.join")}</h3><label class="field"><span>${t("studio.class.code")}</span><input name="code" required maxlength="12" autocapitalize="characters" autocomplete="off" /></label>
       <label class="field"><span>${t("studio.class.name")}</span><input name="name" required maxlength="40" autocomplete="nickname" /></label><div class="buttons"><button class="button main">${t("studio.class.join")}</button></div></form>
     <form class="card" onSubmit=${opens}><h3>${t("studio.class.open")}</h3><label class="field"><span>${t("studio.class.called")}</span><input name="name" maxlength="40" /></label>
-      <label class="field"><span>${t("studio.class.again")}</span><input name="again" maxlength="12" autocapitalize="characters" autocomplete="off" /></label><div class="buttons"><button class="button">${t("studio.class.open")}</button></div></form>`;
+      <label class="field"><span>${t("studio.class.again")}</span><input name="again" maxlength="12" autocapitalize="characters" autocomplete="off" /></label><div class="buttons"><${Button} type="submit" verb="teach" label=${t("studio.class.open")} /></div></form>`;
 }

@@ -33,10 +33,10 @@ const runningFirst = (all) => [...all].sort((a, b) => Number(runs(b)) - Number(r
 function Row({ item }) {
   const state = STATES.includes(item.operate) ? t(`studio.state.${item.operate}`) : item.operate;
   return html`<li class=${item.id === program.value.id ? "chosen" : ""}><span class="grow"><b>${item.describe || item.id}</b><small>${state}${item.condition && item.condition !== "now" ? ` · ${plainly(item.mode, item.condition)}` : ""}</small></span>
-    <${Button} label=${t("studio.open")} onClick=${() => opening(item.id)} />
-    ${item.operate === "suspend" && html`<${Button} label=${t("studio.recover")} onClick=${() => operate("recover", item.id).then(list)} />`}
-    ${["run", "suspend", "run_wait"].includes(item.operate) ? html`<${Button} kind="danger" label=${t("studio.stop")} onClick=${() => operate("shutdown", item.id).then(list)} />`
-      : html`<${Button} kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: item.describe || item.id }))) remove(item.id); }} />`}</li>`;
+    <${Button} verb="program" label=${t("studio.open")} onClick=${() => opening(item.id)} />
+    ${item.operate === "suspend" && html`<${Button} verb="program" label=${t("studio.recover")} onClick=${() => operate("recover", item.id).then(list)} />`}
+    ${["run", "suspend", "run_wait"].includes(item.operate) ? html`<${Button} verb="program" kind="danger" label=${t("studio.stop")} onClick=${() => operate("shutdown", item.id).then(list)} />`
+      : html`<${Button} verb="program" kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: item.describe || item.id }))) remove(item.id).catch((error) => say(error.message, true)); }} />`}</li>`;
 }
 
 export function Library() {
@@ -56,8 +56,8 @@ export function Library() {
     <h3>${t("studio.on.robot")}</h3>
     ${listed.value.length ? html`<ul class="rows">${runningFirst(listed.value).map((item) => html`<${Row} key=${item.id} item=${item} />`)}</ul>` : html`<p class="muted">${t("studio.on.robot.none")}</p>`}
     ${editor.modules.value.length > 0 && html`<h3>${t("studio.toolbox.modules")}</h3><ul class="rows">${editor.modules.value.map((m) => html`<li><span class="grow"><b>${m.condition}</b><small>${m.describe}</small></span>
-      <${Button} label=${t("studio.open")} onClick=${() => openModule(m).then(close, (error) => say(error.message, true))} />
-      <${Button} kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: m.condition }))) removeModule(m).catch((error) => say(error.message, true)); }} /></li>`)}</ul>`}
+      <${Button} verb="program" label=${t("studio.open")} onClick=${() => openModule(m).then(close, (error) => say(error.message, true))} />
+      <${Button} verb="program" kind="danger" label=${t("studio.delete")} onClick=${() => { if (confirm(t("studio.delete.sure", { name: m.condition }))) removeModule(m).catch((error) => say(error.message, true)); }} /></li>`)}</ul>`}
     <${Versions} done=${close} />
   <//>`;
 }
@@ -118,7 +118,7 @@ export function Schedule() {
     <div class="buttons chips" role="group" aria-label=${t("studio.schedule")}>${ready.map((text) => html`<${Button} on=${condition.value === text} label=${plainly(mode.value, text)} onClick=${() => { condition.value = text; }} />`)}</div>
     <label class="field"><span>${t("studio.condition")}</span><input value=${condition.value} maxlength="100" onInput=${(e) => { condition.value = e.target.value; }} /></label>
     <p role="status"><b>${plainly(mode.value, condition.value)}</b></p>
-    <div class="buttons"><${Button} kind="main" label=${t("studio.plan")} onClick=${() => { if (python().trim()) plan(true); else say(t("studio.empty")); }} /></div><//>`;
+    <div class="buttons"><${Button} verb="program" kind="main" label=${t("studio.plan")} onClick=${() => { if (python().trim()) plan(true); else say(t("studio.empty")); }} /></div><//>`;
 }
 
 /** What a function does, and what it takes; what a block of the language does. */

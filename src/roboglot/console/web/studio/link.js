@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { t } from "../base.js";
 import { current } from "../link.js";
+import { pulse } from "../pulse.js";
 
 export const online = signal(/** @type {"opening" | "open" | "lost"} */ ("opening"));
 export const opened = signal(/** @type {any} */ (null)); // what the server said of the robot
@@ -19,10 +20,13 @@ export function listen(listener) { listeners.add(listener); return () => listene
 export function connect() {
   const made = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/studio`);
   socket = made;
-  made.onopen = () => { online.value = "open"; };
+  made.onopen = () => { online.value = "open"; beats.begin(); };
   made.onmessage = ({ data }) => receive(JSON.parse(data));
   made.onclose = () => {
     if (socket !== made) return;
+    socket = null;
+    made.close();
+    beats.end();
     online.value = "lost";
     opened.value = null;
     clearTimeout(retry);
@@ -44,6 +48,8 @@ export function send(message) {
   socket.send(JSON.stringify(message));
   return true;
 }
+
+const beats = pulse(send, () => socket?.onclose?.(new CloseEvent("close")));
 
 /** @param {number | string} key @param {object} message @returns {Promise<any>} */
 function asked(key, message) {
@@ -77,6 +83,7 @@ function answered(message) {
 
 /** @param {any} message */
 function receive(message) {
+  if (message.type === "pong") { beats.answered(message.at); return; }
   if (message.type === "opened" && !answered(message)) return;
   if (message.type === "frame") {
     const frame = JSON.parse(message.text);

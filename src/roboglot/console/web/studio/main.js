@@ -2,8 +2,8 @@
 import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { computed, effect, signal, untracked } from "@preact/signals";
-import { Button, Icon, PATHS, html, kept, language, loadWords, notice, say, t, theme } from "../base.js";
-import { choose, command, connect as connectRobot, current, hello, status, want } from "../link.js";
+import { Button, Icon, PATHS, html, kept, lacks, language, loadWords, notice, say, t, theme } from "../base.js";
+import { choose, connect as connectRobot, current, hello, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
 import { Help, Keys, Library, Schedule, shown } from "./dialogs.js";
@@ -31,7 +31,8 @@ const whole = signal(matchMedia("(min-width: 900px)").matches ? "both" : "blocks
 const sought = signal(""), hits = signal(0);
 
 function Stop() {
-  return html`<button type="button" class="stop" onClick=${() => { runner.stop(); command("stop"); }} title=${t("studio.halt.hint")}>
+  const why = lacks("stop");
+  return html`<button type="button" class="stop" aria-disabled=${why ? "true" : undefined} onClick=${() => runner.halt()} title=${why || t("studio.halt.hint")}>
     <${Icon} name="stop" size=${18} /><span>${t("stop")}</span><kbd>Esc</kbd></button>`;
 }
 
@@ -68,11 +69,11 @@ function Bar() {
   const phase = runner.phase.value, busy = phase === "running" || phase === "starting";
   const word = runner.unknown.value ? t("studio.phase.unknown") : phase === "idle" ? t(`studio.phase.${runner.failure.value ? "failed" : runner.refused.value.length ? "undone" : "idle"}`) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}${runner.older.value ? ` · ${t("studio.phase.older")}` : ""}`;
   return html`<div class="controls" role="toolbar" aria-label=${t("studio.controls")}>
-    <${Button} kind="main" icon="play" label=${t(phase === "paused" ? "studio.go" : "studio.run")} title="F5" disabled=${busy || online.value !== "open"} onClick=${() => runner.run()} />
-    <${Button} icon="pause" label=${t("studio.pause")} title="F6" disabled=${phase !== "running"} onClick=${() => runner.pause()} />
-    <${Button} icon="step" label=${t("studio.step")} title="F8" disabled=${busy || online.value !== "open"} onClick=${() => runner.step()} />
-    <${Button} compact icon="over" label=${t("studio.over")} title=${`${t("studio.over")} (F10)`} disabled=${phase !== "paused"} onClick=${() => runner.step("over")} /><${Button} compact icon="out" label=${t("studio.out")} title=${`${t("studio.out")} (Shift+F8)`} disabled=${phase !== "paused"} onClick=${() => runner.step("out")} />
-    <${Button} icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
+    <${Button} kind="main" verb="program" icon="play" label=${t(phase === "paused" ? "studio.go" : "studio.run")} title="F5" disabled=${busy || online.value !== "open"} onClick=${() => runner.run()} />
+    <${Button} verb="program" icon="pause" label=${t("studio.pause")} title="F6" disabled=${phase !== "running"} onClick=${() => runner.pause()} />
+    <${Button} verb="program" icon="step" label=${t("studio.step")} title="F8" disabled=${busy || online.value !== "open"} onClick=${() => runner.step()} />
+    <${Button} compact verb="program" icon="over" label=${t("studio.over")} title=${`${t("studio.over")} (F10)`} disabled=${phase !== "paused"} onClick=${() => runner.step("over")} /><${Button} compact verb="program" icon="out" label=${t("studio.out")} title=${`${t("studio.out")} (Shift+F8)`} disabled=${phase !== "paused"} onClick=${() => runner.step("out")} />
+    <${Button} verb="program" icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
     ${program.value.kind === "blocks" && html`<${Button} compact icon="dot" label=${t("studio.break.on")} title="F9" onClick=${() => editor.toggleBreak()} />`}
     <span class=${`phase ${runner.unknown.value ? "unknown" : phase} ${runner.failure.value || (phase === "idle" && runner.refused.value.length) ? "failed" : ""}`} role="status" aria-live="polite" title=${`${word}${held()}${runner.older.value ? `. ${t("studio.older")}` : ""}`}>${word}${held()}</span>
     <span class="unseen" role="status" aria-live="polite">${others > 0 && t("studio.others", { n: others })}</span>
@@ -124,7 +125,7 @@ function App() {
     const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: (e) => runner.step(e.shiftKey ? "out" : "step"), F10: () => runner.step("over"),
       F9: () => { if (program.value.kind === "blocks") editor.toggleBreak(); } };
     const key = (event) => {
-      if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && runner.phase.value !== "idle") { runner.stop(); command("stop"); return; }
+      if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && runner.phase.value !== "idle") { runner.halt(); return; }
       if (event.key === "F5" && event.shiftKey) { event.preventDefault(); runner.stop(); return; }
       if (/^[zy]$/i.test(event.key) && (event.ctrlKey || event.metaKey) && !event.defaultPrevented && program.value.kind === "blocks" && !shown.value
           && !event.target.closest?.("input, textarea, [contenteditable], .blocklyWidgetDiv")) { event.preventDefault(); editor.undo(event.shiftKey || event.key.toLowerCase() === "y"); return; }

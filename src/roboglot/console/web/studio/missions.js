@@ -123,9 +123,9 @@ function lineShown({ line, module }) {
 function Verdict({ found }) {
   if (!found) return null;
   if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null || found.late || found.refused?.length ? "" : "fine"}`} role="status"><b>${summary(found)}</b><${Refused} calls=${found.refused} />${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${found.error}</small>`}</div>`;
-  const { stars: count, rows } = found.grade;
+  const { stars: count, rows } = found.grade, undone = found.refused?.length > 0 && html`<b>${t("studio.undone")}</b><${Refused} calls=${found.refused} />`;
   return html`<div class=${`failure ${count ? "fine" : ""}`} role="status"><b>${count ? t("studio.passed") : t("studio.not.passed")} <${Stars} count=${count} /></b>
-    <ul>${rows.filter((r) => !r.passed).map((r) => html`<li>${r.star ? "☆ " : "✗ "}${said(r)}</li>`)}</ul></div>`;
+    <ul>${rows.filter((r) => !r.passed).map((r) => html`<li>${r.star ? "☆ " : "✗ "}${said(r)}</li>`)}</ul>${undone}</div>`;
 }
 
 export function Missions() {
@@ -135,7 +135,7 @@ export function Missions() {
       <${Button} label=${t("studio.begin")} onClick=${() => begin(one)} /></li>`)}</ul>${!missions.value.length && html`<p class="muted">${t("studio.missions.none")}</p>`}`;
   }
   return html`<h2>${said(m.title)} <${Stars} count=${earned(m.id)} /></h2><p>${said(m.task)}</p>
-    <div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${callOff} />` : html`<${Button} kind="main" icon="play" label=${t("studio.attempt")} onClick=${() => attempt(m.id)} />`}
+    <div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${callOff} />` : html`<${Button} kind="main" icon="play" verb="program" label=${t("studio.attempt")} onClick=${() => attempt(m.id)} />`}
       ${hints.value < m.hints.length && html`<${Button} label=${t("studio.hint")} onClick=${() => { hints.value += 1; }} />`}<${Button} label=${t("studio.missions.all")} onClick=${() => { rename({ lesson: undefined }); outcome.value = null; allowHere(); }} /></div>
     ${m.hints.slice(0, hints.value).map((h) => html`<p class="hinted">${said(h)}</p>`)}
     <${Verdict} found=${outcome.value} /><${Chart} scene=${m} />`;
@@ -144,6 +144,6 @@ export function Missions() {
 /** A program tried on a copy of the world, beside the robot's own map. */
 export function Simulate() {
   if (program.value.lesson) return null;
-  return html`<div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${callOff} />` : html`<${Button} icon="eye" label=${t("studio.try")} onClick=${() => attempt("")} />`}</div>
+  return html`<div class="buttons">${trying.value ? html`<${Button} icon="stop" label=${t("studio.stop")} onClick=${callOff} />` : html`<${Button} icon="eye" verb="program" label=${t("studio.try")} onClick=${() => attempt("")} />`}</div>
     ${(trying.value || trace.value.length > 1) && html`<${Chart} scene=${{ boxes: [], goals: [], start: null }} />`}<${Verdict} found=${outcome.value} />`;
 }

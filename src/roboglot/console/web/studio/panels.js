@@ -3,12 +3,12 @@ import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import { effect, signal } from "@preact/signals";
 import { Button, html, language, robotWord, t } from "../base.js";
 import { MapView } from "../map.js";
-import { command, connections, current, state, want } from "../link.js";
+import { connections, current, state, want } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
 import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
 import { body, continueAsText, program } from "./program.js";
-import { failure, line, lit, phase, printed, problems, readings, refused, stop, textBreaks, variables } from "./runner.js";
+import { failure, line, lit, phase, halt, printed, problems, readings, refused, textBreaks, variables } from "./runner.js";
 import { Refused, Simulate } from "./missions.js";
 import { makeText } from "./text.js";
 
@@ -78,9 +78,9 @@ export function TextEditor() {
 
 export function Failure() {
   const found = failure.value;
-  if (!found) return refused.value.length ? html`<div class="failure" role="status"><b>${t("studio.undone")}</b><${Refused} calls=${refused.value} /></div>` : null;
-  return html`<div class="failure" role="alert"><b>${found[language.value] || found.en || t("studio.failed")}</b><small>${found.text}</small>
-    ${found.block && html`<${Button} label=${t("studio.failed.show")} onClick=${() => editor.focus(found.block)} />`}</div>`;
+  return html`${found && html`<div class="failure" role="alert"><b>${found[language.value] || found.en || t("studio.failed")}</b><small>${found.text}</small>
+      ${found.block && html`<${Button} label=${t("studio.failed.show")} onClick=${() => editor.focus(found.block)} />`}</div>`}
+    ${refused.value.length > 0 && html`<div class="failure" role="status"><b>${t("studio.undone")}</b><${Refused} calls=${refused.value} /></div>`}`;
 }
 
 export function Output() {
@@ -109,5 +109,5 @@ export function RobotPanel() {
     ${has && html`<div class="buttons"><${Button} on=${film.value} label=${t(film.value ? "camera.close" : "camera.open")} onClick=${() => { film.value = !film.value; }} /></div>`}
     ${has && film.value && html`<figure class="film" key=${`${current.value} ${connections.value}`}><img src=${`/api/robots/${encodeURIComponent(current.value)}/camera.mjpeg`} alt=${t("camera.alt")} /></figure>`}
     ${state.value?.faults?.length > 0 && html`<ul class="faults">${state.value.faults.map((f) => html`<li class=${f.level.toLowerCase()}>${robotWord(f.message)}</li>`)}</ul>`}
-    <div class="buttons"><${Button} kind="danger" icon="stop" label=${t("stop")} title=${t("studio.halt.hint")} onClick=${() => { if (phase.value !== "idle") stop(); command("stop"); }} /></div>`;
+    <div class="buttons"><${Button} kind="danger" verb="stop" icon="stop" label=${t("stop")} title=${t("studio.halt.hint")} onClick=${() => halt()} /></div>`;
 }

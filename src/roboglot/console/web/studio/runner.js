@@ -1,6 +1,7 @@
 // Running a program on the robot: run, pause, step, stop; which block is lit, what was printed, read, and went wrong.
 import { computed, effect, signal, untracked } from "@preact/signals";
-import { language, notice, say, t, translated } from "../base.js";
+import { lacks, language, notice, say, t, translated } from "../base.js";
+import { command } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
 import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
@@ -53,6 +54,8 @@ function stops(step = "") {
 let postponed = /** @type {(() => unknown) | null} */ (null);
 /** Do it now, or say that it is done when the link is back; the newest wish counts. @param {() => unknown} what */
 function orLater(what) {
+  const why = lacks("program");
+  if (why) return void say(why, true); // a key was pressed: buttons say it themselves
   if (online.value === "open" && opened.value) return what();
   postponed = what;
   say(t("studio.later"), true);
@@ -104,6 +107,8 @@ async function go(step) {
 
 export const pause = () => orLater(() => operate("suspend"));
 export const stop = () => orLater(() => operate("shutdown"));
+/** Stop the robot, and its program. */
+export function halt() { if (!lacks("program")) stop(); return command("stop"); }
 export const step = (/** @type {Step} */ how = "step") => run(how);
 
 /** @param {"suspend" | "shutdown" | "recover"} operation @param {string} [id] */
