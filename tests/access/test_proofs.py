@@ -34,7 +34,7 @@ def known(monkeypatch: pytest.MonkeyPatch) -> Proofs:
         Identity("cell", IdentityKind.MACHINE, "", token_hash("12345"), ()),
     ]
     known = Proofs(Identities(people), LOGINS)
-    for limiter in (known._tries, known._tries_of_name):
+    for limiter in (known._tries, known._tries_of_name, known._tries_of_device):
         monkeypatch.setattr(limiter, "_now", lambda: 0.0)
     return known
 
@@ -83,3 +83,33 @@ async def test_guesses_do_not_end_sessions(known: Proofs, used: bool) -> None:
     assert await admitted(known, session, ELSEWHERE)
     known.renew(Identities([]), {"anna"})
     assert not await admitted(known, session, HOME)
+
+
+async def test_known_browser_has_tries_of_its_own(known: Proofs) -> None:
+    device = known.device("anna", "")
+    for number in range(TRIES_OF_ONE_NAME):
+        await guess(known, LOGINS, f"10.0.1.{number}")
+    await guess(known, LOGINS, HOME)  # from the same address: pupils behind one router
+    assert not await admitted(known, RIGHT, HOME)
+    assert await admitted(known, RIGHT._replace(device=device), HOME)
+    assert known.device("anna", device) == device  # logging in again makes no further tries
+
+    for host in (HOME, *(f"10.0.2.{number}" for number in range(LOGINS - 1))):
+        assert not await admitted(known, basic("a guess")._replace(device=device), host)
+    with pytest.raises(LockedOut, match="in this browser"):
+        await known.find(RIGHT._replace(device=device), ELSEWHERE)
+
+
+@pytest.mark.parametrize("forged", ["ben's", "older", "", ".", "1.2", "\ud800.\ud800"])
+async def test_only_an_earlier_log_in_makes_a_mark(known: Proofs, forged: str) -> None:
+    ben = Identity("ben", IdentityKind.PERSON, "password of ben", None, ())
+    older = Identity("anna", IdentityKind.PERSON, "older", None, ())
+    marks = {"ben's": ("ben", ben), "older": ("anna", older)}
+    if forged in marks:
+        name, owner = marks[forged]
+        forged = Proofs(Identities([owner]), LOGINS).device(name, "")
+    for number in range(TRIES_OF_ONE_NAME):
+        await guess(known, LOGINS, f"10.0.1.{number}")
+    with pytest.raises(LockedOut, match="for anna"):
+        await known.find(RIGHT._replace(device=forged), ELSEWHERE)
+    assert known.device("cell", "") == known.device("unknown", "") == ""

@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
 import pytest_asyncio
@@ -152,6 +154,24 @@ async def test_buttons_follow_rights_that_change(guarded: Guarded, open_page: Op
             await page.wait_for_selector(name + on + (f":{words}" if words else ""))
 
 
+async def test_studio_says_which_right_its_buttons_need(guarded: Guarded, open_page: Open) -> None:
+    guarded.add("driver", "drive")
+    page = await open_page("/?to=studio")
+    await sign_in(page, "driver")
+    for button in (".controls .main", "button:has-text('Step')"):
+        await page.wait_for_selector(f"{button}[aria-disabled=true][title='You lack the right to program.']")
+    assert await page.get_attribute(".stop", "aria-disabled") is None
+    await page.keyboard.press("F5")
+    await page.wait_for_selector(".notice.bad >> text=You lack the right to program.")
+    await page.click("#tab-group")
+    lacking = "[title='You lack the right to admin on all robots.']"
+    await page.wait_for_selector(f"button:has-text('Open a class'){lacking}")
+    await page.click("button:has-text('Programs')")
+    await page.wait_for_selector("dialog button:has-text('New, in Python'):not([aria-disabled])")  # one's own
+    if folder := os.environ.get("ROBOGLOT_PICTURES"):
+        await page.screenshot(path=f"{folder}/studio-right.png")
+
+
 SLOW = [pytest.param(who, marks=pytest.mark.slow) for who in ("none", "see", "program", "edit", "admin")]
 
 
@@ -166,7 +186,8 @@ async def test_buttons_are_on_for_those_who_may(guarded: Guarded, open_page: Ope
     await page.wait_for_selector("text=Scan fits map")
     assert {what for what in BUTTONS if await offered(page, what)} == MAY[who], who
     cookies = await page.context.cookies()
-    assert [(c["httpOnly"], c["sameSite"]) for c in cookies] == [(True, "Strict")]
+    assert {(c["httpOnly"], c["sameSite"]) for c in cookies} == {(True, "Strict")}
+    assert sorted(c["path"] for c in cookies) == ["/", "/api/sign_in"]
     assert await page.evaluate("document.cookie") == ""
 
 
@@ -181,7 +202,7 @@ async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -
     assert await page.evaluate("axe.run(document).then((found) => found.violations.map((v) => v.id))") == []
     await sign_in(page, "anna")
     await page.wait_for_selector("text=Scan fits map")
-    (cookie,) = await page.context.cookies()
+    [cookie] = [c for c in await page.context.cookies() if c["path"] == "/"]
     await page.click("header button:has-text('anna')")
     await page.wait_for_selector("input[name=password]")
     await page.context.add_cookies([cookie])  # a copied cookie is worthless
@@ -216,6 +237,33 @@ async def test_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_
     guarded.store.rotate("cell7")
     known(guarded.runtime.guard).reload()
     await page.wait_for_selector(".sign")
+
+
+def post(url: str, password: str, cookie: str) -> tuple[int, list[str]]:
+    """Return the status of gina's log-in, and the cookies that it sets."""
+    body = json.dumps({"name": "gina", "password": password}).encode()
+    try:
+        with urlopen(Request(f"{url}/api/sign_in", data=body, headers={"Cookie": cookie}), timeout=60) as reply:
+            return reply.status, [text.partition(";")[0] for text in reply.headers.get_all("set-cookie")]
+    except HTTPError as error:
+        with error:
+            return error.code, []
+
+
+async def test_guesses_do_not_stop_a_new_log_in(guarded: Guarded) -> None:
+    guarded.add("gina", "see")
+    guarded.forget_tries()
+
+    async def status(password: str = PASSWORD, cookie: str = "") -> tuple[int, list[str]]:
+        return await asyncio.to_thread(post, guarded.url, password, cookie)
+
+    _, [_, device] = await status()
+    for _ in range(LOGINS):
+        assert (await status("a guess"))[0] == 401
+    assert (await status())[0] == 429
+    allowed, [_, again] = await status(cookie=device)
+    assert (allowed, again) == (200, device)
+    guarded.forget_tries()
 
 
 @pytest.mark.slow  # tests/access/test_guard.py has the limits

@@ -176,6 +176,10 @@ class Guard:
         self._adopt(await asyncio.to_thread(self._store.snapshot))
         return Proof(ProofKind.HTTP, f"Bearer {token}")
 
+    def device(self, name: str, shown: str) -> str:
+        """See ``Admission.device``."""
+        return self._proofs.device(name, shown)
+
     async def shut_out(self, name: str) -> None:
         """See ``Admission.shut_out``."""
         if self._identities.has(name, IdentityKind.GUEST):
@@ -264,6 +268,10 @@ class RobotAdmission(Admission):
         proof = await self._guard.invite(name, Grant(self._name, rights, self._guard.now() + seconds))
         self._note(identity(), connection(), "", "rights", "invited", name)
         return proof
+
+    def device(self, name: str, shown: str) -> str:
+        """Return the mark of a browser in which ``name`` has logged in."""
+        return self._guard.device(name, shown)
 
     async def shut_out(self, name: str) -> None:
         """Revoke a guest."""

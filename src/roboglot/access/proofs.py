@@ -1,4 +1,8 @@
-"""Verification of passwords, tokens and certificates. Failures count against the host and the given name."""
+"""Verification of passwords, tokens and certificates. Failures count against the host and the given name.
+
+Those from a browser in which this name has logged in before count against that browser alone, so that guesses of others
+do not stop a new log-in there: the device cookies of OWASP.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ import time
 
 from roboglot.access.callers import basic_of, host_of
 from roboglot.access.identities import Identities
-from roboglot.access.secrets import password_fits, token_hash
+from roboglot.access.secrets import device_fits, new_device, password_fits, token_hash
 from roboglot.access.store import IdentityKind
 from roboglot.model.admission import LockedOut, Proof, ProofKind, Unknown
 from roboglot.transport.limiter import Limiter
@@ -31,6 +35,7 @@ class Proofs:
         self._tries = Limiter(logins / TRIES_SECONDS, logins, time.monotonic)
         often = TRIES_OF_ONE_NAME * logins
         self._tries_of_name = Limiter(often / TRIES_SECONDS, often, time.monotonic)
+        self._tries_of_device = Limiter(logins / TRIES_SECONDS, logins, time.monotonic)
         self._checking = asyncio.Semaphore(1)
         self._waiting = 0
 
@@ -96,23 +101,32 @@ class Proofs:
         """
         name, password = basic_of(proof.value)
         counted = proof.kind is HTTP
-        if counted:
-            self._count(name, host)
+        counts = self._count(name, host, proof.device) if counted else []
         if not name or not await self._password_fits(name, password):
             return None
+        for tries, key in counts:
+            tries.give_back(key)
         if counted:
-            self._tries.give_back(host)
-            self._tries_of_name.give_back(name)
             self._cache(host, proof, name)
         self._cache(SESSION, proof, name)
         return name
 
-    def _count(self, name: str, host: str) -> None:
-        """Count one try. Raises LockedOut."""
+    def _count(self, name: str, host: str, device: str) -> list[tuple[Limiter, str]]:
+        """Count one try, and return what it counts against. Raises LockedOut."""
+        if device_fits(device, name, self._identities.password_of(name)):
+            if not self._tries_of_device.take(device):
+                raise LockedOut("too many wrong passwords in this browser: wait a minute")
+            return [(self._tries_of_device, device)]
         if not self._tries.take(host):
             raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")
         if name and not self._tries_of_name.take(name):
             raise LockedOut(f"too many wrong passwords for {name}: wait a minute")
+        return [(self._tries, host), (self._tries_of_name, name)]
+
+    def device(self, name: str, shown: str) -> str:
+        """See ``Admission.device``."""
+        kept = self._identities.password_of(name)
+        return shown if device_fits(shown, name, kept) else new_device(name, kept) if kept else ""
 
     async def _password_fits(self, name: str, password: str) -> bool:
         if self._waiting >= CHECKS_MAX:

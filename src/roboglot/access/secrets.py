@@ -39,6 +39,27 @@ def password_fits(password: str, kept: str) -> bool:
     return kind == "scrypt" and hmac.compare_digest(derived, base64.b64decode(key))
 
 
+def new_device(name: str, kept: str) -> str:
+    """Return the mark of a browser in which ``name`` logged in with the password of stored form ``kept``.
+
+    It needs no list: nothing but the stored form with its salt makes one, and a new password ends it.
+    """
+    nonce = secrets.token_urlsafe(_SALT_BYTES)
+    return f"{nonce}.{_seal(nonce, name, kept)}"
+
+
+def device_fits(device: str, name: str, kept: str) -> bool:
+    """Return whether ``new_device`` has made this for the name and its present password."""
+    nonce, _, seal = device.partition(".")
+    made = _seal(nonce, name, kept).encode()
+    return bool(kept and seal) and hmac.compare_digest(seal.encode("utf-8", "surrogatepass"), made)
+
+
+def _seal(nonce: str, name: str, kept: str) -> str:
+    text = f"device {nonce} {name}".encode("utf-8", "surrogatepass")
+    return hmac.new(kept.encode(), text, hashlib.sha256).hexdigest()
+
+
 def _derived(password: str, salt: bytes) -> bytes:
     data = password.encode("utf-8", "surrogatepass")
     return hashlib.scrypt(data, salt=salt, n=_N, r=_R, p=_P, dklen=_KEY_BYTES, maxmem=1 << 26)

@@ -27,10 +27,14 @@ class ProofKind(StrEnum):
 
 
 class Proof(NamedTuple):
-    """Credentials of a client; ``value`` may be a secret and is never logged."""
+    """Credentials of a client; ``value`` may be a secret and is never logged.
+
+    ``device``: mark of a browser in which someone has logged in before (``Admission.device``).
+    """
 
     kind: ProofKind
     value: str
+    device: str = ""
 
     def __repr__(self) -> str:
         return f"Proof({self.kind})"
@@ -59,6 +63,13 @@ class Admission:
 
     async def admit(self, address: str, proof: Proof = NO_PROOF) -> str:
         """Return the client's identity: the name of a person or machine, or an address. Raises Unknown."""
+        return ""
+
+    def device(self, name: str, shown: str) -> str:
+        """Return the mark for a browser in which ``name`` has just logged in: ``shown`` if it is one, else a new one.
+
+        Wrong passwords with it count for this browser alone. Empty for those without a password.
+        """
         return ""
 
     def check(self, door: str, operation: str, right: Right | None) -> None:

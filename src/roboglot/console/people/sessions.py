@@ -122,11 +122,13 @@ def read_cookie(rows: list[tuple[bytes, bytes]], name: str) -> str:
     return ""
 
 
-def set_cookie(name: str, token: str, *, secure: bool) -> tuple[bytes, bytes]:
+def set_cookie(
+    name: str, token: str, *, secure: bool, path: str = "/", lifetime: float = LIFETIME
+) -> tuple[bytes, bytes]:
     """Return the header that sets a session's cookie; an empty token deletes it."""
-    age = int(LIFETIME) if token else 0
+    age = int(lifetime) if token else 0
     safe = "; Secure" if secure else ""
-    return b"set-cookie", f"{name}={token}; Path=/; Max-Age={age}; HttpOnly; SameSite=Strict{safe}".encode()
+    return b"set-cookie", f"{name}={token}; Path={path}; Max-Age={age}; HttpOnly; SameSite=Strict{safe}".encode()
 
 
 def _key(token: str) -> str:

@@ -12,7 +12,7 @@ from roboglot.console.desk import Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer_json, read_as
 from roboglot.console.people.classes import Classes, Elsewhere
 from roboglot.console.people.entry import address_of, admission_of, cookie_of
-from roboglot.console.people.sessions import Sessions, cookie_name, set_cookie
+from roboglot.console.people.sessions import Sessions, cookie_name, read_cookie, set_cookie
 from roboglot.console.settings import JOIN_TRIES
 from roboglot.model.admission import NO_PROOF, LockedOut, Proof, ProofKind, Unknown
 from roboglot.transport.limiter import Limiter
@@ -20,6 +20,7 @@ from roboglot.transport.limiter import Limiter
 SIGN_IN, SIGN_OUT = "/api/sign_in", "/api/sign_out"
 Secret = Annotated[str, msgspec.Meta(max_length=300)]
 MINUTE = 60.0
+DEVICE_LIFETIME = 365 * 86_400.0  # s; a log-in renews it
 
 
 class Shown(msgspec.Struct, forbid_unknown_fields=True):
@@ -51,15 +52,25 @@ class Signing:
             await answer_json(send, {"name": ""}, 200, [set_cookie(name, "", secure=secure)])
             return True
         shown = await read_as(receive, Shown)
-        token, answer = await self._sign_in(address_of(scope), shown)
+        device = read_cookie(scope["headers"], f"{name}-device")
+        token, answer = await self._sign_in(address_of(scope), shown, device)
         if not token:  # the pupil belongs to another world
             await answer_json(send, answer)
             return True
         await self._sessions.end(cookie_of(scope))  # a session that others may know ends
-        await answer_json(send, answer, 200, [set_cookie(name, token, secure=secure)])
+        cookies = [set_cookie(name, token, secure=secure)]
+        if shown.password and (mark := self._device(answer, device)):
+            cookies.append(
+                set_cookie(f"{name}-device", mark, secure=secure, path=SIGN_IN, lifetime=DEVICE_LIFETIME),
+            )
+        await answer_json(send, answer, 200, cookies)
         return True
 
-    async def _sign_in(self, address: str, shown: Shown) -> tuple[str, dict[str, object]]:
+    def _device(self, answer: dict[str, object], shown: str) -> str:
+        admission = admission_of(self._desk)
+        return admission.device(str(answer["name"]), shown) if admission is not None else ""
+
+    async def _sign_in(self, address: str, shown: Shown, device: str) -> tuple[str, dict[str, object]]:
         if shown.code:
             return await self._join(address, shown)
         admission = admission_of(self._desk)
@@ -69,7 +80,7 @@ class Signing:
             raise Problem(400, "give a name and a password, or a token, or a name and a code")
         proof = Proof(ProofKind.HTTP, _header(shown))
         try:
-            who = await admission.admit(address, proof)
+            who = await admission.admit(address, proof._replace(device=device))
         except LockedOut as locked:
             raise Problem(429, str(locked)) from None
         except Unknown as unknown:
