@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import subprocess
 from pathlib import Path
 from types import ModuleType
 
@@ -98,3 +99,23 @@ def test_links_to_english_sections_leave_the_chinese_pages(site: ModuleType, pag
         target = pages.parent / "site" / "zh" / page.parent / path
         english = pages / Path(*target.resolve().relative_to((pages.parent / "site").resolve()).parts)
         assert anchor in map(site.slug, site.headings(english.with_suffix(".md").read_text("utf-8"))), page
+
+
+def test_search_without_a_server_has_its_script_here() -> None:
+    """The plugin ``offline`` has it loaded from unpkg.com unless the settings name another."""
+    found = re.search(r"^  polyfills: \[(.*?)\]", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
+    assert found is not None
+    assert [name for name in found[1].split(", ") if "iframe-worker" in name]
+    assert [name for name in found[1].split(", ") if not (ROOT / "docs" / name).is_file()] == []
+
+
+@pytest.mark.slow  # builds the site; in short: test_search_without_a_server_has_its_script_here
+def test_site_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
+    build = [str(ROOT / "scripts/docs"), "--site-dir", str(tmp_path)]
+    subprocess.run(build, check=True, capture_output=True, timeout=200)
+    texts = {str(page.relative_to(tmp_path)): page.read_text("utf-8") for page in tmp_path.rglob("*.html")}
+    assert len(texts) > 80
+    loaded = re.compile(
+        r"<(?:script|link|img|iframe|source|video|audio|object|embed)\b[^>]*?=[\"']?(?:https?:)?//[^>]*>"
+    )
+    assert {name: found for name, text in texts.items() if (found := loaded.findall(text))} == {}
