@@ -6,10 +6,11 @@ import asyncio
 import contextlib
 import math
 import os
+import secrets
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, BinaryIO
 
 import typer
 from rich.console import Console
@@ -19,6 +20,7 @@ from rich.text import Text
 
 from roboglot.cli.screen import shortened
 from roboglot.clients.cyberdog import Certificates, CyberDogClient, CyberDogRefused, Heartbeat
+from roboglot.clients.cyberdog.chapters.camera.camera import CameraFile
 from roboglot.clients.cyberdog.values import Grid
 from roboglot.clients.errors import ClientError
 from roboglot.config import load_config
@@ -202,9 +204,7 @@ async def _charge(client: CyberDogClient, _: list[str]) -> None:
 
 
 async def _photo(client: CyberDogClient, words: list[str]) -> None:
-    name = _writable(words[:1])
-    photo = await client.photo()
-    _keep(photo.data, name or _here(photo.name))
+    await _receive(_writable(words[:1]), lambda file: client.photo(into=file))
 
 
 async def _record(client: CyberDogClient, words: list[str]) -> None:
@@ -214,8 +214,7 @@ async def _record(client: CyberDogClient, words: list[str]) -> None:
     await client.found()  # a dog still looking for its previous app would end the recording
     await client.record()
     await client.clock.sleep(seconds)
-    film = await client.stop_recording()
-    _keep(film.data, name or _here(film.name))
+    await _receive(name, lambda file: client.stop_recording(into=file))
 
 
 def _check_seconds(seconds: float) -> None:
@@ -239,9 +238,29 @@ def _here(name: str) -> str:
     return last
 
 
-def _keep(data: bytes, name: str) -> None:
-    Path(name).write_bytes(data)
-    console.print(f"{name}: {len(data)} bytes", markup=False)
+def _place_of(name: str) -> Path | None:
+    """Return where a file of this name goes, through links; None without a name."""
+    return Path(os.path.realpath(name)) if name else None
+
+
+async def _receive(name: str, fetch: Callable[[BinaryIO], Awaitable[CameraFile]]) -> None:
+    """Receive a file beside its place, and move it there when it is whole; one that fails leaves nothing.
+
+    ``name`` empty: it gets the robot's in this folder.
+    """
+    place = _place_of(name)
+    if place is not None and place.exists() and not place.is_file():  # a pipe or a device
+        with place.open("wb") as file:
+            found = await fetch(file)
+    else:
+        part = (place.parent if place is not None else Path()) / f".roboglot-{secrets.token_hex(8)}.part"
+        try:
+            with part.open("xb") as file:
+                found = await fetch(file)
+            part.replace(place or Path(name := _here(found.name)))
+        finally:
+            part.unlink(missing_ok=True)
+    console.print(f"{name}: {found.size} bytes", markup=False)
 
 
 _WORKS: tuple[Work, ...] = (

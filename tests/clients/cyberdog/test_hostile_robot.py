@@ -5,14 +5,18 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import os
 from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
 
 import grpc
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from roboglot.cli.cyberdog import _receive
 from roboglot.clients.cyberdog import CyberDogClient, values
+from roboglot.clients.cyberdog.chapters.camera.camera import MEMORY_MAX, PHOTO_MAX
 from roboglot.clients.errors import BadAnswer, ClientError
 from roboglot.wire.cyberdog.channel import APP_NAME, SERVICE, client_options
 from roboglot.wire.cyberdog.codes import Code
@@ -71,6 +75,41 @@ async def test_bytes_that_are_no_answer_are_bad_ones(caplog: pytest.LogCaptureFi
         with pytest.raises(BadAnswer):
             _ = [chunk async for chunk in client.link.fetch(Code.STATUS, "{}")]
     assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
+
+
+def part(data: bytes, size: int) -> bytes:
+    return pb.FileChunk(file_name="x.mp4", file_size=size, buffer=data).SerializeToString()
+
+
+async def test_file_is_held_up_to_a_bound(tmp_path: Path) -> None:
+    async with Robot() as robot, CyberDogClient(ADDRESS, None, port=robot.port, app_port=None) as client:
+        for fetch, most in ((client.photo, PHOTO_MAX), (client.stop_recording, MEMORY_MAX)):
+            for answers in ([part(b"x", most + 1)], [part(b"x", 2), part(b"x", most + 1)]):
+                robot.answers = answers
+                with pytest.raises(BadAnswer, match="into a file only"):
+                    await fetch()
+        robot.answers = [part(b"ab", 3), part(b"c", 3)]
+        assert (await client.stop_recording()).data == b"abc"
+        with (tmp_path / "film").open("wb") as file:
+            film = await client.stop_recording(into=file)
+        assert (film.data, film.size, (tmp_path / "film").read_bytes()) == (b"", 3, b"abc")
+
+
+@pytest.mark.parametrize("name", ["mine.mp4", ""])
+async def test_file_that_fails_leaves_nothing(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.mp4").write_bytes(b"mine")
+    async with Robot() as robot, CyberDogClient(ADDRESS, None, port=robot.port, app_port=None) as client:
+        for answers in ([part(b"abcd", 2**32 - 1)], [part(b"abcd", 3)], [part(b"ab", 3), NONSENSE[0]]):
+            robot.answers = answers
+            with pytest.raises(BadAnswer):
+                await _receive(name, lambda file: client.stop_recording(into=file))
+            assert os.listdir(tmp_path) == ["mine.mp4"]
+            assert (tmp_path / "mine.mp4").read_bytes() == b"mine"
+        robot.answers = [part(b"abc", 3)]
+        await _receive(name, lambda file: client.stop_recording(into=file))
+    assert {*os.listdir(tmp_path)} == {"mine.mp4", name or "x.mp4"}
+    assert (tmp_path / (name or "x.mp4")).read_bytes() == b"abc"
 
 
 anything = st.recursive(
