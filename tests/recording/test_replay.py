@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
+import json
+import uuid
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +17,9 @@ from websockets.asyncio.server import ServerConnection, serve
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import RealClock
 from roboglot.model.tap import SILENT, Direction, Exchange
-from roboglot.recording.comparing.comparison import answers_only, compare
-from roboglot.recording.lines import Target, status_of
+from roboglot.recording.comparing.comparison import Comparison, answers_only, compare
+from roboglot.recording.comparing.names import Names
+from roboglot.recording.lines import Line, Target, status_of
 from roboglot.recording.reader import BadRecording, Recording, read_recording
 from roboglot.recording.replaying import Replay
 from tests.recording.test_compare import session
@@ -132,3 +137,99 @@ def test_status_of_answer_is_in_the_taps_words() -> None:
     assert status_of("cyberdog", b'{"error_code": 104}') == "error_code 104"
     assert status_of("visual", b'{"feedback": {"state": 29}}') == "state 29"
     assert status_of("visual", b'{"response": {}}') == "ok"
+
+
+class Numbered:
+    """A robot over REST that numbers actions and walls, and names places; ``muddle`` spoils its newest action."""
+
+    def __init__(self, first: int, muddle: str = "") -> None:
+        self._actions, self._walls, self._muddle = itertools.count(first), itertools.count(first + 2), muddle
+        self._known: list[str] = []
+
+    def answer(self, request: str) -> tuple[str, str]:
+        method, _, path = request.partition("\n")[0].partition(" ")
+        kind, _, name = path.strip("/").partition("/")
+        if method == "POST":
+            key = {"actions": "action_id", "walls": "id", "places": "id"}[kind]
+            numbers = self._actions if kind == "actions" else self._walls
+            made = json.dumps(str(uuid.UUID(int=next(numbers))) if kind == "places" else next(numbers))
+            self._known.append(f"{kind}/{made}")
+            return "200", f'{{"{key}": {made}, "floor_id": 1, "map_id": "ground floor"}}'
+        if method == "PUT":
+            wanted = json.loads(request.partition("\n\n")[2])["action_id"]
+            return ("200", "{}") if f"actions/{wanted}" in self._known else ("404", "{}")
+        if name == ":current":
+            mine = [int(each.partition("/")[2]) for each in self._known if each.startswith("actions/")]
+            now = {"stuck": mine[0], "ahead": mine[-1] + 1, "": mine[-1]}[self._muddle]
+            return "200", f'{{"action_id": {now}}}'
+        known = f"{kind}/{name}" in self._known or f'{kind}/"{name}"' in self._known
+        return ("200", "{}") if known else ("404", "{}")
+
+
+ALL = (
+    "POST /actions\n\n", "POST /actions\n\n", "POST /walls\n\n", "POST /places\n\n", "GET /actions/:current\n\n",
+    "GET /actions/1\n\n", "GET /walls/3\n\n", 'PUT /actions\n\n{"action_id": 2, "map_id": 1}',
+    f"DELETE /places/{uuid.UUID(int=4)}\n\n", "POST /actions\n\n", "GET /actions/:current\n\n", "GET /actions/99\n\n",
+)  # fmt: skip
+
+
+class ToNumbered(Line):
+    """A line to such a robot; ``heard``: the requests that arrived."""
+
+    def __init__(self, robot: Numbered, heard: list[str]) -> None:
+        self._robot, self._heard = robot, heard
+
+    async def open(self) -> None:
+        """Nothing to open."""
+
+    async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> list[tuple[bytes, str]]:
+        """Send one request."""
+        del operation, answers
+        self._heard.append(payload.decode())
+        status, text = self._robot.answer(payload.decode())
+        return [(text.encode(), status)]
+
+    async def close(self) -> None:
+        """Nothing to close."""
+
+
+async def repeated(robot: Numbered, heard: list[str]) -> Comparison:
+    """Replay a session with a robot that began to count at 1 to another, and compare."""
+    target = Target("slamware://h")
+    first, recorded = Numbered(1), list[Exchange]()
+    for request in ALL:
+        status, text = first.answer(request)
+        operation = request.partition("\n")[0]
+        asked = Exchange(0.0, "a", "slamware", "x:1", "x", Direction.REQUEST, operation, request.encode())
+        recorded += [asked, asked._replace(direction=Direction.REPLY, payload=text.encode(), status=status)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Target, "line", lambda *_: ToNumbered(robot, heard))
+        live = await Replay(recorded, target, RealClock(), fast=True).run()
+    return compare(recorded, live, names=Names())
+
+
+async def test_new_name_of_a_thing_is_no_difference() -> None:
+    heard: list[str] = []
+    comparison = await repeated(Numbered(2), heard)  # 2 and 3 are also names of the recording, for other things
+    assert [(row.operation, row.differences) for row in comparison.rows if row.differences] == []
+    assert heard[5:9] == [
+        "GET /actions/2\n\n", "GET /walls/4\n\n", 'PUT /actions\n\n{"action_id": 3, "map_id": 1}',
+        f"DELETE /places/{uuid.UUID(int=5)}\n\n",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("muddle", ["stuck", "ahead"])
+async def test_name_of_another_thing_is_a_difference(muddle: str) -> None:
+    comparison = await repeated(Numbered(7, muddle), [])
+    [current] = [row for row in comparison.rows if row.operation == "GET /actions/:current"]
+    assert [difference.what for difference in current.differences][:1] == ["$.action_id"]
+
+
+def test_words_and_other_fields_are_no_names() -> None:
+    names = Names()
+    for path, one, other in (("$.grid", 3, 4), ("$.valid", 1, 2), ("$.map_id", "office", "lobby"), ("$.x", 1, 2)):
+        assert names.agree(path, one, other) is None
+    assert names.agree("$.action_id", 1, "1") is None
+    assert names.agree("$.taskId", "order-2026-0001", "order-2026-0007")
+    assert not names.agree("$.taskId", "order-2026-0001", "order-2026-0008")
+    assert not names.agree("$.taskId", "order-2026-0002", "order-2026-0007")

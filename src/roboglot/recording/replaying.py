@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import re
 from collections.abc import Sequence
 
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.model.clock import Clock
 from roboglot.model.tap import Direction, Exchange
+from roboglot.recording.comparing.names import IDS_MAX, NOT_NAMED, Name, name_of, renamed
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.lines import Line, Target
 from roboglot.recording.reader import Asked, pair
 from roboglot.recording.secrets import REDACTED
-
-IDS_MAX = 10_000
 
 
 def sendable(exchanges: Sequence[Exchange]) -> tuple[list[Exchange], int]:
@@ -35,7 +33,7 @@ class Replay:
         self._asked = [asked for asked in pair(sendable(recorded)[0])[0] if asked.request.door == target.door]
         self._target, self._clock, self._fast = target, clock, fast
         self._found: list[Exchange] = []
-        self._ids: dict[str, str] = {}
+        self._ids: dict[Name, str] = {}
         self._started = 0.0
         self._answered = False
         self._lost: LinkLost | None = None
@@ -111,20 +109,12 @@ class Replay:
     # -- ids given by the robot --
 
     def _learn(self, recorded: bytes, live: bytes) -> None:
-        """Remember the robot's new ids for the recorded ones."""
-        then: dict[str, object] = dict(leaves(tree(recorded)))
-        for path, value in leaves(tree(live)):
-            old = then.get(path)
-            if path.lower().endswith("id") and old is not None and old != value and len(self._ids) < IDS_MAX:
-                self._ids[str(old)] = str(value)
+        """Remember the robot's new ids for the recorded ones: the newest, as it may give one again."""
+        now: dict[str, object] = dict(leaves(tree(live)))
+        for path, value in leaves(tree(recorded)):
+            old, new = name_of(path, value), name_of(path, now.get(path))
+            if NOT_NAMED not in (old, new) and (old in self._ids or len(self._ids) < IDS_MAX):
+                self._ids[old] = str(now[path])
 
     def _renamed(self, payload: bytes) -> bytes:
-        """Return a request with the new ids: in the path, and in JSON fields whose names end in id."""
-        if not self._ids:
-            return payload
-        head, blank, body = payload.partition(b"\n\n") if self._target.door == "slamware" else (b"", b"", payload)
-        for old, new in self._ids.items():
-            was, now = re.escape(old.encode()), new.encode().replace(b"\\", rb"\\")
-            head = re.sub(rb"(?<=/)" + was + rb"(?=/|\?|$)", now, head)
-            body = re.sub(rb'(id"\s*:\s*"?)' + was + rb'(?=["\s,}])', rb"\g<1>" + now, body)
-        return head + blank + body
+        return renamed(payload, self._ids, head=self._target.door == "slamware")

@@ -34,6 +34,7 @@ def command(
     from roboglot.recording.comparing import reports
     from roboglot.recording.comparing.comparison import answers_only, compare
     from roboglot.recording.comparing.masks import Mask, read_mask
+    from roboglot.recording.comparing.names import Names
     from roboglot.recording.lines import Target
     from roboglot.recording.reader import read_recording
     from roboglot.recording.replaying import Replay, sendable
@@ -47,7 +48,7 @@ def command(
         sys.exit(f"roboglot replay: {in_words(_first(errors))}")
     if withheld:
         print(f"{withheld} requests are not sent, because they contain [redacted]", file=sys.stderr)
-    comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast)
+    comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast, names=Names())
     try:
         if html:
             html.write_text(reports.page(comparison, (str(file), against)), encoding="utf-8")

@@ -9,7 +9,8 @@ from dataclasses import field
 from itertools import pairwise
 
 from roboglot.model.tap import Direction, Exchange
-from roboglot.recording.comparing.masks import Mask
+from roboglot.recording.comparing.masks import How, Mask
+from roboglot.recording.comparing.names import Names
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.matching import normal
 from roboglot.recording.reader import Asked, pair
@@ -83,15 +84,24 @@ class Comparison:
 
 
 def compare(
-    one: Sequence[Exchange], other: Sequence[Exchange], mask: Mask | None = None, *, order: bool = True
+    one: Sequence[Exchange],
+    other: Sequence[Exchange],
+    mask: Mask | None = None,
+    *,
+    order: bool = True,
+    names: Names | None = None,
 ) -> Comparison:
-    """Compare two sessions, of one robot each; ``order``: compare the order of operations, too."""
+    """Compare two sessions, of one robot each; ``order``: compare the order of operations, too.
+
+    ``names``: ids agree if each stands for the same one throughout, as where one session repeats the other; None: they
+    are compared as other values are, and any two UUIDs agree.
+    """
     mask = mask or Mask()
     rows: dict[tuple[str, str], Row] = {}
     asked_one, pushed_one = pair(one)
     asked_other, pushed_other = pair(other)
     starts = _start(one), _start(other)
-    _compare_answers(rows, asked_one, asked_other, mask)
+    _compare_answers(rows, asked_one, asked_other, mask, names)
     _compare_pushes(rows, [e for _, e in pushed_one], [e for _, e in pushed_other], starts, mask)
     if order:
         compare_order(rows, one, other)
@@ -113,7 +123,11 @@ def _start(exchanges: Sequence[Exchange]) -> float:
 
 
 def _compare_answers(
-    rows: dict[tuple[str, str], Row], ones: Sequence[Asked], others: Sequence[Asked], mask: Mask
+    rows: dict[tuple[str, str], Row],
+    ones: Sequence[Asked],
+    others: Sequence[Asked],
+    mask: Mask,
+    names: Names | None,
 ) -> None:
     left: dict[tuple[str, str, str], list[Asked]] = defaultdict(list)
     for asked in others:
@@ -124,7 +138,7 @@ def _compare_answers(
         row.ones += 1
         alike = left[_key(asked)]
         if alike:
-            _compare_replies(row, asked, alike.pop(0), mask)
+            _compare_replies(row, asked, alike.pop(0), mask, names)
         else:
             row.check(False, "request", asked.request.payload, MISSING)
     for alike in left.values():
@@ -137,21 +151,26 @@ def _key(asked: Asked) -> tuple[str, str, str]:
     return request.door, request.operation, normal(request.door, request.payload).text
 
 
-def _compare_replies(row: Row, one: Asked, other: Asked, mask: Mask) -> None:
+def _compare_replies(row: Row, one: Asked, other: Asked, mask: Mask, names: Names | None) -> None:
     row.check(len(one.replies) == len(other.replies), "number of replies", len(one.replies), len(other.replies))
     for mine, theirs in zip(one.replies, other.replies, strict=False):
         row.check(mine.status == theirs.status, "status", mine.status, theirs.status)
         row.check(mask.in_time(mine.seconds, theirs.seconds), "seconds", mine.seconds, theirs.seconds)
-        _compare_payloads(row, mine.payload, theirs.payload, mask)
+        _compare_payloads(row, mine.payload, theirs.payload, mask, names)
 
 
-def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask) -> None:
+def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask, names: Names | None = None) -> None:
     mine, theirs = dict(leaves(tree(one))), dict(leaves(tree(other)))
-    for path in mine.keys() | theirs.keys():
+    for path in mine | theirs:
         a, b = mine.get(path, MISSING), theirs.get(path, MISSING)
-        there = path in mine and path in theirs
-        ignored = mask.agree(row.operation, path, "", 0)  # they agree only because a rule ignores the field
-        row.check(ignored or (there and mask.agree(row.operation, path, a, b)), path, a, b)
+        if mask.how(row.operation, path) is How.IGNORED:  # there or not
+            good = True
+        elif path not in mine or path not in theirs:
+            good = False
+        else:
+            named = names.agree(path, a, b) if names is not None and mask.how(row.operation, path) is None else None
+            good = mask.agree(row.operation, path, a, b) if named is None else named
+        row.check(good, path, a, b)
 
 
 def _compare_pushes(
