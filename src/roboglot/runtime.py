@@ -71,8 +71,7 @@ class Runtime:
         self._remembers = file.exists() or bool(config.database)
         self._database = open_database(file, config.database, names, in_place=config.lockstep)
         limits = dataclasses.asdict(config.programs)
-        together = limits.pop("memory_together")
-        self._memory_together = together
+        self._memory_together = limits.pop("memory_together")
         self._engine: Engine | None = None
         self._limits = Limits(**limits)
         self.fleet = build_fleet(
@@ -91,7 +90,7 @@ class Runtime:
         self._record_server = RecordServer(config.data, lambda: self.recorder)
         self._types = doors
         self._programs: dict[str, Programs] = {}
-        self._rehearsals = Rehearsals(memory_together=together)
+        self._rehearsals = Rehearsals(memory_together=self._memory_together)
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
         self.console = Console(self.build_desk(), config.console, self._tls) if config.console.enabled else None
 

@@ -115,5 +115,5 @@ class Writer:
             self._stall_timer = loop.call_later(STALLED_SECONDS_MAX, self._watch_reading, taken)
 
     def _give_up(self) -> None:
-        log.warning("disconnect %s: it does not read its frames", self._name)
+        log.warning("disconnected %s: it does not read its frames", self._name)
         self.abort()

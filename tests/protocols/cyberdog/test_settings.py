@@ -235,5 +235,5 @@ async def test_each_refusal_has_its_reason_in_the_log(client, caplog) -> None:
     for code, params in REFUSED:
         caplog.clear()
         await client.ask(code, params)
-        lines = [record.message for record in caplog.records if record.message.startswith(f"{code}: ")]
-        assert [line for line in lines if line != f"{code}: "], (code, params)
+        lines = [record.message for record in caplog.records if record.message.startswith(f"{code} refused: ")]
+        assert [line for line in lines if line != f"{code} refused: "], (code, params)

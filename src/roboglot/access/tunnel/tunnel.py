@@ -169,7 +169,7 @@ class Tunnel:
         try:
             await self._opened(port, lambda: stream)
         except OSError as error:
-            log.info("port %d: %s", port, error)
+            log.info("cannot open port %d: %s", port, error)
             self._forget(number)
             self._link.send(FrameKind.CLOSE, number)
 

@@ -249,7 +249,7 @@ class RoboMasterClient:
     def _lost(self, why: str) -> None:
         if self.state is not LinkState.CONNECTED:
             return
-        log.info("robomaster %s: %s", self.host, why)
+        log.info("lost robomaster %s: %s", self.host, why)
         self._change(LinkState.LOST)
         if self._reconnect and not self._search.going_on:
             self._search.begin()

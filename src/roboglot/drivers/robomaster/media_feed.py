@@ -75,7 +75,7 @@ class PacketFeed(Feed[P]):
                 async for packet in self._stream.packets():
                     self.push(packet)
             except ClientError as error:
-                log.info("%s: no %s: %s", self._supervisor.link.address, self._what, error)
+                log.info("%s sends no %s: %s", self._supervisor.link.address, self._what, error)
             await self._clock.sleep(RETRY)
 
 

@@ -26,7 +26,7 @@ class Call:
     context: Context
     reply: Callable[[object], Awaitable[None]]
     why: str = ""  # the reason for a refusal, in plain words
-    began: float | None = None  # robot time at which followers were notified
+    began: float | None = None  # robot time at which the tap noted the request
 
     def refused(self, answer: Answer, why: str) -> Answer:
         """Return ``answer``, a refusal; ``why`` is for the log and for viewers of the exchange."""

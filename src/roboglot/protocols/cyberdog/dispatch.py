@@ -47,7 +47,7 @@ async def answer(call: Call) -> object | None:
     """Run the request; return its last answer, or None. Raises NotJson, and nothing else."""
     robot = call.context.robot
     if robot.tap.watched:
-        last = await _followed(call)
+        last = await _noted(call)
     else:
         last = await (_answered(call) if robot.stand_in is None else _stood_in(call, robot.stand_in))
     if delay := lateness(robot):
@@ -55,8 +55,8 @@ async def answer(call: Call) -> object | None:
     return last
 
 
-async def _followed(call: Call) -> object | None:
-    """Run the request, and note it and its outcome for followers."""
+async def _noted(call: Call) -> object | None:
+    """Run the request, and note it and its outcome for subscribers of the tap."""
     robot = call.context.robot
     tap, key = robot.tap, str(int(call.code))
     began = call.began = tap.request(DOOR, key, call.text)
@@ -81,7 +81,7 @@ async def _stood_in(call: Call, stand_in: StandIn) -> object | None:
         return await _ask_stand_in(call, stand_in)
     except RobotError as refused:
         call.why = str(refused)
-        log.info("%d: %s", call.code, refused)
+        log.info("%d refused: %s", call.code, refused)
         return error(InBandError.UNAVAILABLE)
 
 
@@ -121,11 +121,11 @@ async def _answered(call: Call) -> object | None:
         return _logged(call, await operation.call(call, values))
     except BadParameters as bad:
         call.why = "; ".join(wrong) or str(bad)
-        log.info("%d: %s", call.code, call.why)
+        log.info("%d refused: %s", call.code, call.why)
         return error(InBandError.BAD_PARAMETERS)
     except RobotError as refused:
         call.why = str(refused)
-        log.info("%d: %s", call.code, refused)
+        log.info("%d refused: %s", call.code, refused)
         if isinstance(refused, ComponentMissing) and call.code in SILENT_WITHOUT_SERVICE:
             return None
         return error(codes_of(refused).in_band)
@@ -142,7 +142,7 @@ def _logged(call: Call, last: object) -> object:
     if not call.why and isinstance(last, dict) and last.get("success") is False:
         call.why = str(last.get("message", ""))
     if call.why:
-        log.info("%d: %s", call.code, call.why)
+        log.info("%d refused: %s", call.code, call.why)
     return last
 
 

@@ -139,7 +139,7 @@ class Service:
         try:
             last = await answer(call)
         except NotJson as bad:
-            log.info("%d: %s", code, bad)
+            log.info("%d refused: %s", code, bad)
             return _answer(0, error(InBandError.BAD_PARAMETERS))
         except asyncio.CancelledError:  # the app does not wait for the end
             self._note_end(peer, code, call.began)

@@ -213,7 +213,7 @@ class Player:
             try:
                 found = {shot.topic: shot for shot in await self._last(self._next - 1, wanted)}
             except (OSError, BadRecording) as error:
-                log.warning("playback of %s: %s", self._recorded.path, error)
+                log.warning("cannot show %s to a new subscriber: %s", self._recorded.path, error)
                 return
             for listener, number, subscription in newcomers:
                 if (shot := found.get(number - 1)) is not None and listener.wants(number) == subscription:

@@ -53,7 +53,7 @@ MANNERS = ("vxy", "vz", "vp", "vy", "wait_for_complete")  # parameters of how to
 
 @dataclass(slots=True)
 class _Asked:
-    """Command being answered: its key in the contract, and when it was noted for followers."""
+    """Command being answered: its key in the contract, and when the tap noted it."""
 
     key: str = ""
     began: float | None = None
@@ -122,7 +122,7 @@ async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer
 
 
 def _enter(context: Context, key: str, text: str, asked: _Asked) -> None:
-    """Note a command for followers, and check the client's right. Raises Forbidden."""
+    """Have the tap note a command, and check the client's right. Raises Forbidden."""
     asked.key = key
     if context.robot.tap.watched:
         asked.began = context.robot.tap.request(DOOR, key, text)

@@ -154,7 +154,7 @@ class Ros2Door:
     def _ended(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
-            log.error("robot %s: the ROS 2 door: %s", self._robot.id, error, exc_info=error)
+            log.error("robot %s: the ROS 2 door broke: %s", self._robot.id, error, exc_info=error)
 
     # -- listening --
 

@@ -107,9 +107,8 @@ class Application:
         self.closing = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        peer = scope.get("client") or ("", 0)
-        client = f"slamware {peer[0]}".strip()
-        address = f"{peer[0]}:{peer[1]}"
+        host, address = _peer(scope)
+        client = f"slamware {host}".strip()
         set_client(client, address)
         if fairness := self._context.robot.fairness:
             await wait_for_turn(fairness, fairness.of(address), lambda: _stops(scope))
@@ -162,8 +161,7 @@ class Application:
             return None
         handler = partial(copy_context().run, operation.handler, self._context, **values)
         card = robot[Network] if Network in robot else None  # noqa: SIM401 - one that comes later is real and on time
-        peer = scope.get("client") or ("", 0)
-        address, fairness, tap = f"{peer[0]}:{peer[1]}", robot.fairness, self._tap
+        (_, address), fairness, tap = _peer(scope), robot.fairness, self._tap
 
         def read() -> bytes | None:
             try:
@@ -225,8 +223,7 @@ class Application:
 
     async def _enter(self, scope: Scope) -> None:
         """Act for the client's proven identity from here on. Raises HttpError 401: unknown client."""
-        peer = scope.get("client") or ("", 0)
-        address = f"{peer[0]}:{peer[1]}"
+        _, address = _peer(scope)
         shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
         proof = Proof(ProofKind.HTTP, shown) if shown else NO_PROOF
         try:
@@ -355,6 +352,12 @@ def head(*headers: tuple[bytes, bytes]) -> bytes:
     """Return the head of a response with status 200 as the server writes it, with %d for the length of its body."""
     rows = [b"%s: %s\r\n" % row for row in headers]
     return b"HTTP/1.1 200 OK\r\n%scontent-length: %%d\r\n\r\n" % b"".join(rows).replace(b"%", b"%%")
+
+
+def _peer(scope: Scope) -> tuple[str, str]:
+    """Return the client's host, and its host and port; empty and ":0" if unknown."""
+    host, port = scope.get("client") or ("", 0)
+    return host, f"{host}:{port}"
 
 
 def _wire_form(scope: Scope) -> bytes:

@@ -40,7 +40,7 @@ class Answers:
     ) -> None:
         self._request = request
         self._tap = tap
-        self._began = began  # time at which the request was reported to followers
+        self._began = began  # time at which the tap noted the request
         self._outlet = outlet
         self._note = note
 

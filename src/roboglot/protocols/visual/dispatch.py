@@ -53,17 +53,7 @@ class Dispatch:
         try:
             request = parse_request(text)
         except BadFrame as bad:
-            answer = feedback(
-                kind=bad.kind or "parse",
-                id=bad.id,
-                target=bad.target,
-                operate=bad.operate,
-                state=bad.state,
-                describe=str(bad),
-            )
-            if tap.watched:
-                tap.reply(DOOR, "", answer, f"state {int(bad.state)}", str(bad), tap.request(DOOR, "", text))
-            self._front_ends.answer(answer)
+            self._refuse_unreadable(text, bad)
             return
         if tap.watched:
             began = tap.request(DOOR, key_of(request), text)
@@ -81,13 +71,32 @@ class Dispatch:
             await self._ask_stand_in(self._service.robot.stand_in, request, text, answers, began)
             return
         # A separate task, so that an operation is completed even if the client disconnects.
+        await asyncio.shield(self._begin(request, answers))
+
+    def _refuse_unreadable(self, text: str, bad: BadFrame) -> None:
+        """Answer a text that is no frame."""
+        answer = feedback(
+            kind=bad.kind or "parse",
+            id=bad.id,
+            target=bad.target,
+            operate=bad.operate,
+            state=bad.state,
+            describe=str(bad),
+        )
+        tap = self._service.robot.tap
+        if tap.watched:
+            tap.reply(DOOR, "", answer, f"state {int(bad.state)}", str(bad), tap.request(DOOR, "", text))
+        self._front_ends.answer(answer)
+
+    def _begin(self, request: Request, answers: Answers) -> asyncio.Task[None]:
+        """Start answering a frame: after all earlier ones, or at once if it is urgent."""
         starting = {id for pending in self._pending.values() if pending.operate == "run" for id in pending.targets}
         urgent = request.operate in URGENT and not self._service.robot.clock.repeats
         in_order = not urgent or not starting.isdisjoint(request.targets)
         task = asyncio.create_task(self._answer(request, answers, in_order=in_order), name=f"frame {request.operate}")
         self._pending[task] = request
         task.add_done_callback(self._pending.pop)
-        await asyncio.shield(task)
+        return task
 
     async def _ask_stand_in(
         self, stand_in: StandIn, request: Request, text: str, answers: Answers, began: float | None

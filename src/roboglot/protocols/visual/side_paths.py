@@ -66,7 +66,7 @@ class SidePaths:
     def _noted(
         self, path: str, answer: Callable[[str, Send], Awaitable[None]]
     ) -> Callable[[str, Send], Awaitable[None]]:
-        """Return ``answer`` with reports to the robot's followers, or a stand-in's answers if there is one."""
+        """Return ``answer`` noted by the tap, or a stand-in's answers if there is one."""
 
         async def receive(text: str, send: Send) -> None:
             tap, stand_in = self._service.robot.tap, self._service.robot.stand_in

@@ -48,7 +48,7 @@ async def test_navigation_needs_localization(client, robot, forward, caplog) -> 
     caplog.set_level("INFO")
     await forward(seconds=1)
     assert await client.ask(6004, {"type": 1, "goalX": 1.0, "goalY": 0.0}) == {"accepted": 2}
-    assert "6004: the robot is not localized; 6004 of type 7 localizes it" in caplog.text
+    assert "6004 refused: the robot is not localized; 6004 of type 7 localizes it" in caplog.text
     assert await client.ask(6004, {"type": 1, "goalX": 1.0}) == {"error_code": 323}
 
 

@@ -87,7 +87,7 @@ class CyberDogCamera(Camera):
                         picture = await self._clock.wait_for(pictures.next(), PICTURE_MAX)
                         self._feed.push(_fitted(picture, self._clock.time()))
             except (ClientError, TimeoutError) as error:
-                log.info("%s: no pictures: %s", self._supervisor.link.address, error)
+                log.info("%s sends no pictures: %s", self._supervisor.link.address, error)
             except Exception:
                 log.exception("video failed")
             await self._clock.sleep(RETRY)

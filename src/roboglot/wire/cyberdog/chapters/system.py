@@ -1,4 +1,4 @@
-"""Chapter "status" on the wire: heartbeats as text, for recordings and other followers of a robot.
+"""Chapter "status" on the wire: heartbeats as text, for recordings and other subscribers of the tap.
 
 Heartbeats come twice a second, mostly unchanged: changes are reported at once, unchanged ones now and then.
 """
@@ -34,7 +34,7 @@ class Beats:
         return json.dumps(fields, ensure_ascii=False, separators=(",", ":"))
 
     def forget(self) -> None:
-        """Forget the last heartbeat, so that the next one is reported; for times without followers."""
+        """Forget the last heartbeat, so that the next one is reported; for times without subscribers."""
         self._last = b""
 
 

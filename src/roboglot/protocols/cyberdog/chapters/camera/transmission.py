@@ -135,7 +135,7 @@ class Transmission:
         try:
             answer = await call.answer(offer.sdp)
         except webrtc.BadOffer as bad:
-            log.info("offer of %r: %s", peer.uid, bad)
+            log.info("cannot answer the offer of %r: %s", peer.uid, bad)
             self._fail(peer, VideoError.NO_CONNECTION, f"the offer cannot be answered: {bad}")
             return
         if self._peers.get(peer.uid) is not peer:  # it gave up meanwhile
@@ -148,7 +148,7 @@ class Transmission:
 
     def _changed(self, peer: _Peer, state: str) -> None:
         """Handle a change of the connection's state, as aiortc words it."""
-        log.info("pictures for %r: %s", peer.uid, state)
+        log.info("the video call of %r is %s", peer.uid, state)
         match state:
             case "connected":
                 peer.give_up.cancel()
@@ -220,7 +220,7 @@ class _Peer:
                 try:
                     await self.call.add_candidate(candidate, mid, index)
                 except bad as error:
-                    log.info("candidate of %r: %s", self.uid, error)
+                    log.info("cannot use a candidate of %r: %s", self.uid, error)
             self._more.clear()
             await self._more.wait()
 

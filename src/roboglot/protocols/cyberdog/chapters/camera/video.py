@@ -23,5 +23,5 @@ async def signal(call: Call) -> str:
     try:
         call.context.video.take(read_signal(read_params(call.text)))
     except BadSignal as bad:
-        log.info("4001: %s", bad)  # robots accept it silently and do nothing
+        log.info("4001 ignored: %s", bad)  # robots accept it silently and do nothing
     return ""

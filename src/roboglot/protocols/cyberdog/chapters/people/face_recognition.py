@@ -81,7 +81,7 @@ class Faces:
         except TimeoutError:
             result = FaceResult.TIMEOUT
         except RobotError as error:
-            log.info("face of %r: %s", name, error)
+            log.info("cannot enter the face of %r: %s", name, error)
             result = FaceResult.INNER
         self.entering = ""
         self._app.push(ENTERED, {"result": int(result), "username": name})
@@ -101,7 +101,7 @@ class Faces:
             if not reported:
                 self._app.push(RECOGNISED, _recognised(FaceResult.TIMEOUT, name, id, 0.0, 0.0))
         except RobotError as error:
-            log.info("face recognition: %s", error)
+            log.info("face recognition ended: %s", error)
 
     async def _push_faces(self, wanted: str, id: int, reported: dict[str, float]) -> None:
         with self._robot[Vision].faces.subscribe() as sightings:

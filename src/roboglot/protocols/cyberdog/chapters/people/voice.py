@@ -96,7 +96,7 @@ class Voice:
         except TimeoutError:
             code = TIMEOUT
         except RobotError as error:
-            log.info("voiceprint of %r: %s", member, error)
+            log.info("cannot learn the voice of %r: %s", member, error)
             code = UNKNOWN
         finally:
             if self._learning is asyncio.current_task():  # unless it was cancelled
@@ -116,7 +116,7 @@ class Voice:
                 try:
                     self._execute(said)
                 except RobotError as error:
-                    log.info("%r: %s", said.text, error)
+                    log.info("cannot obey %r: %s", said.text, error)
 
     def _execute(self, said: SpeechHeard) -> None:
         text, now = said.text.casefold(), self._robot.clock.time()
