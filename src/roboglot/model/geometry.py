@@ -16,6 +16,11 @@ from roboglot.values import dataclass
 POSITION_MAX = 10_000.0  # m from the origin of its map to a place that is asked for
 
 
+def bounded(value: float, most: float) -> float:
+    """Return ``value``, cut to ``most`` in size."""
+    return max(-most, min(most, value))
+
+
 def wrap_angle(angle: float) -> float:
     """Return the same direction as ``angle`` (rad) in (-pi, pi]."""
     if -math.pi < angle <= math.pi:
@@ -50,6 +55,10 @@ class Pose(Struct, frozen=True, gc=False):
     def point(self) -> Point:
         """Position of the pose."""
         return Point(self.x, self.y)
+
+    def is_near(self, other: Pose, way: float, turn: float) -> bool:
+        """Return whether ``other`` is less than ``way`` (m) and ``turn`` (rad) away."""
+        return self.distance_to(other) < way and abs(wrap_angle(self.yaw - other.yaw)) < turn
 
     def compose(self, local: Pose) -> Pose:
         """Transform ``local`` from the frame of this pose to the parent frame."""

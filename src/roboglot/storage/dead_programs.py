@@ -10,8 +10,9 @@ import asyncio
 import logging
 from collections.abc import Callable, Collection
 
+from roboglot.hosting.steady_time import uptime
 from roboglot.storage.homes import Homes
-from roboglot.storage.residence import LEASE, PERIOD, uptime
+from roboglot.storage.residence import LEASE, PERIOD
 from roboglot.storage.transactions import DatabaseError
 from roboglot.transport.log_limiter import LogLimiter
 from roboglot.values import dataclass

@@ -9,11 +9,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import time
 import uuid
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from roboglot.hosting.steady_time import uptime
 from roboglot.storage.homes import Homes, Occupied
 from roboglot.storage.transactions import DatabaseError
 from roboglot.transport.log_limiter import LogLimiter
@@ -21,11 +21,6 @@ from roboglot.transport.log_limiter import LogLimiter
 log = logging.getLogger(__name__)
 PERIOD, HOLD, LEASE = 0.5, 2.5, 4.0  # s between renewals; see above
 HOLDER = "holder"  # file in the data folder
-
-
-def uptime() -> float:
-    """Return uptime in s, unaffected by changes of the date, including the machine's sleep."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 
 
 def holder_of(folder: Path) -> str:

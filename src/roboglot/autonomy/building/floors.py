@@ -25,11 +25,11 @@ from roboglot.model.components.mapping.floors import Floors, RideStage
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
-from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
+from roboglot.model.components.motion.navigation import NavigationOptions
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.errors import Blocked, Expired, InvalidGoal, Refused, RobotError
 from roboglot.model.events import FloorReached, MapReplaced, PoseJumped
-from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
+from roboglot.model.geometry import STILL, Pose, Twist, bounded, wrap_angle
 from roboglot.model.robot import Robot
 
 COMES_MAX = 180.0  # s to wait for the lift
@@ -124,7 +124,7 @@ class LiftFloors(Floors):
         place = await self._course.waiting_place(here.point, [(line, reach)])
         if place is not None:
             with contextlib.suppress(RobotError):  # it is for others: the ride does not depend on it
-                await self.navigation.drive(action, Goal((place,), NavigationOptions(tolerance=0.2)), _unheard)
+                await self.navigation.drive(action, Goal((place,), NavigationOptions(tolerance=0.2)))
 
     async def _go(self, action: Action, floor: int, redraw: bool, mine: Turn) -> None:
         """Ride to ``floor`` from the floor here, or from the car. Raises what its steps do."""
@@ -133,7 +133,7 @@ class LiftFloors(Floors):
         lift, belief = self.robot[LiftClient], self.belief
         while not mine.aboard:
             action.report(RideStage.APPROACHING)
-            await self.navigation.drive(action, Goal((waiting.point,), NavigationOptions(yaw=waiting.yaw)), _unheard)
+            await self.navigation.drive(action, Goal((waiting.point,), NavigationOptions(yaw=waiting.yaw)))
             action.report(RideStage.CALLING)
             await self._comes(self._current)
             await mine.may_board()
@@ -232,8 +232,8 @@ class LiftFloors(Floors):
             if backwards and self._is_aboard and robot[LiftClient].state.floor != self._current:
                 raise Refused("the lift left with the robot in it")
             speed = min(SPEED, GAIN * left) if self._room(way) > ROOM else 0.0
-            lean = max(-LEAN_MAX, min(LEAN_MAX, -LEAN * seen.y * way))
-            turn = max(-TURN_RATE, min(TURN_RATE, TURN_GAIN * wrap_angle(lean - seen.yaw)))
+            lean = bounded(-LEAN * seen.y * way, LEAN_MAX)
+            turn = bounded(TURN_GAIN * wrap_angle(lean - seen.yaw), TURN_RATE)
             base.set_velocity(Twist(way * speed, 0.0, turn))
             await clock.sleep(PERIOD)
         base.set_velocity(STILL)
@@ -299,7 +299,3 @@ class LiftFloors(Floors):
         if redraw and MapAnnotations in robot and drawn != new.drawn:
             kept = new.drawn
             await robot[MapAnnotations].change(lambda _: kept)
-
-
-def _unheard(_: NavigationFeedback) -> None:
-    """Ignore the feedback of navigation: a ride reports its own stages."""

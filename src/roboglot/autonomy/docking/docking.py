@@ -21,11 +21,11 @@ from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import BEFORE_DOCK, Docking
-from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
+from roboglot.model.components.motion.navigation import NavigationOptions
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, DockNotFound, InvalidGoal, Unreachable
 from roboglot.model.events import DockContactChanged, ScanTaken
-from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
+from roboglot.model.geometry import STILL, Pose, Twist, bounded, wrap_angle
 from roboglot.model.robot import Robot
 
 APPROACH_SPEED, CONTACT_SPEED = 0.2, 0.04  # m/s far from and near the contacts; the emergency brake permits the second
@@ -154,7 +154,7 @@ class RearDocking(Docking):
 
     async def _approach(self, action: Action, home: Pose) -> None:
         staging = home.compose(Pose(BEFORE_DOCK))
-        await self._navigation.drive(action, Goal((staging.point,), NavigationOptions(yaw=home.yaw)), _unheard)
+        await self._navigation.drive(action, Goal((staging.point,), NavigationOptions(yaw=home.yaw)))
 
     async def _look(self, home: Pose) -> Pose | None:
         """Return base_link's docked pose (map) by the lidar's scans near ``home``; None if they show no dock."""
@@ -194,23 +194,15 @@ class RearDocking(Docking):
             if seen.x < -OVERRUN or clock.time() - closest_at > STUCK_SECONDS:
                 return
             speed = APPROACH_SPEED if seen.x > SLOW_FROM else CONTACT_SPEED
-            side = _within(SIDE_SPEED, -SIDE_GAIN * seen.y)
-            turn = _within(TURN_RATE, -TURN_GAIN * wrap_angle(seen.yaw))
+            side = bounded(-SIDE_GAIN * seen.y, SIDE_SPEED)
+            turn = bounded(-TURN_GAIN * wrap_angle(seen.yaw), TURN_RATE)
             if not base.limits.holonomic:
                 # In reverse, the heading steers towards the axis; near the contacts it is only straightened.
-                lean = _within(LEAN_MAX, LEAN * seen.y) if seen.x > SLOW_FROM / 2 else 0.0
-                base.set_velocity(Twist(-speed, 0.0, _within(TURN_RATE, TURN_GAIN * (lean - wrap_angle(seen.yaw)))))
+                lean = bounded(LEAN * seen.y, LEAN_MAX) if seen.x > SLOW_FROM / 2 else 0.0
+                base.set_velocity(Twist(-speed, 0.0, bounded(TURN_GAIN * (lean - wrap_angle(seen.yaw)), TURN_RATE)))
                 await clock.sleep(PERIOD)
                 continue
             # The correction is in the dock's frame, which differs from the robot's by a small yaw.
             c, s = math.cos(seen.yaw), math.sin(seen.yaw)
             base.set_velocity(Twist(-c * speed + s * side, s * speed + c * side, turn))
             await clock.sleep(PERIOD)
-
-
-def _within(limit: float, value: float) -> float:
-    return max(-limit, min(limit, value))
-
-
-def _unheard(_: NavigationFeedback) -> None:
-    """Ignore the feedback of navigation: docking reports its own stages."""

@@ -12,11 +12,11 @@ from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.jack import Jack, JackStage
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
+from roboglot.model.components.motion.navigation import NavigationOptions
 from roboglot.model.components.motion.tag_docking import Mark, MarkGoal, TagDocking
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, RobotError, Unreachable
-from roboglot.model.geometry import STILL, Point, Pose, Twist, wrap_angle
+from roboglot.model.geometry import STILL, Point, Pose, Twist, bounded, wrap_angle
 from roboglot.model.robot import Robot
 
 SPEED, CREEP = 0.2, 0.045  # m/s on the way, and where emergency braking allows only creeping
@@ -108,7 +108,7 @@ class MarkDocking(TagDocking):
     async def _dock(self, action: Action, goal: MarkGoal) -> None:
         action.report("approaching")
         options = NavigationOptions(yaw=wrap_angle(goal.start.yaw))
-        await self._navigation.drive(action, Goal((goal.start.point,), options), _unheard)
+        await self._navigation.drive(action, Goal((goal.start.point,), options))
         watch = MarkWatch(self._robot, goal)
         async with watch.open():
             action.report("looking")
@@ -166,8 +166,8 @@ class MarkDocking(TagDocking):
             elif clock.time() - closest_at > STUCK_SECONDS:
                 raise Blocked("something holds the robot before the mark")
             # In reverse, ``yaw`` is that of the rear, so the robot moves where it points, as when driving forward.
-            lean = _within(LEAN_MAX, -LEAN * seen.y * (1.0 if left > SLOW_FROM else left / SLOW_FROM))
-            turn = _within(TURN_RATE, TURN_GAIN * wrap_angle(lean - yaw))
+            lean = bounded(-LEAN * seen.y * (1.0 if left > SLOW_FROM else left / SLOW_FROM), LEAN_MAX)
+            turn = bounded(TURN_GAIN * wrap_angle(lean - yaw), TURN_RATE)
             base.set_velocity(Twist(way * (SPEED if left > SLOW_FROM else CREEP), 0.0, turn))
             await clock.sleep(PERIOD)
 
@@ -190,8 +190,8 @@ class MarkDocking(TagDocking):
                 farthest, farthest_at = sign * seen.x, clock.time()
             elif clock.time() - farthest_at > STUCK_SECONDS:
                 raise Blocked("something holds the robot before the mark")
-            lean = _within(LEAN_MAX, -sign * LEAN * seen.y)
-            turn = _within(TURN_RATE, TURN_GAIN * wrap_angle(lean - seen.yaw))
+            lean = bounded(-sign * LEAN * seen.y, LEAN_MAX)
+            turn = bounded(TURN_GAIN * wrap_angle(lean - seen.yaw), TURN_RATE)
             base.set_velocity(Twist(sign * (CREEP if farthest < SLOW_FROM / 2 else SPEED), 0.0, turn))
             await clock.sleep(PERIOD)
 
@@ -219,11 +219,3 @@ class MarkDocking(TagDocking):
             raise moving.error.again()
         if up and not jack.loaded:
             raise NotFound("the jack met no shelf")
-
-
-def _within(limit: float, value: float) -> float:
-    return max(-limit, min(limit, value))
-
-
-def _unheard(_: NavigationFeedback) -> None:
-    """Ignore the feedback of navigation: docking reports its own stages."""

@@ -18,7 +18,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.sensing.ultra_wideband import TagReading, UltraWideband
 from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.errors import NotFound
-from roboglot.model.geometry import STILL, Point, Pose, Twist
+from roboglot.model.geometry import STILL, Point, Pose, Twist, bounded
 from roboglot.model.perception import PersonSeen, Sighting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
@@ -201,9 +201,9 @@ class SightFollowing(Following):
             goal = Point(quarry.place.x + distance * math.cos(out), quarry.place.y + distance * math.sin(out))
         left = here.point.distance_to(goal)
         if hidden and left < ROUND_THE_CORNER:
-            return Twist(yaw=_within(TURN_RATE, TURN_GAIN * math.remainder(quarry.course - here.yaw, math.tau))), True
+            return Twist(yaw=bounded(TURN_GAIN * math.remainder(quarry.course - here.yaw, math.tau), TURN_RATE)), True
         if left < CLOSE or (side is FollowSide.BEHIND and here.point.distance_to(quarry.place) < distance):
-            return Twist(yaw=_within(TURN_RATE, TURN_GAIN * bearing)), True
+            return Twist(yaw=bounded(TURN_GAIN * bearing, TURN_RATE)), True
         scan = self._robot[Lidar].scan
         heading = math.remainder(here.point.bearing_to(goal) - here.yaw, math.tau)
         if scan is None or not sees(scan, heading):
@@ -217,7 +217,7 @@ class SightFollowing(Following):
     def _step_back(self, bearing: float, seen: Points) -> Twist:
         """Return the velocity that faces a person too near for the camera and backs away."""
         behind = room(seen, self._robot.description.radius, math.pi)
-        turn = _within(TURN_RATE, TURN_GAIN * bearing)
+        turn = bounded(TURN_GAIN * bearing, TURN_RATE)
         return Twist(-BACK if behind > GAP + BACK and abs(bearing) < BACK_BEARING else 0.0, 0.0, turn)
 
     def _way(self, quarry: _Quarry, here: Pose, seen: Points, heading: float, left: float) -> tuple[float, float, bool]:
@@ -238,14 +238,10 @@ class SightFollowing(Following):
 
     def _towards(self, heading: float, left: float, facing: float, seen: Points) -> tuple[Twist, bool]:
         """Return the velocity towards ``heading`` within the free room, turning to ``facing``, and if there is room."""
-        turn = _within(TURN_RATE, TURN_GAIN * facing)
+        turn = bounded(TURN_GAIN * facing, TURN_RATE)
         free = room(seen, self._robot.description.radius, heading)
         speed = min(SPEED, GAIN * left, math.sqrt(2.0 * BRAKING * max(0.0, free - GAP)))
         if self._robot[Base].limits.holonomic:
             return Twist(speed * math.cos(heading), speed * math.sin(heading), turn), free > GAP
-        turn = _within(TURN_RATE, TURN_GAIN * heading)
+        turn = bounded(TURN_GAIN * heading, TURN_RATE)
         return Twist(speed * max(0.0, math.cos(heading)) ** 2, 0.0, turn), free > GAP
-
-
-def _within(limit: float, value: float) -> float:
-    return max(-limit, min(limit, value))

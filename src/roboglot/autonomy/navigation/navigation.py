@@ -50,13 +50,13 @@ class GridNavigation(Navigation):
         self,
         action: Action,
         goal: Goal,
-        report: Callable[[NavigationFeedback], None],
+        report: Callable[[NavigationFeedback], None] | None = None,
         journey: Journey | None = None,
     ) -> None:
         """Drive to the goals, with retries, within an action that holds the base. Raises Blocked, Unreachable.
 
-        ``journey`` counts the goals passed, even if the drive fails. The action is aborted if the map is replaced: on
-        another map the goals are elsewhere.
+        ``report`` gets the progress; None for actions that report their own. ``journey`` counts the goals passed, even
+        if the drive fails. The action is aborted if the map is replaced: on another map the goals are elsewhere.
         """
 
         def check_map(event: MapReplaced) -> None:
@@ -65,7 +65,7 @@ class GridNavigation(Navigation):
 
         end_watch = self._robot.events.listen(MapReplaced, check_map)
         try:
-            await self._drive(action, goal, report, journey or Journey())
+            await self._drive(action, goal, report or _unheard, journey or Journey())
         finally:
             end_watch()
 
@@ -131,6 +131,10 @@ class GridNavigation(Navigation):
             return (await self._course.plan(start, (goal,), NavigationOptions(tolerance=NEAR))).length
         except Unreachable:
             return math.inf
+
+
+def _unheard(_: NavigationFeedback) -> None:
+    """Ignore the progress of a drive."""
 
 
 def _checked(goals: Sequence[Point], options: NavigationOptions) -> Goal:

@@ -78,7 +78,7 @@ class Hypotheses:
         """Keep the places that are in ``found``, too; return the place if only one is left, else None."""
         step = odometry.relative_to(self.odometry)
         expected = [place.pose.compose(step) for place in self.places]
-        left = [match for match in found if any(_is_same(match.pose, pose) for pose in expected)]
+        left = [match for match in found if any(match.pose.is_near(pose, SAME, SAME_YAW) for pose in expected)]
         known, self.odometry = self.complete, odometry
         if not known or not left:  # the first scan, or all candidates were wrong
             left, known = list(found), False
@@ -137,7 +137,3 @@ def open_way(scan: ScanPoints, radius: float) -> Pose | None:
         if free >= STEP_MIN and worth > best:
             best, way = worth, Pose(free, 0.0, yaw)
     return way
-
-
-def _is_same(one: Pose, other: Pose) -> bool:
-    return one.distance_to(other) < SAME and abs(wrap_angle(one.yaw - other.yaw)) < SAME_YAW

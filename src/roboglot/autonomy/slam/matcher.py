@@ -181,7 +181,7 @@ def places(
             alike = candidates
     if not alike:
         return []
-    expected = region is not None or (known is not None and _is_same(alike[0].match.pose, known))
+    expected = region is not None or (known is not None and alike[0].match.pose.is_near(known, SAME, SAME_YAW))
     sure = len(alike) > 1 or expected or alike[0].look.is_sure(alike[0].match.sigma)
     return [one.match for one in alike] if sure else []
 
@@ -229,7 +229,7 @@ def _candidates(grid: EvidenceGrid, scan: ScanPoints, region: Region | None, mos
         rough = Pose(corner.x + (col + 0.5) * RESOLUTION, corner.y + (row + 0.5) * RESOLUTION, yaw)
         best = fit(grid, scan, rough, FREE)
         here = Candidate(best, supported(grid, scan, best.pose), look_at(grid, scan, best.pose))
-        if here.is_place and not any(_is_same(best.pose, other.match.pose) for other in found):
+        if here.is_place and not any(best.pose.is_near(other.match.pose, SAME, SAME_YAW) for other in found):
             found.append(here)
     return sorted(found, key=lambda one: -one.match.fit), score == 0
 
@@ -249,7 +249,3 @@ def _floor(grid: EvidenceGrid, region: Region | None) -> NDArray[np.uint8]:
         )
         floor[:row0], floor[row1:], floor[:, :col0], floor[:, col1:] = 0, 0, 0, 0
     return floor
-
-
-def _is_same(one: Pose, other: Pose) -> bool:
-    return one.distance_to(other) < SAME and abs(wrap_angle(one.yaw - other.yaw)) < SAME_YAW

@@ -21,7 +21,7 @@ from roboglot.model.components.motion.stair_alignment import (
 )
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Expired, NotFound
-from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
+from roboglot.model.geometry import STILL, Pose, Twist, bounded, wrap_angle
 from roboglot.model.robot import Robot
 
 BEFORE = 0.3  # m between the hull's circle and the edge
@@ -110,7 +110,7 @@ class _Approach:
                 self._brake()
             else:
                 speed = min(SPEED, GAIN * away) / max(away, 1e-9)
-                turn = max(-TURN_RATE, min(TURN_RATE, TURN_GAIN * left.yaw))
+                turn = bounded(TURN_GAIN * left.yaw, TURN_RATE)
                 self._base.set_velocity(Twist(speed * left.x, speed * left.y, turn))
             await self._clock.sleep(PERIOD)
 

@@ -36,6 +36,7 @@ def command(
     from roboglot.recording.comparing.masks import Mask, read_mask
     from roboglot.recording.comparing.names import Names
     from roboglot.recording.lines import Target
+    from roboglot.recording.probing import first_of
     from roboglot.recording.reader import read_recording
     from roboglot.recording.replaying import Replay, sendable
 
@@ -45,7 +46,7 @@ def command(
         used = read_mask(mask) if mask else Mask()
         live = asyncio.run(Replay(recorded, target, RealClock(), fast=fast).run())
     except* (OSError, ValueError, ClientError) as errors:
-        sys.exit(f"roboglot replay: {in_words(_first(errors))}")
+        sys.exit(f"roboglot replay: {in_words(first_of(errors))}")
     if withheld:
         print(f"{withheld} requests are not sent, because they contain [redacted]", file=sys.stderr)
     comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast, names=Names())
@@ -58,10 +59,3 @@ def command(
         sys.exit(f"roboglot replay: {in_words(error)}")
     print(reports.table(comparison))
     sys.exit(comparison.fidelity * 100 < at_least)
-
-
-def _first(errors: BaseExceptionGroup[BaseException]) -> BaseException:
-    found: BaseException = errors
-    while isinstance(found, BaseExceptionGroup):
-        found = found.exceptions[0]
-    return found

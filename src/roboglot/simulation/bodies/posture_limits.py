@@ -10,7 +10,7 @@ from roboglot.model.components.motion.feet import FOOTFALL_SECONDS_MIN, FOOTFALL
 from roboglot.model.components.motion.gaits import FOOT_LIFT_MAX
 from roboglot.model.components.motion.legs import STEPS_MAX, BodyPose, LegLimits, Step, check_lift, check_pose
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.geometry import STILL, Orientation, Point, Twist
+from roboglot.model.geometry import STILL, Orientation, Point, Twist, bounded
 from roboglot.simulation.bodies.performing import Body
 
 STEP_SECONDS_MAX = 60.0
@@ -20,15 +20,11 @@ TAUT, GIVING = 3.0, 0.05  # N of a pull that it notices, and m/s by which it yie
 
 def added(now: Body, by: BodyPose, limits: LegLimits) -> BodyPose:
     """Return the sum of the current pose and ``by``, within the limits."""
-
-    def cut(value: float, most: float) -> float:
-        return max(-most, min(most, value))
-
     a, b = now.attitude, by.attitude
     return BodyPose(
         None if by.height is None else max(limits.lowest, min(limits.highest, now.height + by.height)),
-        Orientation(*(cut(x + y, limits.angle) for x, y in ((a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)))),
-        Point(cut(now.shift.x + by.shift.x, limits.shift), cut(now.shift.y + by.shift.y, limits.shift)),
+        Orientation(*(bounded(x + y, limits.angle) for x, y in ((a.roll, b.roll), (a.pitch, b.pitch), (a.yaw, b.yaw)))),
+        Point(bounded(now.shift.x + by.shift.x, limits.shift), bounded(now.shift.y + by.shift.y, limits.shift)),
     )
 
 

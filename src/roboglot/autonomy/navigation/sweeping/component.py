@@ -16,7 +16,7 @@ from roboglot.autonomy.navigation.sweeping.swept import Swept
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.annotations import Area, AreaKind
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.motion.navigation import NavigationFeedback, NavigationOptions
+from roboglot.model.components.motion.navigation import NavigationOptions
 from roboglot.model.components.motion.sweeping import Sweeping
 from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
 from roboglot.model.geometry import Point
@@ -94,11 +94,7 @@ class LaneSweeping(Sweeping):
             journey = Journey()
             try:
                 goal = Goal(tuple(points), NavigationOptions(tolerance=TOLERANCE), straight=True)
-                await self._navigation.drive(action, goal, _unheard, journey)
+                await self._navigation.drive(action, goal, journey=journey)
                 at += LANES_AT_ONCE
             except (Unreachable, Blocked):
                 at += journey.passed // 2 + 1
-
-
-def _unheard(_: NavigationFeedback) -> None:
-    """Ignore the feedback of navigation: sweeping reports its own progress."""

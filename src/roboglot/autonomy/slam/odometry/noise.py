@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.components.sensing.odometry import OdometryNoise
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Pose, bounded
 from roboglot.values import dataclass
 
 RISE, FALL = 0.2, 0.02  # weight of a surprise, of a confirmation
@@ -148,7 +148,7 @@ class LearntBias:
         """Continue from ``kept`` values; others than finite numbers are ignored."""
         for name in ("turn", *SCALES):
             if (value := _number(kept.get(name))) is not None:
-                setattr(self, name, _bounded(value, TURN_BIAS_MAX if name == "turn" else SCALE_BIAS_MAX))
+                setattr(self, name, bounded(value, TURN_BIAS_MAX if name == "turn" else SCALE_BIAS_MAX))
         for name in SCALES:
             if (doubt := _number(kept.get(f"{name}_doubt"))) is not None:
                 self._unknown[name] = min(max(doubt, SCALE_KEPT), SCALE_UNKNOWN) ** 2
@@ -170,26 +170,22 @@ class LearntBias:
     def learn(self, moved: Pose, seconds: float, correction: Pose, seen: tuple[float, float], doubt: Doubt) -> None:
         """Learn from a match's ``correction`` (base_link); ``seen``: shares along x and y that come from the scan."""
         if abs(correction.yaw) < LEARNT_TURN_MAX:
-            self.turn = _bounded(self.turn + self._share("turn", correction.yaw, seconds, doubt.yaw), TURN_BIAS_MAX)
+            self.turn = bounded(self.turn + self._share("turn", correction.yaw, seconds, doubt.yaw), TURN_BIAS_MAX)
         if math.hypot(correction.x, correction.y) > LEARNT_WAY_MAX:
             return
         turned = Pose(yaw=moved.yaw).compose(Pose(correction.x, correction.y))
         if abs(moved.x) > LEARNT_WAY_MIN and seen[0] > LEARNT_MIN:
             learnt = self._share("scale_x", turned.x, moved.x, doubt.way)
-            self.scale_x = _bounded(self.scale_x + learnt, SCALE_BIAS_MAX)
+            self.scale_x = bounded(self.scale_x + learnt, SCALE_BIAS_MAX)
         if abs(moved.y) > LEARNT_WAY_MIN and seen[1] > LEARNT_MIN:
             learnt = self._share("scale_y", turned.y, moved.y, doubt.way)
-            self.scale_y = _bounded(self.scale_y + learnt, SCALE_BIAS_MAX)
+            self.scale_y = bounded(self.scale_y + learnt, SCALE_BIAS_MAX)
 
     def _share(self, name: str, correction: float, step: float, doubt: float) -> float:
         """Return the learnt part of a correction after a step (s or m), and reduce its uncertainty."""
         gain = self._unknown[name] / (self._unknown[name] + doubt / step**2)
         self._unknown[name] *= 1.0 - gain
         return max(gain, BIAS_GAIN) * correction / step
-
-
-def _bounded(value: float, most: float) -> float:
-    return max(-most, min(most, value))
 
 
 def _number(value: object) -> float | None:

@@ -14,7 +14,7 @@ from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.gimbal import GIMBAL, FollowMode, Gimbal, GimbalAngles, GimbalFrame, GimbalLimits
 from roboglot.model.errors import InvalidGoal, Refused
-from roboglot.model.geometry import wrap_angle
+from roboglot.model.geometry import bounded, wrap_angle
 from roboglot.model.robot import Robot
 
 GOOD = math.radians(1.0)
@@ -88,7 +88,7 @@ class RoboMasterGimbal(Gimbal):
         if not (math.isfinite(pitch) and math.isfinite(yaw)):
             raise InvalidGoal("a speed must be finite")
         top = self.limits.speed
-        pitch, yaw = max(-top, min(top, pitch)), max(-top, min(top, yaw))
+        pitch, yaw = bounded(pitch, top), bounded(yaw, top)
 
         async def turn() -> None:
             await self._client.gimbal.speed(-math.degrees(pitch), -math.degrees(yaw))

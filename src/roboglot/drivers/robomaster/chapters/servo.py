@@ -11,7 +11,7 @@ from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.servo import Servos, servo_resource
 from roboglot.model.errors import InvalidGoal, NotFound
-from roboglot.model.geometry import wrap_angle
+from roboglot.model.geometry import bounded, wrap_angle
 from roboglot.model.robot import Robot
 
 COUNT_MAX = 3
@@ -65,7 +65,7 @@ class RoboMasterServos(Servos):
         self._index(number)
         if not math.isfinite(speed):
             raise InvalidGoal("a speed must be finite")
-        cut = max(-self.speed, min(self.speed, speed))
+        cut = bounded(speed, self.speed)
 
         async def run() -> None:
             await self._client.servo.speed(number, round(math.degrees(cut), 3))

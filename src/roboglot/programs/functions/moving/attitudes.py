@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from roboglot.model.components.motion.legs import BodyPose, LegLimits, Legs
-from roboglot.model.geometry import Orientation, Point
+from roboglot.model.geometry import Orientation, Point, bounded
 from roboglot.programs.functions.moving.limits import LIMITS, outside
 from roboglot.programs.functions.moving.outcomes import result
 from roboglot.programs.functions.session import Session
@@ -89,8 +89,8 @@ def held(body: BodyPose, limits: LegLimits) -> BodyPose:
     turn, shift, height = body.attitude, body.shift, body.height
     return BodyPose(
         None if height is None else max(limits.lowest, min(limits.highest, height)),
-        Orientation(*(_cut(angle, limits.angle) for angle in (turn.roll, turn.pitch, turn.yaw))),
-        Point(_cut(shift.x, limits.shift), _cut(shift.y, limits.shift)),
+        Orientation(*(bounded(angle, limits.angle) for angle in (turn.roll, turn.pitch, turn.yaw))),
+        Point(bounded(shift.x, limits.shift), bounded(shift.y, limits.shift)),
     )
 
 
@@ -128,7 +128,3 @@ def _turned(point: tuple[float, float, float], by: Orientation) -> tuple[float, 
 
 def _around(a: float, b: float, angle: float) -> tuple[float, float]:
     return a * math.cos(angle) - b * math.sin(angle), a * math.sin(angle) + b * math.cos(angle)
-
-
-def _cut(value: float, most: float) -> float:
-    return max(-most, min(most, value))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.gimbal import GIMBAL, FollowMode, Gimbal, GimbalAngles, GimbalFrame, GimbalLimits
 from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.geometry import bounded
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import move
 from roboglot.simulation.bodies.hull import Hull, rotation
@@ -66,7 +67,7 @@ class SimulatedGimbal(Gimbal):
         if not (math.isfinite(pitch) and math.isfinite(yaw)):
             raise InvalidGoal("a speed must be finite")
         top = self.limits.speed
-        speeds = GimbalAngles(max(-top, min(top, pitch)), max(-top, min(top, yaw)))
+        speeds = GimbalAngles(bounded(pitch, top), bounded(yaw, top))
         action = self._turning
         if action and action.may_go_on(source) and action.status is ActionStatus.EXECUTING and not action.paused:
             action.goal = speeds

@@ -9,6 +9,7 @@ from msgspec import Struct
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.servo import Servos, servo_resource
 from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.geometry import bounded
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.axis_motors import Axis, move
 from roboglot.simulation.bodies.part import Fitting, Part
@@ -66,7 +67,7 @@ class SimulatedServos(Servos):
         index = self._index(number)
         if not math.isfinite(speed):
             raise InvalidGoal("a speed must be finite")
-        cut = float(max(-self.speed, min(self.speed, speed)))
+        cut = float(bounded(speed, self.speed))
         action = self._turning.get(index)
         if action and action.may_go_on(source) and action.status is ActionStatus.EXECUTING and not action.paused:
             action.goal = cut
