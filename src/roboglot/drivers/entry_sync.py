@@ -1,13 +1,14 @@
 """Two-way synchronisation of entries (places, drawings) between a robot and this program.
 
-Local changes made without a link are sent when it is back. If both sides changed an entry, the robot's version wins.
-The entries of both sides are merged when the program starts. Independent of the type of the entries.
+Local changes made without a link are sent when it is back. If both sides changed an entry, the robot's version wins,
+unless it was removed here and only moved there, as all are when a robot clears its map. The entries of both sides are
+merged when the program starts. Independent of the type of the entries.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Collection, Hashable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Hashable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from itertools import islice
 from typing import Generic, Protocol, TypeVar
@@ -18,6 +19,8 @@ from roboglot.model.robot import Robot
 
 T = TypeVar("T")
 ENTRIES_MAX = 10_000  # taken over from a robot
+# Keys of entries that are now elsewhere but the same otherwise, with their new keys.
+Moves = Callable[[Mapping[Hashable, T], Mapping[Hashable, T]], Mapping[Hashable, Hashable]]
 
 
 class EntryStore(Protocol[T]):
@@ -40,8 +43,9 @@ class EntrySync(Generic[T]):
         changed: type[Event],
         *,
         what: str,
+        moves: Moves[T],
     ) -> None:
-        self._supervisor, self._near, self._far, self._what = supervisor, near, far, what
+        self._supervisor, self._near, self._far, self._what, self._moves = supervisor, near, far, what, moves
         self._agreed: Mapping[Hashable, T] = {}
         self._lock = asyncio.Lock()
         self._syncing = self._due = False
@@ -53,6 +57,9 @@ class EntrySync(Generic[T]):
             self._due = False
             far, near = dict(islice((await self._far.read()).items(), ENTRIES_MAX)), await self._near.read()
             wanted = {**self._agreed, **_changes(near, self._agreed), **_changes(far, self._agreed)}
+            for old, new in self._moves(self._agreed, far).items():
+                if old not in near:
+                    wanted[new] = None
             there = {key: entry for key, entry in wanted.items() if entry is not None}
             refused: Collection[Hashable] = ()
             if there != far:
@@ -64,7 +71,8 @@ class EntrySync(Generic[T]):
             finally:
                 self._syncing = False
             now = await self._near.read()
-            self._agreed = {key: e for key, e in there.items() if now.get(key) == e and key not in refused}
+            agreed = {key: e for key, e in there.items() if now.get(key) == e and key not in refused}
+            self._agreed = {key: agreed[key] for key in {**far, **agreed} if key in agreed}  # in the robot's order
 
     @asynccontextmanager
     async def forgotten(self) -> AsyncIterator[None]:

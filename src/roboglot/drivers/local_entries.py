@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from roboglot.model.components.mapping.annotations import Annotations, Area, Line, MapAnnotations
 from roboglot.model.components.mapping.places import Places
@@ -15,7 +16,9 @@ from roboglot.model.robot import Robot
 
 log = logging.getLogger(__name__)
 Drawing = Line | Area
+Keys = Mapping[Hashable, Hashable]
 DIGITS = 3  # of a coordinate in m; smaller differences are ignored
+SAME = 0.005  # m by which distances between rounded points may differ
 
 
 class LocalPlaces:
@@ -27,6 +30,15 @@ class LocalPlaces:
     async def read(self) -> Mapping[Hashable, PointOfInterest]:
         """Return all places."""
         return {place.id: place for place in self._robot[Places].all()}
+
+    @staticmethod
+    def moves(before: Mapping[Hashable, PointOfInterest], now: Mapping[Hashable, PointOfInterest]) -> Keys:
+        """Return the ids of places that are elsewhere now and the same otherwise."""
+        return {
+            id: id
+            for id, place in before.items()
+            if (there := now.get(id)) not in (None, place) and replace(there, pose=place.pose) == place
+        }
 
     async def write(self, put: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[Hashable]:
         """Apply the changes one by one; log what fails."""
@@ -52,6 +64,17 @@ class LocalDrawings:
         now = self._robot[MapAnnotations].current
         drawings: tuple[Drawing, ...] = (*now.lines, *now.areas)
         return {key_of(bare): bare for bare in map(without_id, drawings)}
+
+    @staticmethod
+    def moves(before: Mapping[Hashable, Drawing], now: Mapping[Hashable, Drawing]) -> Keys:
+        """Return the keys of drawings before and now, of each kind that was moved as a whole, in the same order."""
+        olds, news = _by_kind(before), _by_kind(now)
+        found: dict[Hashable, Hashable] = {}
+        for kind, old in olds.items():
+            new = news.get(kind, [])
+            if len(old) == len(new) and _are_moved([before[key] for key in old], [now[key] for key in new]):
+                found |= zip(old, new, strict=True)
+        return found
 
     async def write(self, put: Sequence[Drawing], gone: Sequence[Drawing]) -> Collection[Hashable]:
         """Apply all changes at once; log a failure."""
@@ -81,6 +104,22 @@ def key_of(drawing: Drawing) -> Hashable:
     """Return the key of a drawing ``without_id``."""
     width = drawing.half_width if isinstance(drawing, Area) else None
     return drawing.kind, drawing.start, drawing.end, width, frozenset(drawing.metadata.items())
+
+
+def _by_kind(drawings: Mapping[Hashable, Drawing]) -> dict[Hashable, list[Hashable]]:
+    """Return the keys of drawings by what a move leaves as it is."""
+    found: dict[Hashable, list[Hashable]] = {}
+    for key, drawing in drawings.items():
+        width = drawing.half_width if isinstance(drawing, Area) else None
+        found.setdefault((drawing.kind, width, frozenset(drawing.metadata.items())), []).append(key)
+    return found
+
+
+def _are_moved(olds: Sequence[Drawing], news: Sequence[Drawing]) -> bool:
+    """Return whether all are as long, and as far from the one before, as they were."""
+    points = [[point for one in drawings for point in (one.start, one.end)] for drawings in (olds, news)]
+    distances = [[a.distance_to(b) for a, b in pairwise(each)] for each in points]
+    return all(abs(old - new) <= SAME for old, new in zip(*distances, strict=True))
 
 
 def _rounded(point: Point) -> Point:

@@ -164,6 +164,11 @@ async def test_labels_of_its_map_are_places_here(labelled: Robot, driven: Robot)
     await near.remove(kitchen.id)
     await labels_are(hall=Point(0.75, 0.5))
     assert list(near.all()) == [hall]
+    await near.put(replace(hall, metadata={"display_name": "lobby"}))
+    await labels_are(lobby=Point(0.75, 0.5))
+    await near.remove("hall-1")  # an id of ours, which a label has not
+    await labels_are()
+    assert list(near.all()) == []
 
 
 async def test_its_skin_shows_what_it_is_given(driven: Robot, robot: Robot) -> None:

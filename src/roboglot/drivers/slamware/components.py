@@ -42,10 +42,22 @@ class OptionalComponents:
         self._network = SlamwareNetwork(robot, client, supervisor)
         self._light = SlamwareLight(robot.clock, client, supervisor)
         self._places = EntrySync(
-            robot, supervisor, LocalPlaces(robot), SlamwarePlaces(client), PlacesChanged, what="places"
+            robot,
+            supervisor,
+            LocalPlaces(robot),
+            SlamwarePlaces(client),
+            PlacesChanged,
+            what="places",
+            moves=LocalPlaces.moves,
         )
         self._drawings = EntrySync(
-            robot, supervisor, LocalDrawings(robot), SlamwareDrawings(client), AnnotationsChanged, what="drawings"
+            robot,
+            supervisor,
+            LocalDrawings(robot),
+            SlamwareDrawings(client),
+            AnnotationsChanged,
+            what="drawings",
+            moves=LocalDrawings.moves,
         )
         self.parts: tuple[tuple[str, float, Ask], ...] = (
             ("health", 0.5, self._health.refresh),
