@@ -285,6 +285,20 @@ async def test_drive_ends_with_its_map(tour: Tour) -> None:
 
 
 @pytest.mark.world("empty")
+async def test_drive_that_waits_ends_with_its_map(tour: Tour) -> None:
+    """It waits until the drive before it has braked; meanwhile a client clears the map."""
+    tour.head_for((8.0, 5.0))
+    await tour.clock.advance(3.0)
+    drive = tour.head_for((2.0, 5.0))
+    assert drive.status is ActionStatus.ACCEPTED
+    tour.robot[Mapping].clear()
+    await tour.end_of(drive)
+    assert isinstance(drive.error, Unreachable), drive.reason
+    tour.robot[Mapping].clear()  # after its end, it has no effect
+    assert drive.status is ActionStatus.ABORTED
+
+
+@pytest.mark.world("empty")
 async def test_driving_by_hand_takes_over(tour: Tour) -> None:
     action = tour.head_for((8.5, 5.0))
     await tour.clock.advance(2.0)

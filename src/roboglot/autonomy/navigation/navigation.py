@@ -17,6 +17,7 @@ from roboglot.autonomy.navigation.journey import Journey
 from roboglot.autonomy.navigation.pilot import Pilot
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import abort_with_map
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions, check_goals
 from roboglot.model.errors import Blocked, Unreachable
 from roboglot.model.events import MapReplaced
@@ -42,9 +43,9 @@ class GridNavigation(Navigation):
         self._course.check_available()
 
         async def run(action: Action) -> None:
-            await self.drive(action, goal, action.report)
+            await self._drive(action, goal, action.report, Journey())
 
-        return start_on_base(self._robot, "navigate to", run, goal=goal, source=source)
+        return abort_with_map(self._robot, start_on_base(self._robot, "navigate to", run, goal=goal, source=source))
 
     async def drive(
         self,

@@ -46,6 +46,17 @@ async def finish(client: httpx.AsyncClient, forward: Forward, id: int, *, within
     raise AssertionError(f"action {id} has not ended within {within} s")
 
 
+async def test_errand_that_waits_ends_with_its_map(client: httpx.AsyncClient, forward: Forward) -> None:
+    """It waits until the one before has braked; on the new map, its goal is elsewhere."""
+    await forward(seconds=1)
+    for x in (3.0, 1.0):
+        id = await start(client, "MultiFloorMoveAction", target={"pose": {"x": x, "y": 1.0, "yaw": 0.0}})
+        await forward(seconds=2 if x == 3.0 else 0)
+    assert (await client.delete("/api/core/slam/v1/maps")).status_code == 200
+    ended = await finish(client, forward, id, within=30.0)
+    assert (ended["result"], ended["reason"]) == (-1, "CANNOT_REACH_TARGET")
+
+
 async def test_going_home_without_docking_ends_at_landing_point(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:

@@ -16,6 +16,7 @@ from roboglot.autonomy.navigation.sweeping.swept import Swept
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.annotations import Area, AreaKind
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import abort_with_map
 from roboglot.model.components.motion.navigation import NavigationOptions
 from roboglot.model.components.motion.sweeping import Sweeping
 from roboglot.model.errors import Blocked, InvalidGoal, Unreachable
@@ -42,7 +43,7 @@ class LaneSweeping(Sweeping):
         async def run(action: Action) -> None:
             await self._run(action, await self._ways(wanted, apart))
 
-        return start_on_base(self._robot, "sweep", run, goal=wanted, source=source)
+        return abort_with_map(self._robot, start_on_base(self._robot, "sweep", run, goal=wanted, source=source))
 
     async def lanes(self, areas: Sequence[Area] = (), *, width: float | None = None) -> Sequence[Sequence[Point]]:
         return await self._ways(*self._checked(areas, width))

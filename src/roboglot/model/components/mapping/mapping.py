@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
+from roboglot.model.action import Action, ActionStatus
 from roboglot.model.components.component import Component
-from roboglot.model.geometry import Point, Pose
+from roboglot.model.errors import Unreachable
+from roboglot.model.events import ActionChanged, MapReplaced
+from roboglot.model.geometry import ORIGIN, Point, Pose
 from roboglot.model.maps import OccupancyGrid
+from roboglot.model.robot import Robot
 
 
 class Mapping(Component):
@@ -58,3 +62,22 @@ class Mapping(Component):
 
         InvalidGoal beyond 10 km. Publishes ``MapReplaced``.
         """
+
+
+def abort_with_map(robot: Robot, action: Action, until: ActionStatus = ActionStatus.SUCCEEDED) -> Action:
+    """Abort ``action``, whose goal is a place on the present map, if that is replaced: there, the goal is elsewhere.
+
+    From now on, as it may wait for another to brake, ``until`` it has this status or has ended. Returns the action.
+    """
+
+    def check_map(event: MapReplaced) -> None:
+        if event.origin != ORIGIN:
+            action.abort(Unreachable("the map was replaced, and with it the goal's place"))
+
+    def check_end(event: ActionChanged) -> None:
+        if event.action is action and (action.status.ended or action.status is until):
+            for leave in leaves:
+                leave()
+
+    leaves = [robot.events.listen(MapReplaced, check_map), robot.events.listen(ActionChanged, check_end)]
+    return action

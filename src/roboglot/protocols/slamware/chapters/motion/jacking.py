@@ -6,6 +6,7 @@ import msgspec
 
 from roboglot.model.actions import Action
 from roboglot.model.components.logistics.jack import Jack, JackStage
+from roboglot.model.components.mapping.mapping import abort_with_map
 from roboglot.model.components.motion.base import Base
 from roboglot.model.errors import InvalidGoal
 from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
@@ -43,4 +44,4 @@ def carry(context: Context, options: JackTopMoveToOptions) -> Action:
             await errand.do(robot[Jack].raise_platform(source=PART))
         await errand.do(navigate(robot, goals, how, source=PART))
 
-    return run_errand(robot, "carry", work, tuple(goals))
+    return abort_with_map(robot, run_errand(robot, "carry", work, tuple(goals)))

@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from roboglot.model.actions import Action
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import abort_with_map
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import Blocked, InvalidGoal, NotFound, RobotError, Unreachable
@@ -63,7 +64,8 @@ def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action
         yaw = pose.yaw if how.has("with_yaw") and how.yaw is None else None
         await errand.do(navigate(errand.robot, [pose.point], how, source=PART, yaw=yaw))
 
-    return run_errand(context.robot, "move to a floor", work, target)
+    action = run_errand(context.robot, "move to a floor", work, target)
+    return action if target.poi_name else abort_with_map(context.robot, action, ActionStatus.EXECUTING)
 
 
 def multi_floor_back_home(context: Context, options: GoHomeOptions) -> Action:
