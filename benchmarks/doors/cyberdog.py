@@ -18,7 +18,7 @@ from typing import Any
 
 import grpc
 from _claim import Claims
-from _serving import ROUNDS, cpu_seconds, idle_share
+from _serving import cpu_seconds, idle_share
 
 from roboglot.clients.cyberdog import Certificates, CyberDogClient
 from roboglot.protocols.cyberdog.certificates import ensure_certificates
@@ -32,7 +32,7 @@ ADDRESS, ECHO = "127.0.0.176", "127.0.0.177:50052"
 APP_PORT = 18983  # not the default, which another robot's app may use
 WAIT_MAX, RUN_MAX = 60.0, 300.0  # s: for one step, for all
 SECONDS = 6.0
-TURN = 2.5  # s of one turn
+ROUNDS, TURN = 25, 1.0  # s of one turn
 AT_ONCE = 64  # requests under way
 GEAR = 8013  # a request that reads one value
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cyberdog_video.py"
@@ -70,7 +70,7 @@ def wait_until_idle(robot: ServedRobot) -> None:
             return
 
 
-async def rate(target: str, proof: Certificates, pid: int, idle: float = 0.0) -> float:
+async def rate(proof: Certificates, target: str, pid: int, idle: float) -> float:
     """Requests a second of the server's processor time, with AT_ONCE under way."""
     credentials = grpc.ssl_channel_credentials(proof.ca, proof.key, proof.certificate)
     async with grpc.aio.secure_channel(target, credentials, options=client_options(ROBOT_NAME)) as channel:
@@ -147,15 +147,17 @@ async def run(robot: ServedRobot, folder: Path, claims: Claims) -> None:
     process.start()
     own, idle, pairs = robot.process.pid, await asyncio.to_thread(idle_share, robot.process.pid), []
     try:
-        for _ in range(ROUNDS):
-            bare = await rate(ECHO, proof, process.pid or 0)
-            pairs.append((bare, await rate(f"{ADDRESS}:50052", proof, own, idle)))
+        servers = {"bare": (ECHO, process.pid or 0, 0.0), "ours": (f"{ADDRESS}:50052", own, idle)}
+        for number in range(ROUNDS):  # the machine's speed changes: short turns, each server first in every other round
+            turn = {name: await rate(proof, *servers[name]) for name in sorted(servers, reverse=number % 2 == 1)}
+            pairs.append((turn["bare"], turn["ours"]))
     finally:
         process.kill()
         process.join(WAIT_MAX)
-    print("a core second, bare and ours:", ", ".join(f"{bare:.0f} {ours:.0f}" for bare, ours in pairs))
+    shares = sorted(ours / bare for bare, ours in pairs)
+    print("shares of the bare echo, by round:", " ".join(f"{share:.2f}" for share in shares))
     claims.at_least("short sendMsg a core second", statistics.median(ours for _, ours in pairs), 3000, "/s")
-    claims.at_least("share of the bare echo", statistics.median(ours / bare for bare, ours in pairs), 0.9, "")
+    claims.at_least("share of the bare echo", statistics.median(shares), 0.9, "")
     await video(robot, proof, claims)
 
 
