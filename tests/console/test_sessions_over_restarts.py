@@ -191,7 +191,7 @@ async def test_robots_locked_in_a_class_that_is_over(tmp_path: Path) -> None:
         await signed(shown, name="Anna", code=code)
         await asyncio.to_thread(lesson, shown.url, teacher, do="lock")
         assert shown.robot[Lease].taken_by
-    [file] = tmp_path.rglob("lesson.json")  # noqa: ASYNC240 - small
+    [file] = tmp_path.rglob("open_class.json")  # noqa: ASYNC240 - small
     file.write_text(json.dumps(json.loads(file.read_text()) | {"until": 1.0}))
     async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
         teacher = f"roboglot-{shown.url.rpartition(':')[2]}={teacher.partition('=')[2]}"

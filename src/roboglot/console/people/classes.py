@@ -19,7 +19,7 @@ from roboglot.console.desk import Desk
 from roboglot.console.http import Problem
 from roboglot.console.people.sessions import Session
 from roboglot.console.studio import class_requests, classroom
-from roboglot.console.studio.class_files import KeptLesson, LessonFile
+from roboglot.console.studio.class_files import KeptClass, OpenClassFile
 from roboglot.control.lease_server import LEASE
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, Right
@@ -63,7 +63,7 @@ class Elsewhere:
 
 
 @dataclass(slots=True)
-class Lesson:
+class OpenClass:
     """A class that is open."""
 
     code: str
@@ -89,10 +89,10 @@ class Classes:
     ) -> None:
         self._desk, self._room, self._stop = desk, room, stop
         self._present, self._put_out, self._now = present, put_out, now or SteadyTime()
-        self._file = LessonFile(desk.studio.classes) if desk.studio.classes is not None else None
+        self._file = OpenClassFile(desk.studio.classes) if desk.studio.classes is not None else None
         self._writing = asyncio.Lock()
-        self._lesson = self._restored()
-        self._studio: dict[str, Lesson] = {}  # classes opened in the studio, in this world or another
+        self._current = self._restored()
+        self._studio: dict[str, OpenClass] = {}  # classes opened in the studio, in this world or another
 
     # -- pupils --
 
@@ -102,21 +102,21 @@ class Classes:
         Raises Problem.
         """
         name = name.strip()
-        lesson = self._lesson
-        if lesson is None or not secrets.compare_digest(code.strip().upper().encode(), lesson.code.encode()):
-            lesson = None
-        elif lesson.until < self._now():
+        class_ = self._current
+        if class_ is None or not secrets.compare_digest(code.strip().upper().encode(), class_.code.encode()):
+            class_ = None
+        elif class_.until < self._now():
             raise Problem(401, "this class is over")
         if not 0 < len(name) <= NAME_MAX or not name.isprintable() or set(name) & set(":@"):
             raise Problem(400, f"a name has 1 to {NAME_MAX} characters, without : and @")
         name = name.replace(" ", "-")
-        if lesson is None:
+        if class_ is None:
             place = await self._admit(code, name)
             if place.page:
                 return Elsewhere(place.page, place.code, name)
-            lesson = self._studio.setdefault(place.code, Lesson(place.code, "", 0.0))
-            lesson.until = self._now() + place.seconds
-        return await self._seat(lesson, f"{name}@{lesson.code}")
+            class_ = self._studio.setdefault(place.code, OpenClass(place.code, "", 0.0))
+            class_.until = self._now() + place.seconds
+        return await self._seat(class_, f"{name}@{class_.code}")
 
     async def _admit(self, code: str, name: str) -> classroom.Place:
         try:
@@ -126,24 +126,24 @@ class Classes:
         except Refused as error:
             raise Problem(409, str(error)) from None
 
-    async def _seat(self, lesson: Lesson, identity: str) -> Seat:
-        if identity in lesson.seats and identity in self._present():
+    async def _seat(self, class_: OpenClass, identity: str) -> Seat:
+        if identity in class_.seats and identity in self._present():
             raise Problem(409, f"{identity.partition('@')[0]} is in the class already")
-        if identity not in lesson.seats and len(lesson.seats) >= classroom.PUPILS_MAX:
+        if identity not in class_.seats and len(class_.seats) >= classroom.PUPILS_MAX:
             raise Problem(409, f"the class has {classroom.PUPILS_MAX} pupils")
-        robot = lesson.seats[identity].robot if identity in lesson.seats else self._least_used(lesson)
+        robot = class_.seats[identity].robot if identity in class_.seats else self._least_used(class_)
         admission = self._desk.robots[robot].admission
-        proof = await admission.invite(identity, frozenset({Right.PROGRAM}), lesson.until - self._now())
-        seat = lesson.seats[identity] = Seat(identity, robot, lesson.code, proof, lesson is not self._lesson)
+        proof = await admission.invite(identity, frozenset({Right.PROGRAM}), class_.until - self._now())
+        seat = class_.seats[identity] = Seat(identity, robot, class_.code, proof, class_ is not self._current)
         self._desk.pupils.add(identity)
-        await self._save(lesson)
+        await self._save(class_)
         return seat
 
-    def _least_used(self, lesson: Lesson) -> str:
-        taken = [seat.robot for seat in lesson.seats.values()]
+    def _least_used(self, class_: OpenClass) -> str:
+        taken = [seat.robot for seat in class_.seats.values()]
         return min(self._desk.robots, key=taken.count)
 
-    def _restored(self) -> Lesson | None:
+    def _restored(self) -> OpenClass | None:
         """Return the class that was open when the program ended, with its pupils and locked robots.
 
         One that is over is left out, unless its teacher still has to unlock robots.
@@ -153,47 +153,47 @@ class Classes:
         if kept is None or (kept.until <= self._now() and not locked):
             return None
         latest = self._now() + MINUTES_MAX * 60.0  # also where the clock was set back
-        lesson = Lesson(kept.code, kept.name, min(kept.until, latest))
+        class_ = OpenClass(kept.code, kept.name, min(kept.until, latest))
         for identity, robot in kept.seats.items():
             if robot in self._desk.robots:
-                lesson.seats[identity] = Seat(identity, robot, kept.code, None, studio=False)
+                class_.seats[identity] = Seat(identity, robot, kept.code, None, studio=False)
                 self._desk.pupils.add(identity)
         self._desk.locked |= locked
-        return lesson
+        return class_
 
-    async def _save(self, changed: Lesson) -> None:
+    async def _save(self, changed: OpenClass) -> None:
         """Write the class of this console's page, if it has changed, or that there is none."""
-        if self._file is None or (self._lesson is not None and changed is not self._lesson):
+        if self._file is None or (self._current is not None and changed is not self._current):
             return
         async with self._writing:
-            now = self._lesson
+            now = self._current
             seats = {seat.identity: seat.robot for seat in now.seats.values()} if now is not None else {}
-            kept = KeptLesson(now.code, now.name, now.until, seats) if now is not None else None
+            kept = KeptClass(now.code, now.name, now.until, seats) if now is not None else None
             await asyncio.to_thread(self._file.keep, kept)
 
     def restore(self, session: Session) -> None:
         """Return a pupil, whose session outlived the program, to the class with the same robot."""
         if session.code and session.robot in self._desk.robots:
-            lesson = self._lesson if self._lesson is not None and session.code == self._lesson.code else None
-            if lesson is None:
-                lesson = self._studio.setdefault(session.code, Lesson(session.code, "", 0.0))
-            in_studio = lesson is not self._lesson
-            lesson.seats[session.name] = Seat(session.name, session.robot, session.code, None, in_studio)
+            class_ = self._current if self._current is not None and session.code == self._current.code else None
+            if class_ is None:
+                class_ = self._studio.setdefault(session.code, OpenClass(session.code, "", 0.0))
+            in_studio = class_ is not self._current
+            class_.seats[session.name] = Seat(session.name, session.robot, session.code, None, in_studio)
             self._desk.pupils.add(session.name)
 
     async def end(self, code: str) -> None:
         """End a class of the studio: release its pupils' robots."""
-        if (lesson := self._studio.pop(code, None)) is not None:
-            for seat in list(lesson.seats.values()):
-                await self._give_back(lesson, seat)
+        if (class_ := self._studio.pop(code, None)) is not None:
+            for seat in list(class_.seats.values()):
+                await self._give_back(class_, seat)
 
     # -- the teacher --
 
     def look(self) -> dict[str, object]:
         """Return the class for its teacher; empty if none is open. Raises Forbidden."""
         self.check_teacher()
-        lesson = self._lesson
-        if lesson is None:
+        class_ = self._current
+        if class_ is None:
             return {}
         present = self._present()
         pupils = [
@@ -204,10 +204,10 @@ class Classes:
                 "here": seat.identity in present,
                 "locked": seat.robot in self._desk.locked,
             }
-            for seat in lesson.seats.values()
+            for seat in class_.seats.values()
         ]
-        minutes = max(0, round((lesson.until - self._now()) / 60.0))
-        return {"code": lesson.code, "name": lesson.name, "minutes": minutes, "pupils": pupils}
+        minutes = max(0, round((class_.until - self._now()) / 60.0))
+        return {"code": class_.code, "name": class_.name, "minutes": minutes, "pupils": pupils}
 
     async def do(self, request: ClassRequest) -> dict[str, object]:
         """Carry out a teacher's request, and return the class. Raises Forbidden, NotFound, Refused."""
@@ -219,30 +219,30 @@ class Classes:
         if request.do == "open":
             await self._open(request)
             return self.look()
-        lesson = self._lesson
-        if lesson is None:
+        class_ = self._current
+        if class_ is None:
             raise NotFound("no class is open")
-        if request.pupil and request.pupil not in lesson.seats:
+        if request.pupil and request.pupil not in class_.seats:
             raise NotFound(f"there is no pupil {request.pupil!r}")
-        seats = [lesson.seats[request.pupil]] if request.pupil else list(lesson.seats.values())
+        seats = [class_.seats[request.pupil]] if request.pupil else list(class_.seats.values())
         for robot in dict.fromkeys(seat.robot for seat in seats):
             await self._do_with(request.do, robot)
         if request.do in ("give_back", "close"):
             for seat in seats:
-                await self._give_back(lesson, seat)
+                await self._give_back(class_, seat)
         if request.do == "close":
-            self._lesson = None
-            await self._save(lesson)
+            self._current = None
+            await self._save(class_)
             with contextlib.suppress(Refused):
-                await self._room.close(lesson.code)
+                await self._room.close(class_.code)
         return self.look()
 
     async def _open(self, request: ClassRequest) -> None:
-        if self._lesson is not None:
-            raise Refused(f"class {self._lesson.code} is open")
+        if self._current is not None:
+            raise Refused(f"class {self._current.code} is open")
         code = "".join(secrets.choice(classroom.CODE_LETTERS) for _ in range(classroom.CODE_LENGTH))
-        self._lesson = Lesson(code, request.name.strip(), self._now() + request.minutes * 60.0)
-        await self._save(self._lesson)
+        self._current = OpenClass(code, request.name.strip(), self._now() + request.minutes * 60.0)
+        await self._save(self._current)
         await self._room.open(code, request.name.strip())  # the studio's page uses the same code to join
 
     async def _do_with(self, do: str, name: str) -> None:
@@ -262,17 +262,17 @@ class Classes:
                 raise Refused(f"robot {name} is a real one: carry it back by hand")
             self._desk.stage.reset(name)
 
-    async def _give_back(self, lesson: Lesson, seat: Seat) -> None:
+    async def _give_back(self, class_: OpenClass, seat: Seat) -> None:
         """Release a pupil's robot; the pupil must join again."""
-        del lesson.seats[seat.identity]
+        del class_.seats[seat.identity]
         self._desk.pupils.discard(seat.identity)
-        if seat.robot in self._desk.locked and seat.robot not in {left.robot for left in lesson.seats.values()}:
+        if seat.robot in self._desk.locked and seat.robot not in {left.robot for left in class_.seats.values()}:
             self._desk.locked.discard(seat.robot)
             with contextlib.suppress(RobotError):
                 await _release(self._desk.robots[seat.robot])
         await self._desk.robots[seat.robot].admission.shut_out(seat.identity)
         await self._put_out(seat.identity)
-        await self._save(lesson)  # last: a slow disk must not leave the pupil a right
+        await self._save(class_)  # last: a slow disk must not leave the pupil a right
 
     def check_teacher(self) -> None:
         """Raise Forbidden unless the current client may lead a class."""

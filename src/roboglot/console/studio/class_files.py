@@ -13,7 +13,7 @@ import msgspec
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)
-CLASS, LESSON = "class.json", "lesson.json"
+CLASS, OPEN_CLASS = "class.json", "open_class.json"
 CLASSES_MAX, BAGS_MAX, FILE_MAX = 20, 60, 4_000_000  # folders; files in each; bytes read of a file
 
 
@@ -39,7 +39,7 @@ class Sheet(msgspec.Struct):
     bags: list[Bag] = []
 
 
-class KeptLesson(msgspec.Struct):
+class KeptClass(msgspec.Struct):
     """The class of a console's own page. ``until``: Unix time (s); ``seats``: robots by the pupils' identities."""
 
     code: str
@@ -48,30 +48,30 @@ class KeptLesson(msgspec.Struct):
     seats: dict[str, str] = {}
 
 
-class LessonFile:
+class OpenClassFile:
     """File of the class that is open on a console's own page, in the folder of the classes."""
 
     def __init__(self, folder: Path) -> None:
-        self._file = folder / LESSON
+        self._file = folder / OPEN_CLASS
 
-    def load(self) -> KeptLesson | None:
+    def load(self) -> KeptClass | None:
         """Return the class; None if none is open. An unreadable one is skipped with a warning."""
         try:
-            return _read(self._file, KeptLesson)
+            return _read(self._file, KeptClass)
         except FileNotFoundError:
             return None
         except (OSError, ValueError, msgspec.MsgspecError) as error:
             log.warning("left out the class in %s: %s", self._file, error)
             return None
 
-    def keep(self, lesson: KeptLesson | None) -> None:
+    def keep(self, kept: KeptClass | None) -> None:
         """Write the class, or delete it. After a failure it lasts only until the program ends."""
         try:
-            if lesson is None:
+            if kept is None:
                 self._file.unlink(missing_ok=True)
                 return
             self._file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            _write(self._file, msgspec.json.encode(lesson))
+            _write(self._file, msgspec.json.encode(kept))
         except OSError as error:
             log.error("cannot keep the class over a restart: %s: %s", self._file, error)
 

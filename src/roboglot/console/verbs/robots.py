@@ -90,7 +90,7 @@ async def undock(robot: Robot) -> Started:
 
 @VERBS.on("stop")
 async def stop(robot: Robot) -> None:
-    """Cancel everything that moves the robot, for whomever; returns when it stands."""
+    """Cancel everything that moves the robot, for any client; returns when it stands."""
     doomed = [action for action in robot.actions.running() if moves(action)]
     for action in doomed:
         action.cancel("stopped at the console")
