@@ -13,12 +13,14 @@ import ssl
 from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Protocol, cast
+from typing import Protocol, cast
 
-from msgspec import DecodeError, Meta, Struct
+from msgspec import DecodeError
+from msgspec.json import encode
 
 from roboglot.access.tunnel.busy_poll import BusyPoll
 from roboglot.access.tunnel.frames import FrameKind
+from roboglot.access.tunnel.greeting import Hello, Welcome
 from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.tunnel import Tunnel
 from roboglot.transport.listening import listen
@@ -36,18 +38,6 @@ BROADCAST = "127.255.255.255"
 ROBOT_IP = b"robot ip "
 # Ports of the vendors' clients, which robots call or send to: a CyberDog app's, RoboMaster's pushes and discovery.
 APPS = frozenset({8981, 40924, 40926})
-
-
-Ports = Annotated[list[Annotated[int, Meta(ge=1, le=65535)]], Meta(max_length=64)]
-
-
-class Welcome(Struct):
-    """Answer of the gateway to a greeting: its ports, and the key of a second connection."""
-
-    tcp: Ports
-    callbacks: Ports
-    broadcasts: Ports
-    beats: str = ""
 
 
 class NotTrusted(ConnectionError):
@@ -161,7 +151,7 @@ class Connector:
                 link = await self._call(TunnelLink)
                 try:
                     self._check(link)
-                    link.send(FrameKind.HELLO, 0, json.dumps({"beats": key}).encode())
+                    link.send(FrameKind.HELLO, 0, encode(Hello(beats=key)))
                     await tunnel.beat_over(link)
                 finally:
                     link.end("it was closed here")
@@ -170,7 +160,7 @@ class Connector:
             await asyncio.sleep(BESIDE_AGAIN)
 
     async def _greet(self, link: TunnelLink) -> Welcome:
-        link.send(FrameKind.HELLO, 0, json.dumps({"robot": self._robot, "token": self._token}).encode())
+        link.send(FrameKind.HELLO, 0, encode(Hello(self._robot, self._token)))
         async with asyncio.timeout(GREETING_SECONDS_MAX):
             frame = await link.first()
         if frame.kind is not FrameKind.WELCOME:
@@ -218,7 +208,7 @@ class Connector:
                 for port in words.tcp:
                     server = await listen(tunnel.accept(port), self._address, port)
                     stack.callback(server.close)
-                ready(words.tcp)
+                ready(list(words.tcp))
                 beside = asyncio.ensure_future(self._beat_beside(tunnel, words.beats))
                 stack.callback(beside.cancel)
                 await tunnel.run()

@@ -26,6 +26,7 @@ import msgspec
 from roboglot.access.guard import Guard, Tunnelled
 from roboglot.access.tunnel.busy_poll import BusyPoll
 from roboglot.access.tunnel.frames import BadFrame, FrameKind
+from roboglot.access.tunnel.greeting import Hello, Welcome
 from roboglot.access.tunnel.link import TunnelLink
 from roboglot.access.tunnel.tunnel import Tunnel, TunnelLost
 from roboglot.model.actions import Action
@@ -64,23 +65,6 @@ class Ports:
     pushes: tuple[int, ...]
     broadcasts: tuple[int, ...]
     callbacks: tuple[int, ...]
-
-
-class Hello(msgspec.Struct, frozen=True):
-    """Greeting of a client: requests a robot, or a second connection for heartbeats (``beats``: the tunnel's key)."""
-
-    robot: str = ""
-    token: str = ""
-    beats: str = ""
-
-
-class Welcome(msgspec.Struct, frozen=True):
-    """Ports open to a client, and the key of its second connection."""
-
-    tcp: tuple[int, ...]
-    callbacks: tuple[int, ...]
-    broadcasts: tuple[int, ...]
-    beats: str
 
 
 class Gateway:
