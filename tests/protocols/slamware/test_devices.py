@@ -10,6 +10,7 @@ import pytest
 
 from roboglot.config import RobotConfig
 from roboglot.fleet import Fleet, build_fleet
+from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack, JackStage
@@ -20,13 +21,14 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.sensing.depth_camera import DepthCamera
 from roboglot.model.components.sensing.sensor_masks import SensorMasks
-from roboglot.model.components.system.firmware import Firmware
+from roboglot.model.components.system.firmware import Firmware, Module
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.statistics.lifetime_totals import TOTALS
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
+from roboglot.simulation.components.motion.emergency_stop import SimulatedEmergencyStop
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
 
@@ -240,10 +242,42 @@ async def test_metres_and_seconds_count_over_the_robots_life(
     assert kept == [pytest.approx(metres, abs=0.01), pytest.approx(30.0)]
     again = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await again.start()  # as after a crash: stored values count on
+    await forward(seconds=2)
     async with httpx.AsyncClient(base_url=again.endpoints[0].address) as other:
         seconds = (await other.get("/api/core/statistics/v1/runtime")).json()
     await again.close()
-    assert seconds == pytest.approx(65.0, abs=0.1)
+    assert seconds == pytest.approx(32.0, abs=0.1)
+
+
+async def test_a_restart_adds_nothing_to_metres_and_seconds(
+    robot: Robot, door: SlamwareDoor, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    async def totals() -> list[float]:
+        return [(await client.get(f"/api/core/statistics/v1/{name}")).json() for name in ("odometry", "runtime")]
+
+    robot[Driving].move_by(Pose(0.5))
+    await forward(seconds=5)
+    before = await totals()
+    await door.close()  # as the robot's doors do when it restarts
+    await forward(seconds=20)
+    await door.start()
+    assert await totals() == [pytest.approx(before[0], abs=0.01), pytest.approx(before[1], abs=0.1)]
+
+
+@pytest.mark.parametrize("pressed", [False, True])
+async def test_only_the_stop_button_outlasts_a_restart(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, pressed: bool
+) -> None:
+    stop = robot[EmergencyStop]
+    assert isinstance(stop, SimulatedEmergencyStop)
+    firmware = robot[Firmware]
+    for again, seconds in ((firmware.reboot, 26), (lambda: firmware.restart(Module.BASE), 4)):
+        assert await put(client, "base.emergency_stop", "on") == 200
+        assert await put(client, "base.brake_release", "on") == 200
+        stop.press(True) if pressed else None
+        restart = again()
+        await forward(seconds=seconds)
+        assert (restart.status, stop.engaged, stop.brake_released) == (ActionStatus.SUCCEEDED, pressed, False)
 
 
 @pytest.fixture

@@ -6,8 +6,9 @@ from msgspec import Struct
 
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.system.firmware import Module
 from roboglot.model.errors import EmergencyStopped, Refused
-from roboglot.model.events import BrakeChanged, EmergencyStopChanged
+from roboglot.model.events import BrakeChanged, EmergencyStopChanged, ModuleRestarted, Rebooted
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.motion.base import SimulatedBase
@@ -20,11 +21,13 @@ class EmergencyStopSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedEmergencyStop(EmergencyStop):
-    """Emergency stop that locks the base and cuts the motors."""
+    """Emergency stop that locks the base and cuts the motors; what applications asked for ends with a restart."""
 
     def __init__(self, base: SimulatedBase, robot: Robot) -> None:
         self._base, self._robot = base, robot
         self._engaged = self._pressed = self._released = False
+        robot.events.listen(Rebooted, lambda _: self._forget())
+        robot.events.listen(ModuleRestarted, self._module_restarted)
 
     @property
     def engaged(self) -> bool:
@@ -62,6 +65,15 @@ class SimulatedEmergencyStop(EmergencyStop):
             self._base.locks.unlock(BRAKE)
         self._base.roll_freely(released)
         self._robot.events.publish(BrakeChanged(stamp=self._robot.clock.time(), released=released))
+
+    def _module_restarted(self, event: ModuleRestarted) -> None:
+        if event.module is Module.BASE:
+            self._forget()
+
+    def _forget(self) -> None:
+        """Forget the requests of applications: only the button on the hull outlasts a restart."""
+        self._set(self._pressed)
+        self.release_brake(False)
 
     def _set(self, engaged: bool) -> None:
         if engaged == self._engaged:

@@ -14,7 +14,6 @@ from msgspec import Meta, Struct
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.driving import BASE
-from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.system.disk import Disk
 from roboglot.model.components.system.firmware import (
@@ -229,9 +228,6 @@ class SimulatedFirmware(Firmware):
             self._base.locks.lock(lock, f"the {module} restarts")
             self._module = module
             try:
-                if module is Module.BASE and EmergencyStop in robot:
-                    robot[EmergencyStop].release()  # requests of applications are forgotten
-                    robot[EmergencyStop].release_brake(False)
                 await self._clock.sleep(RESTART_SECONDS[module])
             finally:
                 self._module = None

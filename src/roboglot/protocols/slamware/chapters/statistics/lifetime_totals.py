@@ -18,7 +18,7 @@ class Totals:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._before = (0.0, 0.0)
+        self._before = (0.0, 0.0)  # what to add to the robot's own count, which goes on when the robot restarts
         self._timer: Timer | None = None
         self._keeping: asyncio.Task[object] | None = None
 
@@ -26,7 +26,8 @@ class Totals:
         """Load the earlier totals and start saving them."""
         if Settings in self._robot:
             metres, seconds = self._robot[Settings].get(TOTALS, (0.0, 0.0))
-            self._before = (float(metres), float(seconds))
+            driven = self._robot[Odometry].reading.distance if Odometry in self._robot else 0.0
+            self._before = (float(metres) - driven, float(seconds) - self._robot.clock.time())
             self._wait()
 
     async def close(self) -> None:
