@@ -15,6 +15,7 @@ from roboglot.autonomy.delivery.rules import at_work
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.energy.power import Power
 from roboglot.model.components.logistics.delivery import (
     BoxChoice,
     Delivery,
@@ -33,6 +34,7 @@ from roboglot.model.components.logistics.industry import (
     RoundTemplate,
 )
 from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.system.firmware import Firmware, Module
 from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
@@ -104,6 +106,27 @@ async def test_it_holds_after_crash_while_people_load_it(tmp_path: Path) -> None
         assert status_of(robot, order) is OrderStatus.READY
         await robot[Delivery].cancel(order.number)
         assert status_of(robot, order) is OrderStatus.CANCELED
+
+
+@pytest.mark.parametrize("part", ["sleep", "base", "reboot"])
+async def test_orders_wait_until_the_robot_is_awake(tmp_path: Path, part: str) -> None:
+    async with running(tmp_path / "robot.db") as (robot, clock):
+        await robot[Places].put(ROOM)
+        match part:
+            case "sleep":
+                robot[Power].sleep()
+            case "base":
+                robot[Firmware].restart(Module.BASE)
+            case "reboot":
+                robot[Firmware].reboot()
+        await clock.advance(2.0)
+        (order,) = await robot[Delivery].accept(OrderRequest(OrderKind.RETURN, "room"))
+        await clock.advance(0.5)
+        assert status_of(robot, order) is OrderStatus.READY
+        if part == "sleep":
+            robot[Power].wake()
+        await clock.advance(45.0 if part == "reboot" else 20.0)
+        assert status_of(robot, order) is OrderStatus.SUCCEEDED
 
 
 @pytest.mark.world("empty")

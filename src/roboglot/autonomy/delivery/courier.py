@@ -109,6 +109,11 @@ class Courier:
             return None
         return next((order for order in self._book.open if order.status is OrderStatus.READY), None)
 
+    @property
+    def _may_rest(self) -> bool:
+        readiness = self.readiness
+        return readiness.rest_due and self._driver.allowed and not readiness.lost and readiness.awake
+
     async def _work(self) -> None:
         while True:
             self._woken.clear()
@@ -118,7 +123,7 @@ class Courier:
                     await self._robot.clock.sleep(BASE_LOOK)  # the current driver may finish
                     continue
                 await self._carry_out(order)
-            elif self.readiness.rest_due and self._driver.allowed and not self.readiness.lost:
+            elif self._may_rest:
                 await self._rest()
             else:
                 await self._wait()

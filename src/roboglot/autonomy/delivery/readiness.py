@@ -1,4 +1,4 @@
-"""Readiness of a delivering robot: charged, within its hours, and localized."""
+"""Readiness of a delivering robot: awake, charged, within its hours, and localized."""
 
 from __future__ import annotations
 
@@ -7,14 +7,24 @@ from typing import Protocol
 
 from roboglot.autonomy.delivery.rules import at_work
 from roboglot.model.components.energy.battery import Battery, DockContact
-from roboglot.model.components.energy.power import Power
+from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.delivery import Policy
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.storeys import Storeys
 from roboglot.model.components.motion.docking import Docking
-from roboglot.model.events import BatteryChanged, DeliveryNews, DockContactChanged, PoseJumped
+from roboglot.model.components.system.firmware import Firmware, FirmwareState
+from roboglot.model.events import (
+    BatteryChanged,
+    DeliveryNews,
+    DockContactChanged,
+    FirmwareChanged,
+    ModuleRestarted,
+    PoseJumped,
+    PowerModeChanged,
+)
 from roboglot.model.robot import Robot
 
+INSTALLING = (FirmwareState.INSTALLING, FirmwareState.INSTALLED, FirmwareState.REBOOTING)
 RECOVERED = 80  # percent at which the robot resumes work after a low battery
 
 
@@ -36,7 +46,7 @@ class Service(Protocol):
 
 
 class Readiness:
-    """Readiness by battery, working hours and localization. ``rest_due``: the robot goes to rest when idle."""
+    """Readiness by power, battery, working hours and localization. ``rest_due``: the robot goes to rest when idle."""
 
     def __init__(self, robot: Robot, service: Service, report: Callable[[DeliveryNews], None]) -> None:
         self._robot, self._service, self._report = robot, service, report
@@ -51,6 +61,7 @@ class Readiness:
             listen(BatteryChanged, self._battery_changed),
             listen(PoseJumped, lambda _: self._found()),
             listen(DockContactChanged, self._pushed),
+            *(listen(kind, lambda _: self._woke()) for kind in (PowerModeChanged, FirmwareChanged, ModuleRestarted)),
         ]
 
     def close(self) -> None:
@@ -62,7 +73,18 @@ class Readiness:
     def works(self) -> bool:
         """True if an order may begin."""
         hours = at_work(self._service.policy, self._robot.clock.epoch())
-        return hours and not self._low and not self._lost
+        return hours and not self._low and not self._lost and self.awake
+
+    @property
+    def awake(self) -> bool:
+        """False while the robot sleeps or is off, restarts, or is being updated."""
+        robot = self._robot
+        if Power in robot and robot[Power].mode is not PowerMode.AWAKE:
+            return False
+        if Firmware not in robot:
+            return True
+        firmware = robot[Firmware]
+        return firmware.restarting is None and firmware.progress.state not in INSTALLING
 
     @property
     def lost(self) -> bool:
@@ -104,6 +126,10 @@ class Readiness:
         """Begin no order until the pose is set or the robot is on its dock."""
         self._lost = True
         self._report(DeliveryNews.PLACE_LOST)
+
+    def _woke(self) -> None:
+        if self.awake:
+            self._service.wake()
 
     def _found(self) -> None:
         if self._lost:
