@@ -75,3 +75,14 @@ async def test_error_leaves_what_was_refused_before_it(studio: Open) -> None:
     await page.wait_for_selector(".panel .failure[role=alert] >> text=ZeroDivisionError")
     await shows(page, "[...document.querySelectorAll('.wrong')].map((one) => one.dataset.id)", ["fast", "say"])
     assert page.errors == []
+
+
+async def test_verdict_of_a_mission_shows_refusals(studio: Open) -> None:
+    page = await studio()
+    await page.click("#tab-missions")
+    await page.click(".missions li:first-child button")
+    call = {"function": "cyberdog.motion.turn", "line": 3, "module": "m", "block": "", "words": "too fast"}
+    graded = {"grade": {"stars": 0, "rows": []}, "refused": [call]}
+    await page.evaluate("found => import('/studio/missions.js').then(m => { m.outcome.value = found; })", graded)
+    await page.wait_for_selector(".panel .failure >> text=motion.turn (m, line 3): too fast")
+    assert page.errors == []
