@@ -14,6 +14,8 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack, JackStage
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.emergency_braking import EmergencyBraking
@@ -142,6 +144,13 @@ async def test_masks_and_depth(robot: Robot, client: httpx.AsyncClient, forward:
     assert robot[SensorMasks].masked == {0: True}
     assert (await client.put("/api/core/sensors/v1/depth/:enable", json={"enable": False})).status_code == 200
     assert not robot[DepthCamera].enabled
+    robot[Mapping].enable(False)
+    robot[Mapping].close_loops(False)
+    robot[Localization].enable(False)
+    robot[Firmware].reboot()
+    await forward(seconds=40)
+    assert robot[DepthCamera].enabled
+    assert [robot[Mapping].enabled, robot[Mapping].closes_loops, robot[Localization].enabled] == [True] * 3
 
 
 async def test_sleep_and_waking_up(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:

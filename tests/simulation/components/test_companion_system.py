@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from operator import ne
+
 import pytest
 
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.energy.power import Power, PowerMode
+from roboglot.model.components.interaction.light import Light
+from roboglot.model.components.interaction.skin import ElectronicSkin, SkinPattern
 from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.emergency_braking import EmergencyBraking
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.sensing.depth_camera import DepthCamera
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.disk import LOW, Disk
 from roboglot.model.components.system.firmware import Firmware, FirmwarePackage, FirmwareState
@@ -215,3 +222,45 @@ def test_the_disk_fills_up(dog):
         disk.take("more", LOW)
     disk.release("recordings")
     assert disk.free == free - 3_000_000
+
+
+async def test_a_download_outlives_a_restart(dog):
+    """The record still held it, and so did the disk, but it could not be installed any more."""
+    firmware = dog.robot[Firmware]
+    await downloaded(dog)
+    firmware.reboot()
+    await dog.clock.advance(30.0)
+    assert (firmware.progress.state, firmware.progress.package) == (FirmwareState.DOWNLOADED, package())
+    firmware.install(DIGEST)
+    await dog.clock.advance(21.0)
+    dog.robot[Power].shut_down(restart_after=1.0)  # any restart runs what was installed
+    await dog.clock.advance(30.0)
+    assert (firmware.progress.state, firmware.version) == (FirmwareState.IDLE, "2.0")
+
+
+@pytest.mark.parametrize("way", [lambda robot: robot[Firmware].reboot(), lambda r: r[Power].shut_down(restart_after=1)])
+async def test_a_restart_ends_what_clients_switched(simulate, way):
+    """A restart of the robot leaves what a start of this program does."""
+    sim = simulate(start=Pose(5, 5), body="universal")
+    sim.world.start()
+    robot = sim.robot
+    at_first = switches(robot)
+    robot[EmergencyStop].engage()
+    robot[EmergencyStop].release_brake(True)
+    robot[EmergencyBraking].enable(not robot[EmergencyBraking].enabled)
+    robot[DepthCamera].enable(False)
+    robot[ElectronicSkin].show(SkinPattern.LIGHT)
+    robot[ElectronicSkin].enable(False)
+    robot[Light].shine("eyes")
+    assert all(map(ne, at_first, switches(robot)))
+    way(robot)
+    await sim.clock.advance(40.0)
+    assert switches(robot) == at_first
+
+
+def switches(robot):
+    stop, braking, depth = robot[EmergencyStop], robot[EmergencyBraking], robot[DepthCamera]
+    skin, eyes = robot[ElectronicSkin].state, robot[Light].state("eyes")
+    return [
+        stop.engaged, stop.brake_released, braking.enabled, depth.enabled, skin.enabled, skin.pattern, eyes.effect
+    ]  # fmt: skip

@@ -10,7 +10,7 @@ from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal, NotLocalized, NotReady
-from roboglot.model.events import LostReason, PoseJumped
+from roboglot.model.events import LostReason, PoseJumped, Rebooted
 from roboglot.model.geometry import ORIGIN, POSITION_MAX, Pose, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -31,6 +31,7 @@ class LidarLocalization(Localization):
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot = robot
         self._belief = belief
+        robot.events.listen(Rebooted, lambda _: self.enable(True))
 
     @property
     def pose(self) -> Pose:

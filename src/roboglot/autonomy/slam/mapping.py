@@ -9,7 +9,7 @@ from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.autonomy.slam.grid_import import evidence_of
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.events import MapReplaced, PoseJumped
+from roboglot.model.events import MapReplaced, PoseJumped, Rebooted
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.model.robot import Robot
@@ -23,6 +23,11 @@ class LidarMapping(Mapping):
     def __init__(self, robot: Robot, belief: Belief) -> None:
         self._robot = robot
         self._belief = belief
+        robot.events.listen(Rebooted, lambda _: self._start_afresh())
+
+    def _start_afresh(self) -> None:
+        self.enable(True)
+        self.close_loops(True)
 
     @property
     def grid(self) -> OccupancyGrid:

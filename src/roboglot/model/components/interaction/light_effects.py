@@ -45,6 +45,11 @@ class ShownLight(Light):
             if zone not in self.zones:
                 self.zones[zone], self._commanded[zone], self._last[zone] = count, [dark] * count, dark
 
+    def start_afresh(self) -> None:
+        """Darken all lamps, as after every start."""
+        for zone in self.zones:
+            self.shine(zone, DARK, LightEffect.OFF)
+
     def commanded(self, zone: str, lamp: int) -> ZoneState:
         """Return the last command of this lamp (from 0)."""
         return self._commanded[zone][lamp]

@@ -36,7 +36,11 @@ class ShownSkin(ElectronicSkin):
 
     def __init__(self, clock: Clock, seed: str) -> None:
         self._clock, self._seed = clock, seed
-        self._state = SkinState(True, SkinPattern.DARK, 1.0, Shade.LIGHT, clock.time())
+        self.start_afresh()
+
+    def start_afresh(self) -> None:
+        """Be switched on and dark, as after every start."""
+        self._state = SkinState(True, SkinPattern.DARK, 1.0, Shade.LIGHT, self._clock.time())
 
     @property
     @abstractmethod

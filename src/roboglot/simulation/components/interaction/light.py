@@ -6,6 +6,7 @@ from msgspec import Struct
 
 from roboglot.model.components.interaction.light import Light
 from roboglot.model.components.interaction.light_effects import ShownLight
+from roboglot.model.events import Rebooted
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Count
 
@@ -17,7 +18,9 @@ class LightSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def _fit(fit: Fitting) -> ShownLight:
-    return ShownLight(fit.body[LightSection].zones, fit.robot.clock)
+    light = ShownLight(fit.body[LightSection].zones, fit.robot.clock)
+    fit.robot.events.listen(Rebooted, lambda _: light.start_afresh())
+    return light
 
 
 PART = Part(name="light", interface=Light, section=LightSection, fit=_fit)

@@ -11,6 +11,7 @@ from roboglot.model.components.interaction.skin_effects import ShownSkin
 from roboglot.model.components.motion.feet import Foot, FootState
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.errors import Refused
+from roboglot.model.events import Rebooted
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.part import Fitting, Part
 
@@ -25,6 +26,7 @@ class SimulatedSkin(ShownSkin):
     def __init__(self, robot: Robot, seed: int) -> None:
         super().__init__(robot.clock, f"{seed} {robot.id}")
         self._robot = robot
+        robot.events.listen(Rebooted, lambda _: self.start_afresh())
 
     @property
     def feet(self) -> Mapping[Foot, FootState]:

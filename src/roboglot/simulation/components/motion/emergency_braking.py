@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from roboglot.model.components.motion.emergency_braking import EmergencyBraking
 from roboglot.model.components.sensing.lidar import Lidar
-from roboglot.model.events import EventStream, ObstacleBraked, ScanTaken
+from roboglot.model.events import EventStream, ObstacleBraked, Rebooted, ScanTaken
 from roboglot.model.sensing import LaserScan
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
@@ -40,6 +40,7 @@ class SimulatedEmergencyBraking(EmergencyBraking):
         self._section, self._radius, self._base, self._lidar, self._events = section, radius, base, lidar, events
         self.duty, self._enabled, self._braking = Duty(), section.on, False
         events.listen(ScanTaken, self._wake)
+        events.listen(Rebooted, lambda _: self.enable(section.on))
         if section.on:
             base.when_driven.append(self._wake)
         self._seen: LaserScan | None = None

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from roboglot.model.clock import Clock
 from roboglot.model.components.sensing.depth_camera import DepthCamera, DepthImage
+from roboglot.model.events import Rebooted
 from roboglot.model.geometry import Orientation, Vector3
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
@@ -97,7 +98,9 @@ def _bundle(section: DepthCameraSection) -> Floats:
 
 def _fit(fit: Fitting) -> SimulatedDepthCamera:
     section, chance = fit.body[DepthCameraSection], fit.chance("depth camera")
-    return SimulatedDepthCamera(section, fit.hull, fit.world.rays, fit.robot.clock, chance)
+    camera = SimulatedDepthCamera(section, fit.hull, fit.world.rays, fit.robot.clock, chance)
+    fit.robot.events.listen(Rebooted, lambda _: camera.enable(True))
+    return camera
 
 
 PART = Part(name="depth_camera", interface=DepthCamera, section=DepthCameraSection, fit=_fit)

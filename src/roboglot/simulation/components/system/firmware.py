@@ -67,6 +67,7 @@ class SimulatedFirmware(Firmware):
         self._updating: asyncio.Task[None] | None = None
         self._next_look = LOOK_EVERY
         self._module: Module | None = None
+        robot.events.listen(Rebooted, lambda _: self._start_afresh())
 
     # -- versions --
 
@@ -213,7 +214,7 @@ class SimulatedFirmware(Firmware):
         await self._clock.sleep(seconds)
         await self._record.boot()
         self._base.locks.unlock("reboot")
-        self._report(action, FirmwareProgress())
+        action.report(FirmwareProgress())
         robot.events.publish(Rebooted(stamp=self._clock.time()))
 
     @property
@@ -269,6 +270,11 @@ class SimulatedFirmware(Firmware):
         if package := self._record.wake():
             self._robot[Disk].take(PACKAGE, package.size)
             self._progress = FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, package)
+
+    def _start_afresh(self) -> None:
+        """Run what was installed, whichever way the robot restarted; a package that waits for it still does."""
+        left = self._record.restart()
+        self._become(FirmwareProgress(FirmwareState.DOWNLOADED, 1.0, left) if left else FirmwareProgress())
 
     def _report(self, action: Action, progress: FirmwareProgress) -> None:
         action.report(progress)

@@ -33,7 +33,11 @@ class FirmwareRecord:
         """Restore the state of the previous run, once; return its downloaded package."""
         if self._awake or Settings not in self._robot:
             return None
-        self._awake, self._booted = True, self._versions(PENDING)
+        return self.restart()
+
+    def restart(self) -> FirmwarePackage | None:
+        """Run the pending versions; return the downloaded package."""
+        self._awake, self._booted = True, self._versions(PENDING) or self._booted
         left = self._read(DOWNLOADED)
         return convert(left, FirmwarePackage) if left else None
 
