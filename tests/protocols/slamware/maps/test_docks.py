@@ -35,9 +35,10 @@ async def test_docks(robot: Robot, client: httpx.AsyncClient, forward: Forward) 
 
     await ok(await client.delete(f"{docks}/{own['id']}"))
     assert robot[Docking].home == Pose(3.0, 1.0, 0.5)
-    moved = {"pose": {"x": 4.0, "y": 1.0, "yaw": 0.5}}
+    moved = {"pose": {"x": 4.0, "y": 1.0, "yaw": 0.5}, "metadata": {}}  # as in the manual's example
     await ok(await client.put(f"{docks}/second", json=moved))
     assert robot[Docking].home == Pose(4.0, 1.0, 0.5)
+    assert (await client.get(docks)).json() == [{**second, "pose": moved["pose"]}]
     assert (await client.put(f"{docks}/unknown", json=moved)).status_code == 404
     await ok(await client.put(f"{SLAM}/homepose", json={"x": 5.0, "y": 1.0, "z": 0, "yaw": 0, "pitch": 0, "roll": 0}))
     assert (await client.get(docks)).json()[0]["pose"]["x"] == 5.0

@@ -104,11 +104,13 @@ def _one(docks: Docks, id: str) -> PointOfInterest:
 
 @TABLE.on(f"PUT {API}/homedocks/{{dock_id}}", right=Right.EDIT, needs=(Docking, MapAnnotations, Settings))
 async def edit_home_dock(context: Context, dock_id: Identifier, body: PoseChange) -> bool:
-    """Change a dock's pose, metadata or both; 404 if there is none."""
+    """Change a dock's pose, metadata or both; it keeps its name without a new one. 404 if there is none."""
 
     def edit(docks: Docks) -> Docks:
         old = _one(docks, dock_id)
         metadata = dict(old.metadata) if body.metadata is None else metadata_text(body.metadata)
+        if not metadata.get(NAME) and NAME in old.metadata:
+            metadata[NAME] = old.metadata[NAME]
         new = PointOfInterest(dock_id, pose_of(body.pose) if body.pose else old.pose, metadata)
         return tuple(new if dock is old else dock for dock in docks)
 
