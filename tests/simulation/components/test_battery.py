@@ -1,6 +1,7 @@
 """Draining, charging on the dock, running dry."""
 
 import math
+from itertools import product
 
 import pytest
 
@@ -81,8 +82,14 @@ async def test_pushing_costs_more_than_driving_more_than_standing(simulate):
     assert pushing > 2 * driving
 
 
-@pytest.mark.parametrize("body", ["universal", "hermes", "cyberdog2", "robomaster_ep"])
-@pytest.mark.parametrize("charge", [0.98, 0.5, 0.08])
+BODIES, CHARGES = ("universal", "hermes", "cyberdog2", "robomaster_ep"), (0.98, 0.5, 0.08)
+ONE_OF_EACH = {*zip(BODIES, (*CHARGES, 0.5), strict=True)}  # in every run
+
+
+@pytest.mark.parametrize(
+    ("body", "charge"),
+    [pytest.param(*pair, marks=[] if pair in ONE_OF_EACH else pytest.mark.slow) for pair in product(BODIES, CHARGES)],
+)
 async def test_charge_is_the_integral_of_the_current(simulate, body, charge):
     sim = simulate(body=body, start=Pose(5, 5))
     battery = sim.robot[Battery]
