@@ -18,6 +18,7 @@ from roboglot.model.actions import Action
 from roboglot.model.clock import RealClock
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.robot import Description, Robot
+from roboglot.programs.engine import engine as engine_module
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.errors import ProgramError
 from roboglot.programs.stores import StoredProgram
@@ -89,5 +90,6 @@ async def main(database: str, file: str, tasks: int, begin: int) -> None:
 
 
 if __name__ == "__main__":
+    engine_module.ANSWER_MAX = 200.0  # programs have a low priority: minutes on a busy machine are seconds to them
     end_with(int(sys.argv[5]))
     asyncio.run(main(sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])))
