@@ -29,7 +29,7 @@ KILLS = int(os.environ.get("ROBOGLOT_KILLS", "2"))
 TASKS = 3
 ROOT = Path(__file__).parents[3]
 KILLED_ROBOT = (sys.executable, "-m", "tests.protocols.visual.killed_robot")
-PATIENCE = 120.0  # s of the machine's time for a life: programs have a low priority, and one took 37 s at a load of 5
+PATIENCE = 120.0  # s of the machine's time for a life: programs have a low priority, and three took 37 s at a load of 5
 
 
 async def life(database: Path, words: Path, seconds: float | None) -> Counter[tuple[str, ...]]:
