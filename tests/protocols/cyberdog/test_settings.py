@@ -159,6 +159,26 @@ async def test_training_is_cancellable_expires_and_needs_a_member(client, app, r
     assert len(app.of(3013)) == 1
 
 
+async def test_a_voice_in_training_keeps_its_member(client, app, robot, anna, passing) -> None:
+    await robot[Members].add("anna")
+    await client.ask(3011, {"nick_name": "anna", "voiceprint_id": "v1"})
+    await robot[Members].rename("anna", "eva")
+    assert (await client.ask(1021, {"account": "eva"}))["accounts"][0]["voice_state"] == 2
+    anna.say("good morning")
+    await passing(lambda: app.of(3013))
+    assert app.of(3013) == [{"code": 0, "voiceprint_id": "v1"}]
+    assert robot[Members].get("eva").voice
+    await client.ask(3011, {"nick_name": "eva", "voiceprint_id": "v2"})
+    assert await client.ask(1022, {"member": "eva"}) == {"success": True}
+    await passing(lambda: len(app.of(3013)) == 2)
+    assert app.of(3013)[1] == {"code": 5010, "voiceprint_id": "v2"}
+    await client.ask(1020, {"member": "anna"})
+    await client.ask(3011, {"nick_name": "anna", "voiceprint_id": "v3"})
+    await client.ask(1013, {"enable": False})  # without a microphone there is nothing to wait for
+    await passing(lambda: len(app.of(3013)) == 3)
+    assert app.of(3013)[2] == {"code": 5001, "voiceprint_id": "v3"}
+
+
 async def test_voice_board_is_activated_by_token_that_holds(client, app, robot, forward, passing) -> None:
     asked = await client.ask(3001)
     assert asked.keys() == {"did", "sn"}

@@ -69,7 +69,7 @@ class Context:
         await self.tasks.close()
         self.gaits.close()
         self.voice.close()
-        self.faces.stop()
+        self.faces.close()
         self.bracelet.close()
         self.jobs.close()
         self.updates.close()

@@ -10,9 +10,11 @@ from enum import IntEnum
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.errors import RobotError
+from roboglot.model.events import MembersChanged
 from roboglot.model.perception import Emotion, FaceSeen
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink
+from roboglot.protocols.cyberdog.chapters.people.expected_member import ExpectedMember
 from roboglot.protocols.cyberdog.table import push
 from roboglot.wire.cyberdog.codes import Code
 
@@ -41,10 +43,22 @@ class Faces:
     """Enrols one face or recognises faces, not both at once. Lives as long as the door is open."""
 
     def __init__(self, robot: Robot, app: AppLink) -> None:
-        self.entering = ""  # the member whose face is expected
-        self.entered = ""  # the member whose face was recorded last
+        self._expected = ExpectedMember(robot)
+        self._entered = ExpectedMember(robot)
+        self._asked = ""  # the expected member's name in the request
         self._robot, self._app = robot, app
         self._looking: asyncio.Task[None] | None = None
+        self._leave = robot.events.listen(MembersChanged, self._end_if_removed)
+
+    @property
+    def entering(self) -> str:
+        """The member whose face is expected, by the present name; "" for none."""
+        return self._expected.name
+
+    @property
+    def entered(self) -> str:
+        """The member whose face was recorded last, by the present name; "" for none."""
+        return self._entered.name
 
     @property
     def busy(self) -> bool:
@@ -52,9 +66,10 @@ class Faces:
         return self._looking is not None and not self._looking.done()
 
     def enter(self, name: str) -> None:
-        """Enrol the next face for a member; push 7003 reports the outcome."""
-        self.entering = name
-        self._begin(self._enter(name))
+        """Enrol the next face for a member; push 7003 reports the outcome. Raises NotFound."""
+        self._expected.expect(name)
+        self._asked = name
+        self._begin(self._enter())
 
     def recognise(self, name: str, id: int, seconds: float) -> None:
         """Push 7004 for each member (only ``name``, if given) seen within ``seconds``; 5907 if none was."""
@@ -64,27 +79,44 @@ class Faces:
         """Stop without a report."""
         if self._looking:
             self._looking.cancel()
-        self._looking, self.entering = None, ""
+        self._looking = None
+        self._expected.clear()
+
+    def close(self) -> None:
+        """Stop for good."""
+        self._leave()
+        self.stop()
 
     def _begin(self, work: Coroutine[object, None, None]) -> None:
         self._looking = asyncio.get_running_loop().create_task(work, name="faces")
 
-    async def _enter(self, name: str) -> None:
-        members = self._robot[Members]
+    async def _enter(self) -> None:
         try:
             face = await self._robot.clock.wait_for(self._next_face(), ENTERING_MAX)
-            if face.name not in ("", name):
+            if face.name not in ("", self.entering):
                 result = FaceResult.KNOWN
             else:
-                await members.set_face(name, face.print)
-                self.entered, result = name, FaceResult.DONE
+                await self._robot[Members].set_face(self.entering, face.print)
+                self._entered.expect(self.entering)
+                result = FaceResult.DONE
         except TimeoutError:
             result = FaceResult.TIMEOUT
         except RobotError as error:
-            log.info("cannot enter the face of %r: %s", name, error)
+            log.info("cannot enter the face of %r: %s", self.entering or self._asked, error)
             result = FaceResult.INNER
-        self.entering = ""
+        self._report(result)
+
+    def _report(self, result: FaceResult) -> None:
+        name = self.entering or self._asked
+        self._expected.clear()
         self._app.push(ENTERED, {"result": int(result), "username": name})
+
+    def _end_if_removed(self, _event: MembersChanged) -> None:
+        if self._expected.removed:
+            if self._looking:
+                self._looking.cancel()
+            self._looking = None
+            self._report(FaceResult.INNER)
 
     async def _next_face(self) -> FaceSeen:
         with self._robot[Vision].faces.subscribe() as sightings:

@@ -13,9 +13,11 @@ from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.sensing.hearing import Hearing
 from roboglot.model.errors import RobotError
+from roboglot.model.events import MembersChanged
 from roboglot.model.perception import SpeechHeard
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.chapters.motion.gait import NOTHING_SPECIAL, Gaits
+from roboglot.protocols.cyberdog.chapters.people.expected_member import ExpectedMember
 from roboglot.protocols.cyberdog.chapters.system.stored_settings import MICROPHONE, VOICE_CONTROL, kept, wake_words
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion, MotionCode
 
@@ -38,12 +40,19 @@ class Voice:
     """Lives as long as the door is open. ``trained(code, voiceprint_id)`` is called when a training has ended."""
 
     def __init__(self, robot: Robot, gaits: Gaits, trained: Callable[[int, str], None]) -> None:
-        self.training = ""  # the member whose voice is being learned
+        self._expected = ExpectedMember(robot)
+        self._voiceprint = ""  # that is being learned
         self._robot, self._gaits, self._trained = robot, gaits, trained
         self._listening: asyncio.Task[None] | None = None
         self._learning: asyncio.Task[None] | None = None
         self._obeying: asyncio.Task[MotionCode] | None = None
         self._attentive_until = 0.0
+        self._leave = robot.events.listen(MembersChanged, self._end_if_removed)
+
+    @property
+    def training(self) -> str:
+        """The member whose voice is being learned, by the present name; "" for none."""
+        return self._expected.name
 
     @property
     def microphone(self) -> bool:
@@ -63,23 +72,25 @@ class Voice:
         elif self._listening:
             self._listening.cancel()
             self._listening = None
-        if not self.microphone:
-            self.stop_training()
+        if not self.microphone and self._learning:
+            self._fail(FAILED)
 
     def train(self, member: str, voiceprint: str) -> None:
         """Learn the next speaker's voice as ``member``'s; replaces an earlier request."""
         self.stop_training()
-        self.training = member
+        self._voiceprint = voiceprint
         self._learning = asyncio.get_running_loop().create_task(self._learn(member, voiceprint), name="voiceprint")
 
     def stop_training(self) -> None:
-        """Stop learning a voice."""
+        """Stop learning a voice, without a report."""
         if self._learning:
             self._learning.cancel()
-        self._learning, self.training = None, ""
+        self._learning = None
+        self._expected.clear()
 
     def close(self) -> None:
         """Stop listening for good."""
+        self._leave()
         self.stop_training()
         if self._listening:
             self._listening.cancel()
@@ -89,9 +100,9 @@ class Voice:
         try:
             if not self.microphone:
                 return
-            self._robot[Members].get(member)
+            self._expected.expect(member)
             print_ = await self._robot.clock.wait_for(self._next_voice(), TRAINING_MAX)
-            await self._robot[Members].set_voice(member, print_)
+            await self._robot[Members].set_voice(self.training, print_)
             code = TRAINED
         except TimeoutError:
             code = TIMEOUT
@@ -100,8 +111,18 @@ class Voice:
             code = UNKNOWN
         finally:
             if self._learning is asyncio.current_task():  # unless it was cancelled
-                self._learning, self.training = None, ""
+                self._learning = None
+                self._expected.clear()
                 self._trained(code, voiceprint)
+
+    def _fail(self, code: int) -> None:
+        """Stop learning a voice, and report it."""
+        self.stop_training()
+        self._trained(code, self._voiceprint)
+
+    def _end_if_removed(self, _event: MembersChanged) -> None:
+        if self._learning and self._expected.removed:
+            self._fail(UNKNOWN)
 
     async def _next_voice(self) -> bytes:
         with self._robot[Hearing].speech() as speech:
