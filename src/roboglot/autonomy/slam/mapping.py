@@ -26,6 +26,8 @@ class LidarMapping(Mapping):
         robot.events.listen(Rebooted, lambda _: self._start_afresh())
 
     def _start_afresh(self) -> None:
+        """Begin with an empty map, as at a start: the one in memory was lost."""
+        self.clear()
         self.enable(True)
         self.close_loops(True)
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import httpx
+import numpy as np
 import pytest
 
 from roboglot.model.components.mapping.annotations import LineKind, MapAnnotations
@@ -13,6 +15,7 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.events import LoopClosed
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
@@ -315,6 +318,31 @@ async def test_a_cleared_map_is_forgotten_in_memory_only(
     await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
     await forward(seconds=10)
     assert len((await client.get(f"{ARTIFACT}/lines/walls")).json()) == 2
+
+
+async def test_a_restart_loses_what_memory_alone_holds(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
+) -> None:
+    """A new map begins where the robot is, unless one is on disk; drawings stay where they are."""
+    grid, places = robot[Mapping].grid, robot[Places].all()
+    larger = np.pad(grid.log_odds, ((0, 0), (0, 300)), constant_values=-100)
+    robot[Mapping].load(replace(grid, log_odds=larger), robot[Localization].pose)
+    assert robot[Mapping].grid.width == grid.width + 300
+    await ok(await client.put(f"{SLAM}/homepose", json={"x": 1, "y": 2, "z": 0, "yaw": 0, "pitch": 0, "roll": 0}))
+    robot[Firmware].reboot()
+    await forward(seconds=40)
+    home = (await client.get(f"{SLAM}/homepose")).json()
+    assert (home["x"], home["y"]) == pytest.approx((1.0, 2.0), abs=0.05)
+    assert robot[Mapping].grid.width < grid.width + 300
+    assert robot[Places].get("d1").pose.distance_to(places[0].pose) < 0.05
+
+    await ok(await client.post(f"{MULTI}/stcm/:save"))
+    await ok(await client.post(f"{ARTIFACT}/lines/walls", json=[WALL]))
+    walls, places = (await client.get(f"{ARTIFACT}/lines/walls")).json(), robot[Places].all()
+    robot[Firmware].reboot()
+    await forward(seconds=40)
+    assert (await client.get(f"{ARTIFACT}/lines/walls")).json() == walls
+    assert robot[Places].all() == places
 
 
 async def test_landmarks_are_kept(client: httpx.AsyncClient) -> None:

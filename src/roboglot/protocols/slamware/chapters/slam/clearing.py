@@ -32,9 +32,13 @@ class Clearing:
             self._end_watch = self._robot.events.listen(MapReplaced, self._replaced)
 
     async def close(self) -> None:
-        """Finish moving drawings."""
+        """End, once the drawings have moved."""
         if self._end_watch is not None:
             self._end_watch()
+        await self.finish()
+
+    async def finish(self) -> None:
+        """Wait until the drawings are on the map that was cleared last."""
         if self._moving is not None:
             await asyncio.wait([self._moving])
 

@@ -46,12 +46,11 @@ def get_home_pose(context: Context) -> Pose3D:
 async def set_home_pose(context: Context, body: Pose3D) -> bool:
     """Set the place of the home dock, by the robot's pose when docked."""
     robot = context.robot
-    before = home_dock(robot)
-    if before is None:
+    if home_dock(robot) is None:
         robot[Docking].set_home(pose_of(body))
-        return True
-    moved = replace(before, pose=pose_of(body))
-    await change_docks(robot, lambda docks: tuple(moved if dock.id == moved.id else dock for dock in docks))
+    if (home := home_dock(robot)) is not None:
+        moved = replace(home, pose=pose_of(body))
+        await change_docks(robot, lambda docks: tuple(moved if dock.id == moved.id else dock for dock in docks))
     return True
 
 

@@ -74,13 +74,18 @@ class MapKeeper:
         return max(floors, key=lambda f: (bound in {dock.id for dock in f.annotations.docks}, f.name.default))
 
     async def start(self) -> None:
-        """Load the map on disk, if there is one and the robot can map, and begin to store its place on it."""
+        """Load the map on disk, if there is one and the robot can map, and begin to store its place on it.
+
+        Without one, the entered docks remain, and with them the robot's home.
+        """
         if Mapping not in self._robot or FileStore not in self._robot:
             return
+        await self.clearing.finish()  # the restart of the robot cleared the map
         try:
             await self.reload(restarting=True)
         except NotFound:
-            pass
+            if Docking in self._robot and self._robot[MapAnnotations].current.docks:
+                settle_home(self._robot)
         except RobotError as error:
             log.warning("cannot load the saved map of robot %s: %s", self._robot.id, error)
         self.clearing.start()
