@@ -169,6 +169,24 @@ async def test_clearing_begins_a_new_map_here(tour: Tour) -> None:
     assert tour.robot[Mapping].grid.width > 100
 
 
+@pytest.mark.world("office")
+@pytest.mark.parametrize("clears", [True, False], ids=["cleared", "origin moved"])
+async def test_no_pose_of_old_frame_contradicts_new_one(tour: Tour, clears: bool) -> None:
+    """In a corridor a scan fits many poses, among them those believed a moment ago, on the map before."""
+    localization, mapping = tour.robot[Localization], tour.robot[Mapping]
+    await tour.clock.advance(1.0)
+    tour.head_for((20.0, 10.0))
+    await tour.until(lambda: localization.pose.distance_to(Point()) > 0.4)
+    if clears:
+        mapping.clear()
+    else:
+        mapping.move_origin(Point(0.5, 0.0))
+    believed, true = localization.pose, tour.truth
+    for _ in range(4):
+        await tour.clock.advance(0.1)
+        assert localization.pose.relative_to(believed).distance_to(tour.truth.relative_to(true)) < 0.05
+
+
 @pytest.mark.world("empty")
 async def test_nonsense_poses_are_refused(tour: Tour) -> None:
     for pose in (Pose(math.nan, 0.0, 0.0), Pose(0.0, math.inf, 0.0), Pose(0.0, 0.0, math.nan), Pose(1e9, 0.0, 0.0)):

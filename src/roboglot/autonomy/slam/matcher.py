@@ -28,6 +28,9 @@ KNOWN_SHARE = 0.4  # of all points; with fewer on known ground, quality is reduc
 SEARCH_STEP = math.radians(1.0)
 SEARCH_POINTS_MAX = 180
 WIDE = (0.5, math.radians(20.0))  # m, rad searched around a doubtful pose
+SIGMAS = 3.0  # standard deviations of the prior that are searched …
+CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed the range that a match converges from
+REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad searched at most after one step
 UNKNOWN_SCORE = 50  # of 255, for a point on unknown ground: better than on floor seen free
 EDGE_COST = 0.1  # of a perfect score: the advantage that a pose at the window's edge needs over its centre
 LEAST = np.where(np.eye(3, dtype=bool), SURE, -np.inf)  # lower bounds of variances; covariances are unbounded
@@ -133,6 +136,16 @@ def fit(
     x, y, yaw = found.tolist()
     pose = Pose(x + corner.x, y + corner.y, wrap_angle(yaw))
     return Match(pose, narrowed, strain, fitting, known, len(points), stays, added)
+
+
+def start_of_match(grid: EvidenceGrid, scan: ScanPoints, before: Pose, covariance: NDArray[np.float64]) -> Pose:
+    """Return the pose from which to match: ``before``, or the best one around it if ``covariance`` is too large."""
+    x, y, yaw = (math.sqrt(covariance[k, k]) for k in range(3))
+    reach, turn = SIGMAS * max(x, y), SIGMAS * yaw
+    if reach < CATCH and turn < CATCH_YAW:
+        return before
+    window = min(max(reach, CATCH), REACH_MAX), min(max(turn, CATCH_YAW), REACH_YAW_MAX)
+    return search(grid, scan, before, window)
 
 
 def search(grid: EvidenceGrid, scan: ScanPoints, centre: Pose, window: tuple[float, float]) -> Pose:

@@ -31,6 +31,7 @@ from roboglot.autonomy.slam.matcher import (
     fit,
     places,
     search,
+    start_of_match,
 )
 from roboglot.autonomy.slam.odometry.learner import Correction, OdometryLearner
 from roboglot.autonomy.slam.scan_points import ScanPoints, is_covered
@@ -39,19 +40,23 @@ from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
 from roboglot.autonomy.slam.turns import Turns
 from roboglot.autonomy.slam.whereabouts import NEAR, Elsewhere, Whereabouts
 from roboglot.model.components.mapping.localization import Region
-from roboglot.model.events import LoopClosed, LostReason, PoseJumped, RecoveryMeans, RobotDisplaced, ScanTaken
-from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.events import (
+    LoopClosed,
+    LostReason,
+    MapReplaced,
+    PoseJumped,
+    RecoveryMeans,
+    RobotDisplaced,
+    ScanTaken,
+)
+from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.robot import Robot
-from roboglot.model.sensing import LaserScan
 
 log = logging.getLogger(__name__)
 
 AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit for the pose to be corrected
 AGREEMENT_TO_MAP = 0.6  # … for the scan to be added to the map
 QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
-SIGMAS = 3.0  # standard deviations of the prior that are searched …
-CATCH, CATCH_YAW = 0.2, math.radians(8.0)  # m, rad: … when they exceed the range that a match converges from
-REACH_MAX, REACH_YAW_MAX = 1.5, math.radians(45.0)  # m, rad searched at most after one step
 TRUSTED = 0.75  # agreement from which a match is used to judge odometry
 KNOWN_SURE = 0.6  # share of known points from which agreement alone suffices
 PROBATION = 3.0  # m to drive without contradiction after a distant relocalization, before scans are added there
@@ -100,8 +105,11 @@ class Slam:
         )
         belief.reader.load_kernel()
         self._turns = Turns(robot.clock, self._take)
-        listen = robot.events.listen
-        self._listeners = [listen(ScanTaken, self._turns.put), listen(PoseJumped, self._jumped)]
+        self._listeners = [
+            robot.events.listen(ScanTaken, self._turns.put),
+            robot.events.listen(PoseJumped, self._jumped),
+            robot.events.listen(MapReplaced, self._replaced),
+        ]
         self._timer = robot.clock.call_later(SILENCE_PERIOD, self._listen)
 
     def close(self) -> None:
@@ -155,6 +163,13 @@ class Slam:
             self._witness.forget()
             self.whereabouts.note_given(event.stamp)
 
+    def _replaced(self, event: MapReplaced) -> None:
+        """Forget poses in the frame of a map that was cleared, or whose origin was moved."""
+        if event.origin != ORIGIN:
+            self._displacement.forget(event.stamp)
+            self._witness.forget()
+            self._slip.forget()
+
     @property
     def started(self) -> bool:
         """True once a scan has been compared with the map."""
@@ -189,7 +204,7 @@ class Slam:
         if len(scan.points) < POINTS_MIN:
             belief.quality *= 1.0 - QUALITY_GAIN
             return
-        if self._matched_odometry and self._is_held(event.scan, odometry):
+        if self._matched_odometry and self._slip.holds(belief, event.scan, odometry, last):
             way = turn = 0.0
         seconds = event.stamp - self._matched_at if way >= STILL or turn >= STILL_YAW else 0.0
         self._step = odometry.relative_to(last)
@@ -217,15 +232,6 @@ class Slam:
     @property
     def _is_unsure(self) -> bool:
         return self._belief.search or self._belief.lost is not None or not self.whereabouts.sure
-
-    def _is_held(self, scan: LaserScan, odometry: Pose) -> bool:
-        """Return whether the wheels slip; if so, keep the believed place."""
-        belief, last = self._belief, self._matched_odometry or odometry
-        before = belief.map_to_odom.compose(last)
-        stayed = self._slip.check(scan, odometry, belief.map_to_odom.compose(odometry))
-        if self._slip.slips and belief.localizing:
-            belief.move_to(stayed or before, odometry)
-        return self._slip.slips and belief.localizing
 
     def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, moved: Pose | None, seconds: float) -> bool:
         """Match the scan, judge the fit, and move the belief if it localizes. Return whether to search the whole map.
@@ -349,12 +355,7 @@ class Slam:
         """Return the start pose of the match, by a search if odometry may be too far off."""
         if self._belief.lost is not None and stamp - self._looked_at < LOST_PERIOD:
             return before
-        x, y, yaw = (math.sqrt(self._belief.covariance[k, k]) for k in range(3))
-        reach, turn = SIGMAS * max(x, y), SIGMAS * yaw
-        if reach < CATCH and turn < CATCH_YAW:
-            return before
-        window = min(max(reach, CATCH), REACH_MAX), min(max(turn, CATCH_YAW), REACH_YAW_MAX)
-        return search(self._belief.map, scan, before, window)
+        return start_of_match(self._belief.map, scan, before, self._belief.covariance)
 
     def _doubted(self, best: Match, scan: ScanPoints, before: Pose, stamp: float) -> Match:
         """Return ``best``, or a better match without odometry, as wheels slip and robots are pushed."""

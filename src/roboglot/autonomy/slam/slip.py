@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from roboglot.autonomy.slam.belief import Belief
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 
@@ -31,6 +32,17 @@ class SlipWatch:
         self._scan: LaserScan | None = None
         self._odometry = self._pose = Pose()
         self.slips = False
+
+    def forget(self) -> None:
+        """Forget the older scan, whose pose is in the frame of another map."""
+        self._scan, self.slips = None, False
+
+    def holds(self, belief: Belief, scan: LaserScan, odometry: Pose, last: Pose) -> bool:
+        """Return whether the wheels slip; then keep the place believed at the ``last`` odometry."""
+        stayed = self.check(scan, odometry, belief.map_to_odom.compose(odometry))
+        if self.slips and belief.localizing:
+            belief.move_to(stayed or belief.map_to_odom.compose(last), odometry)
+        return self.slips and belief.localizing
 
     def check(self, scan: LaserScan, odometry: Pose, pose: Pose) -> Pose | None:
         """Return the pose of an older scan, where the robot has stayed, when slip begins; else None."""
