@@ -13,7 +13,7 @@ from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.errors import DockNotFound
-from roboglot.model.events import ActionChanged
+from roboglot.model.events import ActionChanged, Rebooted
 from roboglot.model.geometry import ORIGIN, Pose
 
 if TYPE_CHECKING:
@@ -142,6 +142,18 @@ async def test_docked_robot_that_finds_itself_knows_its_dock(tour: Tour) -> None
     assert (await tour.end_of(tour.robot_finds_itself())).status is ActionStatus.SUCCEEDED
     assert docking.home is not None
     assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.1
+
+
+@pytest.mark.world("empty")
+async def test_docked_robot_knows_its_dock_after_a_restart(tour: Tour) -> None:
+    """Another map was loaded, which forgot the dock; a restart begins a new one, as a start does."""
+    mapping, docking = tour.robot[Mapping], tour.robot[Docking]
+    await tour.clock.advance(1.0)
+    mapping.load(mapping.grid, Pose(3.0, 1.0))
+    assert docking.home is None
+    tour.robot.events.publish(Rebooted(stamp=tour.clock.time()))
+    assert docking.home is not None
+    assert tour.start.compose(docking.home).distance_to(tour.truth) < 0.05
 
 
 @pytest.mark.world("office")

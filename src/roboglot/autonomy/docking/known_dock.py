@@ -14,6 +14,7 @@ from roboglot.model.events import (
     MapReplaced,
     PoseConfirmed,
     PoseJumped,
+    Rebooted,
 )
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.robot import Robot
@@ -39,6 +40,7 @@ class KnownDock:
             listen(PoseJumped, self._jumped),
             listen(PoseConfirmed, lambda _: self._confirm()),
             listen(LocalizationLost, lambda _: self._anchor()),
+            listen(Rebooted, self._begin),
         ]
 
     def close(self) -> None:
@@ -79,6 +81,12 @@ class KnownDock:
         if self._pose is not None:
             self._pose = None if event.origin is None else self._pose.relative_to(event.origin)
         self._on_it = self._on_it and self._pose is not None
+        if event.origin is not None:
+            self._learn()
+
+    def _begin(self, _: Rebooted) -> None:
+        """Trust the pose, as a new map begins here: ``MapReplaced`` follows."""
+        self._confirmed = True
 
     def _straightened(self, event: LoopClosed) -> None:
         """Move the dock with the nearest corrected pose of a loop closure."""
