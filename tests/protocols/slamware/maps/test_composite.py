@@ -134,7 +134,8 @@ async def test_no_one_waits_while_large_file_is_read(
 ) -> None:
     done = threading.Event()
     monkeypatch.setattr(map_keeper, "LockstepClock", ())  # any other clock includes other threads' time
-    monkeypatch.setattr(map_keeper, "_parsed", lambda _: done.wait(20) and [FloorMap()])
+    read = FloorMap(grid=OccupancyGrid(np.zeros((1, 1), np.int8), 0.05, Point()))
+    monkeypatch.setattr(map_keeper, "_parsed", lambda _: done.wait(20) and [read])
     upload = asyncio.create_task(bare_client.post(f"{MULTI}/stcm", content=b"STCM"))
     try:
         for _ in range(5):

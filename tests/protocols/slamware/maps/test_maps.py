@@ -27,6 +27,7 @@ from roboglot.protocols.slamware.chapters.slam.composite import (
 )
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
+from roboglot.wire.slamware.chapters.slam import stcm_layers
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
 from tests.protocols.slamware.drawings import DESK, WALL, ok
 
@@ -198,6 +199,15 @@ async def test_several_floors(robot: Robot, client: httpx.AsyncClient, drawn: No
     assert (await client.put(f"{MULTI}/floors/:current", json={"floor": "7F"})).status_code == 404
     assert (await client.delete(f"{MULTI}/stcm")).status_code == 204
     await ok(await client.post(f"{MULTI}/stcm/:save"))  # every floor on disk is kept
+
+
+async def test_file_that_no_start_could_load_is_refused(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:
+    await ok(await client.post(f"{MULTI}/stcm/:save"))
+    walls = stcm_layers.line_layer(stcm_layers.WALLS, [stcm_layers.LineEntry("1", 0, 0, 1, 0)])
+    refused = await client.post(f"{MULTI}/stcm", content=encode_stcm(CompositeMap((walls,))))
+    assert (refused.status_code, "the map has no grid" in refused.text) == (400, True)
+    await ok(await client.post(f"{MULTI}/stcm/:reload", json={}))  # the one before is still there
+    assert robot[Mapping].grid.width > 0
 
 
 async def test_the_origin_moves_with_all_that_is_drawn(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:

@@ -42,6 +42,7 @@ log = logging.getLogger(__name__)
 FILE = "slamware/map.stcm"
 DRAWN = "slamware/drawn.json"  # the file of drawings on that map's other floors
 NOT_MOVED = (0.0, 0.0)
+NO_GRID = "the map has no grid"
 FLOOR = "slamware.floor"  # the setting that holds the id of the floor of the drawings in memory
 NO_FLOOR = ""  # its value for no floor
 # The setting that holds the files on which the drawings in memory are based: by digest, the m (x, y) by which the
@@ -117,8 +118,8 @@ class MapKeeper:
             await self._use(floor, pose, draw)
 
     async def upload(self, data: bytes) -> None:
-        """Store the file on disk unchanged, without loading it. Raises InvalidGoal unless it is a composite map."""
-        await self._parse(data)
+        """Store the file on disk unchanged, without loading it. Raises InvalidGoal unless it could be loaded."""
+        await self._check(data)
         async with self._turn:
             await self._robot[FileStore].write(FILE, data)
 
@@ -194,7 +195,7 @@ class MapKeeper:
             if data == await files.read(FILE):
                 return
         try:
-            await self._parse(data)
+            await self._check(data)
         except InvalidGoal as error:
             log.warning("cannot read the cloud's map: %s", error)
             return
@@ -230,12 +231,18 @@ class MapKeeper:
         async with self._parsing:
             return await asyncio.to_thread(_parsed, data)
 
+    async def _check(self, data: bytes) -> None:
+        """Raise InvalidGoal unless each floor of the file has a map."""
+        for floor in await self._parse(data):
+            if floor.grid is None:
+                raise InvalidGoal(f"floor {floor.name.floor} of the map has no grid" if floor.name.floor else NO_GRID)
+
     async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[object, None, None]) -> None:
         """Load the grid into memory, call ``draw`` for its drawings, and set the robot's pose, else at its dock."""
         self._loading = True
         try:
             if floor.grid is None:
-                raise InvalidGoal("the map has no grid")
+                raise InvalidGoal(NO_GRID)
             self._robot[Mapping].load(floor.grid, pose or ORIGIN)
             await draw
         finally:
