@@ -203,6 +203,27 @@ async def test_to_a_place_on_another_floor_and_back(
     assert world.truth.floor_of("a") == 0
 
 
+async def test_loaded_places_follow_the_moved_origin(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, origin: Pose
+) -> None:
+    """A place of the floor in memory stays where it is in the world; those of other floors keep their numbers."""
+
+    async def places() -> list[tuple[float, float]]:
+        docks = (await client.get(f"{MULTI}/homedocks")).json()
+        pois = (await client.get(f"{MULTI}/pois")).json()
+        return [(place["pose"]["x"], place["pose"]["y"]) for place in (*docks, *pois)]
+
+    await forward(seconds=1)
+    await two_floors(robot, client, origin)
+    dock, down, up = await places()
+    new = {"new_origin": {"x": 1.0, "y": -2.0}}
+    assert (await client.put("/api/core/slam/v1/maps/origin", json=new)).status_code == 200
+    moved = [pytest.approx((x - 1.0, y + 2.0)) for x, y in (dock, down)]
+    assert await places() == [*moved, up]
+    await client.put("/api/multi-floor/localization/v1/pose", json={"poi_name": "downstairs"})
+    assert (robot[Localization].pose.x, robot[Localization].pose.y) == moved[1]
+
+
 async def test_unloaded_floor_shows_no_other_one(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, origin: Pose
 ) -> None:

@@ -16,7 +16,7 @@ from dataclasses import replace
 import msgspec
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import Drawings, MapMemory, Replacement
 from roboglot.model.components.mapping.mapping import Mapping
@@ -59,7 +59,8 @@ class MapKeeper:
         self._loading = False
         self._layers: tuple[Layer, ...] = ()  # of the map in memory, of unknown type
         self.status = MapLoadStatus.NOT_LOADED
-        self.floors: tuple[FloorMap, ...] = ()  # loaded from disk
+        self.floors: tuple[FloorMap, ...] = ()  # loaded from disk; the one in memory as seen from its present origin
+        self._filed: tuple[FloorMap, ...] = ()  # the same as in the file
         self._loaded = ""  # the digest of that file
         self.current = FloorName()
         self.place = PlaceMemory(robot, lambda: _frame_on_disk(robot))
@@ -154,7 +155,8 @@ class MapKeeper:
         """Save and reload; the grid in memory stays, as it is the same."""
         await self.save()
         data = await self._robot[FileStore].read(FILE)
-        self.floors, self._loaded = tuple(await self._parse(data)), _digest(data)
+        self.floors = self._filed = tuple(await self._parse(data))
+        self._loaded = _digest(data)
         self.status = MapLoadStatus.LOADED
 
     async def reload(self, pose: Pose | None = None, *, restarting: bool = False) -> None:
@@ -183,7 +185,8 @@ class MapKeeper:
             except BaseException:
                 self.status = MapLoadStatus.ERROR
                 raise
-            self.floors, self._loaded, self.status = tuple(floors), digest, MapLoadStatus.LOADED
+            self.floors = self._filed = tuple(floors)
+            self._loaded, self.status = digest, MapLoadStatus.LOADED
 
     async def _fetch(self) -> None:
         """Store the cloud's map on disk, if it differs."""
@@ -204,7 +207,7 @@ class MapKeeper:
 
     async def enter(self, building: str, floor: str, pose: Pose | None) -> None:
         """Use the map of another loaded floor, with its last drawings. Raises NotFound."""
-        for loaded in self.floors:
+        for loaded in self._filed:
             if (loaded.name.building, loaded.name.floor) == (building, floor):
                 async with self._turn:
                     await self._use(loaded, pose, self._turn_over(loaded, self._loaded))
@@ -251,7 +254,7 @@ class MapKeeper:
         self.place.known = True
         if Docking in self._robot:
             settle_home(self._robot)
-        self._layers, self.current = floor.layers, floor.name
+        self._layers, self.current, self.floors = floor.layers, floor.name, self._filed
         if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
             self._robot[Localization].set_pose(dock.pose if is_docked(self._robot) else before(dock))
 
@@ -289,6 +292,8 @@ class MapKeeper:
                 lambda now: Replacement(seen_from(Pose(origin.x, origin.y), now), settings={BASIS: basis})
             )
             self._layers, self.place.known = (), True
+            if (shift := basis.get(self._loaded)) is not None:
+                self.floors = tuple(_moved(f, Pose(*shift)) if f.name == self.current else f for f in self._filed)
 
     async def _turn_over(self, floor: FloorMap, digest: str) -> None:
         """Switch from the floor in memory to ``floor`` of the map with ``digest``, each with its drawings."""
@@ -314,6 +319,14 @@ class MapKeeper:
             return msgspec.json.decode(await self._robot[FileStore].read(DRAWN), type=dict[str, Drawings])
         except NotFound:
             return {}
+
+
+def _moved(floor: FloorMap, origin: Pose) -> FloorMap:
+    """Return the floor with its places and docks as seen from another origin."""
+    seen = seen_from(origin, Drawings(floor.places, Annotations(docks=floor.annotations.docks)))
+    return replace(
+        floor, places=tuple(seen.places), annotations=replace(floor.annotations, docks=seen.annotations.docks)
+    )
 
 
 async def _put_drawings(robot: Robot, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
