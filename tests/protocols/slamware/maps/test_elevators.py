@@ -222,6 +222,9 @@ async def test_loaded_places_follow_the_moved_origin(
     assert await places() == [*moved, up]
     await client.put("/api/multi-floor/localization/v1/pose", json={"poi_name": "downstairs"})
     assert (robot[Localization].pose.x, robot[Localization].pose.y) == moved[1]
+    assert (await client.delete("/api/core/slam/v1/maps")).status_code == 200  # a new map begins at that place
+    (_, cleared, still) = await places()
+    assert (cleared, still) == (pytest.approx((0.0, 0.0), abs=1e-6), up)
 
 
 async def test_unloaded_floor_shows_no_other_one(

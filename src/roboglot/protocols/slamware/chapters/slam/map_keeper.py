@@ -16,7 +16,7 @@ from dataclasses import replace
 import msgspec
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
+from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import Drawings, MapMemory, Replacement
 from roboglot.model.components.mapping.mapping import Mapping
@@ -34,6 +34,7 @@ from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, before
 from roboglot.protocols.slamware.chapters.slam.clearing import Clearing
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.protocols.slamware.chapters.slam.last_place import PlaceMemory, is_docked, last_place
+from roboglot.protocols.slamware.chapters.slam.loaded_floors import LoadedFloors
 from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 from roboglot.wire.slamware.chapters.slam.stcm import Layer, decode_stcm, encode_stcm
@@ -59,21 +60,20 @@ class MapKeeper:
         self._loading = False
         self._layers: tuple[Layer, ...] = ()  # of the map in memory, of unknown type
         self.status = MapLoadStatus.NOT_LOADED
-        self.floors: tuple[FloorMap, ...] = ()  # loaded from disk; the one in memory as seen from its present origin
-        self._filed: tuple[FloorMap, ...] = ()  # the same as in the file
-        self._loaded = ""  # the digest of that file
+        self._loaded = LoadedFloors()
         self.current = FloorName()
         self.place = PlaceMemory(robot, lambda: _frame_on_disk(robot))
         self.clearing = Clearing(robot, self._on_map_cleared)
 
     @property
+    def floors(self) -> tuple[FloorMap, ...]:
+        """Floors loaded from disk; the one in memory as seen from its present origin."""
+        return self._loaded.shown
+
+    @property
     def start_floor(self) -> FloorMap | None:
         """Floor of the bound dock, else the loaded file's default one."""
-        return self._start_of(self.floors) if self.floors else None
-
-    def _start_of(self, floors: Sequence[FloorMap]) -> FloorMap:
-        bound = self._robot[Settings].get(BOUND)
-        return max(floors, key=lambda f: (bound in {dock.id for dock in f.annotations.docks}, f.name.default))
+        return _start_of(self._robot, self.floors) if self.floors else None
 
     async def start(self) -> None:
         """Load the map on disk, if there is one and the robot can map, and begin to store its place on it.
@@ -113,14 +113,14 @@ class MapKeeper:
 
     async def use(self, data: bytes, pose: Pose) -> None:
         """Use the map of a file's start floor from now on, in memory only."""
-        floor = self._start_of(await self._parse(data))
+        floor = _start_of(self._robot, await self._parse(data))
         async with self._turn:
             draw = _put_drawings(self._robot, floor, {})  # the present drawings belong to no file
             await self._use(floor, pose, draw)
 
     async def upload(self, data: bytes) -> None:
         """Store the file on disk unchanged, without loading it. Raises InvalidGoal unless it could be loaded."""
-        await self._check(data)
+        _require_grids(await self._parse(data))
         async with self._turn:
             await self._robot[FileStore].write(FILE, data)
 
@@ -155,8 +155,7 @@ class MapKeeper:
         """Save and reload; the grid in memory stays, as it is the same."""
         await self.save()
         data = await self._robot[FileStore].read(FILE)
-        self.floors = self._filed = tuple(await self._parse(data))
-        self._loaded = _digest(data)
+        self._loaded.hold(await self._parse(data), _digest(data))
         self.status = MapLoadStatus.LOADED
 
     async def reload(self, pose: Pose | None = None, *, restarting: bool = False) -> None:
@@ -171,7 +170,7 @@ class MapKeeper:
                 await self._fetch()
                 data = await self._robot[FileStore].read(FILE)
                 floors, digest = await self._parse(data), _digest(data)
-                floor = self._start_of(floors)
+                floor = _start_of(self._robot, floors)
                 if restarting:
                     floor, pose = _resumed(self._robot, floors, digest) or (floor, None)
                 keep = restarting and digest in _basis(self._robot)
@@ -185,8 +184,8 @@ class MapKeeper:
             except BaseException:
                 self.status = MapLoadStatus.ERROR
                 raise
-            self.floors = self._filed = tuple(floors)
-            self._loaded, self.status = digest, MapLoadStatus.LOADED
+            self._loaded.hold(floors, digest)
+            self.status = MapLoadStatus.LOADED
 
     async def _fetch(self) -> None:
         """Store the cloud's map on disk, if it differs."""
@@ -198,7 +197,7 @@ class MapKeeper:
             if data == await files.read(FILE):
                 return
         try:
-            await self._check(data)
+            _require_grids(await self._parse(data))
         except InvalidGoal as error:
             log.warning("cannot read the cloud's map: %s", error)
             return
@@ -207,11 +206,10 @@ class MapKeeper:
 
     async def enter(self, building: str, floor: str, pose: Pose | None) -> None:
         """Use the map of another loaded floor, with its last drawings. Raises NotFound."""
-        for loaded in self._filed:
-            if (loaded.name.building, loaded.name.floor) == (building, floor):
-                async with self._turn:
-                    await self._use(loaded, pose, self._turn_over(loaded, self._loaded))
-                return
+        if (loaded := self._loaded.find(building, floor)) is not None:
+            async with self._turn:
+                await self._use(loaded, pose, self._turn_over(loaded, self._loaded.digest))
+            return
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
 
     async def leave_floors(self, stop: str, drawn: Drawings) -> None:
@@ -226,6 +224,7 @@ class MapKeeper:
 
             await self._robot[MapMemory].replace(edit)
             self._layers, self.current = (), FloorName(self.current.building, stop, default=False)
+            self._loaded.restore()
 
     async def _parse(self, data: bytes) -> list[FloorMap]:
         """Return the floors in a file, in a thread: a hostile file may take seconds, and 300 MB; so one at a time."""
@@ -233,12 +232,6 @@ class MapKeeper:
             return _parsed(data)
         async with self._parsing:
             return await asyncio.to_thread(_parsed, data)
-
-    async def _check(self, data: bytes) -> None:
-        """Raise InvalidGoal unless each floor of the file has a map."""
-        for floor in await self._parse(data):
-            if floor.grid is None:
-                raise InvalidGoal(f"floor {floor.name.floor} of the map has no grid" if floor.name.floor else NO_GRID)
 
     async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[object, None, None]) -> None:
         """Load the grid into memory, call ``draw`` for its drawings, and set the robot's pose, else at its dock."""
@@ -254,7 +247,8 @@ class MapKeeper:
         self.place.known = True
         if Docking in self._robot:
             settle_home(self._robot)
-        self._layers, self.current, self.floors = floor.layers, floor.name, self._filed
+        self._layers, self.current = floor.layers, floor.name
+        self._loaded.restore()
         if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
             self._robot[Localization].set_pose(dock.pose if is_docked(self._robot) else before(dock))
 
@@ -281,6 +275,7 @@ class MapKeeper:
 
             await self._robot[MapMemory].replace(edit)
             self._layers = ()
+            self._loaded.move(self.current, origin, _basis(self._robot))
 
     async def move_origin(self, point: Point) -> None:
         """Move the origin of the map in memory to ``point``, by whole cells; drawings keep their places."""
@@ -292,8 +287,7 @@ class MapKeeper:
                 lambda now: Replacement(seen_from(Pose(origin.x, origin.y), now), settings={BASIS: basis})
             )
             self._layers, self.place.known = (), True
-            if (shift := basis.get(self._loaded)) is not None:
-                self.floors = tuple(_moved(f, Pose(*shift)) if f.name == self.current else f for f in self._filed)
+            self._loaded.move(self.current, Pose(origin.x, origin.y), basis)
 
     async def _turn_over(self, floor: FloorMap, digest: str) -> None:
         """Switch from the floor in memory to ``floor`` of the map with ``digest``, each with its drawings."""
@@ -321,12 +315,17 @@ class MapKeeper:
             return {}
 
 
-def _moved(floor: FloorMap, origin: Pose) -> FloorMap:
-    """Return the floor with its places and docks as seen from another origin."""
-    seen = seen_from(origin, Drawings(floor.places, Annotations(docks=floor.annotations.docks)))
-    return replace(
-        floor, places=tuple(seen.places), annotations=replace(floor.annotations, docks=seen.annotations.docks)
-    )
+def _start_of(robot: Robot, floors: Sequence[FloorMap]) -> FloorMap:
+    """Return the floor of the bound dock, else the default one."""
+    bound = robot[Settings].get(BOUND)
+    return max(floors, key=lambda f: (bound in {dock.id for dock in f.annotations.docks}, f.name.default))
+
+
+def _require_grids(floors: Sequence[FloorMap]) -> None:
+    """Raise InvalidGoal for a floor that could not be loaded."""
+    for floor in floors:
+        if floor.grid is None:
+            raise InvalidGoal(f"floor {floor.name.floor} of the map has no grid" if floor.name.floor else NO_GRID)
 
 
 async def _put_drawings(robot: Robot, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
