@@ -7,6 +7,7 @@ import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import grpc
 import pytest
@@ -169,13 +170,24 @@ async def test_call_during_attempt_leads_to_next_at_once(clock: LockstepClock) -
     await link.close()
 
 
-async def test_calls_without_end_leave_pauses_between_attempts(clock: LockstepClock) -> None:
+async def test_calls_without_end_leave_pauses_between_attempts(
+    clock: LockstepClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor do they wake the link each: a client that is no app may call thousands of times a second."""
+    wait_for, woken = clock.wait_for, list[float]()
+
+    def counted(awaited: Any, left: float) -> Any:
+        woken.append(left)
+        return wait_for(awaited, left)
+
+    monkeypatch.setattr(clock, "wait_for", counted)
     link = Dialling(clock, None, AppRoute(ADDRESS, "127.0.0.1:1", 1), ticks=lambda _: Ticks())
     link.start()
     for _ in range(400):
         await clock.advance(0.1)
         link.seen("ipv4:127.0.0.1:4711")
     assert link.attempts == pytest.approx([0.0, 5.0, 12.0, 21.0, 30.0, 39.0], abs=0.11)
+    assert len(woken) <= 2 * len(link.attempts)
     await link.close()
 
 

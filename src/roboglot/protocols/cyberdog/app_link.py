@@ -88,6 +88,7 @@ class AppLink:
         self._news = asyncio.Event()  # set when the address changes or a client calls: dial at once
         self._line: AppLine | None = None
         self._ended = False
+        self._called = False  # since the last dial: one call is as good as many
         self._outboxes: dict[int, Outbox] = {}
         self._beats = Beats()
         self._task: asyncio.Task[None] | None = None
@@ -110,11 +111,14 @@ class AppLink:
         """Record a request from ``peer`` (as gRPC writes it): the app may be there."""
         if self.connected and self._target:
             return  # calls of other clients must not take the app's place
+        before = self._target
         if self._configured:
             self._target = self._configured
         elif host := host_of(peer):
             self._target = f"{host}:{self._app_port}"
-        self._news.set()
+        if self._target != before or not self._called:
+            self._called = True
+            self._news.set()
 
     def forget(self) -> None:
         """Drop the address: no heartbeats until the next request comes."""
@@ -147,7 +151,7 @@ class AppLink:
         while True:
             if not self._target:
                 await self._news.wait()
-                self._news.clear()
+                self._answer_calls()
                 continue
             target = self._target
             if await self._keep(target):
@@ -170,7 +174,13 @@ class AppLink:
                 break
             self._news.clear()
             called, end = True, min(end, begun + least)
+        self._called = False
         return called
+
+    def _answer_calls(self) -> None:
+        """Note that a dial begins, or has succeeded: later calls count again."""
+        self._called = False
+        self._news.clear()
 
     async def _keep(self, target: str) -> bool:
         """Dial ``target`` and send heartbeats until it is lost or moves; return whether one got through."""
@@ -231,7 +241,7 @@ class AppLink:
         if connected == self.connected:
             return
         self.connected = connected
-        self._news.clear()  # pending calls have been answered
+        self._answer_calls()
         log.info("app at %s %s", self._target or "a forgotten address", "connected" if connected else "lost")
         if connected:
             self._remember(self._target.rpartition(":")[0])
