@@ -6,8 +6,9 @@ What no action moves has to stand, and once all clients are gone the robot comes
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 import pytest
@@ -29,11 +30,28 @@ LOOK = 0.1  # s between two looks
 GRACE = 0.5  # s after the last action in which a part may come to rest
 CREEP, TURN = 0.003, 0.01  # m and rad between two looks up to which a robot stands
 SHOWN = 40  # lines of the diary that a failure shows
+CHOSEN = os.environ.get("WALKS", "")  # "5000-5100": these walks instead of the usual ones, the last one included
 
 
 def seeds(quick: int, slow: int) -> list[Any]:
-    """Return numbers of walks: the first few for every run, the others for ``--slow``."""
+    """Return numbers of walks: the first few for every run, the others for ``--slow``; or those of ``WALKS``."""
+    if CHOSEN:
+        first, _, last = CHOSEN.partition("-")
+        return list(range(int(first), int(last or first) + 1))
     return [*range(quick), *(pytest.param(number, marks=pytest.mark.slow) for number in range(quick, slow))]
+
+
+class Diary(list[tuple[object, ...]]):
+    """Lines about what was asked and answered on a walk."""
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Print its end if the walk fails."""
+        try:
+            yield
+        except BaseException:
+            print(*self[-SHOWN:], sep="\n")
+            raise
 
 
 class Witness:
@@ -45,7 +63,7 @@ class Witness:
         robot.events.listen(ActionChanged, self._note)
         self._joints: dict[str, tuple[float, ...]] = {}
         self._before, self._followed = (self.now, self.pose), -math.inf
-        self.diary: list[tuple[object, ...]] = []
+        self.diary = Diary()
         self.rolls = False  # its brake is released, or hands move it
         self.stopped_at = math.inf  # s: an emergency stop; it has to stand GRACE later, whatever runs
 
@@ -66,14 +84,9 @@ class Witness:
         """Write a line into the diary."""
         self.diary.append((round(self.now, 2), *words))
 
-    @contextmanager
-    def writing(self) -> Iterator[None]:
+    def writing(self) -> AbstractContextManager[None]:
         """Print the diary's end if the walk fails."""
-        try:
-            yield
-        except BaseException:
-            print(*self.diary[-SHOWN:], sep="\n")
-            raise
+        return self.diary.writing()
 
     async def pass_time(self, seconds: float) -> None:
         """Let time pass, and look."""

@@ -117,7 +117,7 @@ class Walk:
         self._numbers = 0
         self._stopped = False  # an emergency stop was answered, and nothing has been asked since that lifts it
         self._lifted = 0  # the last call that may
-        self._joined = 0  # the last call that takes over another one's stream
+        self._joined = {JOIN: 0, JOIN_JOB: 0}  # the last call of each that takes over another one's stream
         self._origin = witness.pose
         robot.events.listen(MapReplaced, self._follow)
 
@@ -131,8 +131,8 @@ class Walk:
         self._witness.note(self._numbers, "->", code, params)
         if (code == MOTION and params["motion_id"] == STAND) or code in (INSTALL, JOB):  # a restarted dog may stand
             self._lifted, self._stopped = self._numbers, False
-        if code == JOIN:
-            self._joined = self._numbers
+        if code in self._joined:
+            self._joined[code] = self._numbers
         call = Call(self._numbers, code, params, self._draw.choice(self.clients).open(code, params), self._witness.now)
         call.reading = asyncio.create_task(self._read(call))
         self._calls.append(call)
@@ -200,8 +200,8 @@ class Walk:
                 self._judge_task(call)
             case 5010:
                 assert call.answers[0] in ({"accepted": 1}, {"accepted": 2}), call
-                refused = call.answers[0] == {"accepted": 2}
-                assert refused or has_keys(call.answers[-1], {"id": (int, str), "operate": str, "code": int}), call
+                short = call.answers[0] == {"accepted": 2} or call.number < self._joined[JOIN_JOB]  # or taken over
+                assert short or has_keys(call.answers[-1], {"id": (int, str), "operate": str, "code": int}), call
             case 10001:
                 [answer] = call.answers
                 TaskState(answer["task_status"]["task_status"])
@@ -236,7 +236,7 @@ class Walk:
         assert all(has_keys(one, {"feedback_code": int, "feedback_msg": str}) for one in between), call
         for one in between:
             Feedback(one["feedback_code"])
-        taken_over = call.number < self._joined and "result" not in last
+        taken_over = call.number < self._joined[JOIN] and "result" not in last
         assert taken_over or last in ({"result": 0}, {"result": 3}, {"result": 5}), call
         if last == {"result": 0} and call.code == TASK and call.params["type"] == TaskType.NAVIGATION:
             goal = self._origin.compose(Pose(call.params["goalX"], call.params["goalY"]))

@@ -107,3 +107,12 @@ async def test_home_is_on_start_or_bound_floor(robot: Robot, client: httpx.Async
     assert (maps.home(), await start_floors()) == ("A/2", ["2"])
     await ok(await client.post(f"{MULTI}/stcm/:reload"))  # as after a restart
     assert (await client.get(current)).json()["floor"] == "2"
+
+
+async def test_map_with_a_dock_far_away_is_loaded(client: httpx.AsyncClient, forward: Forward) -> None:
+    await forward(seconds=1)
+    await ok(await client.put(f"{SLAM}/homepose", json={"x": 0.8, "y": -90_000.0, "yaw": 2.0}))
+    await ok(await client.post(f"{MULTI}/stcm/:save"))
+    await ok(await client.post(f"{MULTI}/stcm/:reload"))
+    assert (await client.get("/api/multi-floor/status")).json()["map_load_status"] == "LOADED"
+    assert len((await client.get(f"{MULTI}/floors")).json()) == 1

@@ -250,7 +250,7 @@ class MapKeeper:
         self._layers, self.current = floor.layers, floor.name
         self._loaded.restore()
         if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
-            self._robot[Localization].set_pose(dock.pose if is_docked(self._robot) else before(dock))
+            _take_place_at(dock, self._robot)
 
     async def clear(self) -> None:
         """Clear the map and begin a new one where the robot is; return once the drawings are on it."""
@@ -319,6 +319,14 @@ def _start_of(robot: Robot, floors: Sequence[FloorMap]) -> FloorMap:
     """Return the floor of the bound dock, else the default one."""
     bound = robot[Settings].get(BOUND)
     return max(floors, key=lambda f: (bound in {dock.id for dock in f.annotations.docks}, f.name.default))
+
+
+def _take_place_at(dock: PointOfInterest, robot: Robot) -> None:
+    """Take the robot to be on its dock or in front of it; at the map's origin if a file has the dock off any map."""
+    try:
+        robot[Localization].set_pose(dock.pose if is_docked(robot) else before(dock))
+    except InvalidGoal as error:
+        log.warning("the home dock of robot %s cannot be its place: %s", robot.id, error)
 
 
 def _require_grids(floors: Sequence[FloorMap]) -> None:
