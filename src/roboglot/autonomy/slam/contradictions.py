@@ -2,8 +2,9 @@
 
 In a static world, all points that distinguish both poses agree. If they disagree, some are on moving things, and the
 wheels are believed: their pose, matched to walls alone. The wheels are also believed if only surfaces that were painted
-a moment ago, and are no walls, support the scan's pose. Robots driving ahead drag matches back by millimetres per step,
-too little for a single step: so the last seconds are judged too. Needs the kernels.
+a moment ago, and are no walls, support the scan's pose, unless wheels may well be as far off as that: on new floor all
+surfaces are new. Robots driving ahead drag matches back by millimetres per step, too little for a single step: so the
+last seconds are judged too. Needs the kernels.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ VOTES_MIN = 4  # votes for odometry below which it is ignored, as far as the lid
 NOISE_MAX = 0.1  # m between both poses from which no noise makes a point prefer the wrong one
 STOOD = 0.02  # m driven up to which a robot stood, and its wheels cannot be that wrong
 SIGMAS = 1.0  # of odometry: smaller contradictions are its own errors
+FRESH_SIGMAS = 3.0  # of odometry: new surfaces that fit the scan are no evidence against it up to there
 WAY_MAX, TURN_MAX = 0.3, 0.3  # m, rad: longer steps of odometry are no evidence against a scan
 PASTS = (1.0, 4.0)  # s of history over which odometry is compared again
 PAST_TURN_MAX = 2.0  # rad turned within them, at most
@@ -136,7 +138,8 @@ def contested(
 
     ``before``: pose by odometry (``prior``: its covariance; ``sigma``: its standard deviation, m) after ``way`` m.
     """
-    if best.pose.distance_to(before) < max(CONTRADICTION, SIGMAS * sigma):
+    contradiction = best.pose.distance_to(before)
+    if contradiction < max(CONTRADICTION, SIGMAS * sigma):
         return None
     tight = prior.copy()
     tight[:2, :] = tight[:, :2] = 0.0
@@ -152,7 +155,7 @@ def contested(
     least = max(GAP_MIN, TELLING * apart)
     for_wheels = np.count_nonzero((off_scan - off_wheels > least) & (off_wheels < FITS))
     for_scan = np.count_nonzero(votes := (off_wheels - off_scan > least) & (off_scan < FITS))
-    if way > STOOD and for_scan:
+    if way > STOOD and for_scan and contradiction > FRESH_SIGMAS * sigma:
         fresh = _fresh(grid, scan.in_frame(best.pose, points[votes & ~on_walls(points)]))
         for_wheels, for_scan = for_wheels + fresh, for_scan - fresh
     jumped = apart >= NOISE_MAX and way <= STOOD
