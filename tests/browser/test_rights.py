@@ -49,6 +49,7 @@ BUTTONS = {
 }
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
 TRY = "(body) => fetch('/api/sign_in', {method: 'POST', body}).then((reply) => reply.status)"
+FUNCTION = {"blocks": {"blocks": [{"type": "procedures_defnoreturn", "id": "def", "fields": {"NAME": "dance"}}]}}
 Page = Any
 Open = Callable[..., Awaitable[Page]]
 
@@ -163,6 +164,11 @@ async def test_studio_says_which_right_its_buttons_need(guarded: Guarded, open_p
     assert await page.get_attribute(".stop", "aria-disabled") is None
     await page.keyboard.press("F5")
     await page.wait_for_selector(".notice.bad >> text=You lack the right to program.")
+    await page.evaluate("state => studio.editor.load(state)", FUNCTION)
+    await page.locator("[data-id=def] > .blocklyPath").first.click(button="right", position={"x": 12, "y": 12})
+    words = "Keep as a module: You lack the right to program."
+    await page.wait_for_selector(f".blocklyMenuItemDisabled >> text={words}")
+    await page.keyboard.press("Escape")
     await page.click("#tab-group")
     lacking = "[title='You lack the right to admin on all robots.']"
     await page.wait_for_selector(f"button:has-text('Open a class'){lacking}")

@@ -1,7 +1,7 @@
 // Modules of one's own: kept from a function's blocks, opened again, and shown from inside while they run.
 import * as Blockly from "blockly";
 import { useEffect, useRef } from "preact/hooks";
-import { html, say, t, translated } from "../base.js";
+import { html, lacks, say, t, translated } from "../base.js";
 import { defineModule } from "./blocks.js";
 import * as editor from "./editor.js";
 import { ask, frame } from "./link.js";
@@ -141,6 +141,7 @@ export function Inside({ name, block }) {
 }
 
 Blockly.ContextMenuRegistry.registry.register({
-  id: "module", weight: 1, scopeType: Blockly.ContextMenuRegistry.ScopeType.BLOCK, displayText: () => t("studio.module.keep"),
-  preconditionFn: ({ block }) => (DEFINITIONS.has(block.type) ? "enabled" : "hidden"), callback: ({ block }) => { keep(block); },
+  id: "module", weight: 1, scopeType: Blockly.ContextMenuRegistry.ScopeType.BLOCK,
+  displayText: () => [t("studio.module.keep"), lacks("program")].filter(Boolean).join(": "),
+  preconditionFn: ({ block }) => (DEFINITIONS.has(block.type) ? (lacks("program") ? "disabled" : "enabled") : "hidden"), callback: ({ block }) => { keep(block); },
 });
