@@ -12,6 +12,7 @@ from tests.browser.test_studio import COUNTING, FOREVER, READY, Open, Page, load
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 COLOUR = "name => getComputedStyle(document.querySelector(name)).backgroundColor"
+ENDED = "ended by the user"
 WORD = "document.querySelector('.phase').textContent"
 ONLINE = "import('/studio/link.js').then(link => link.online.value)"
 
@@ -24,13 +25,17 @@ async def opens_text(page: Page, text: str) -> None:
 
 async def test_line_of_a_running_text_is_lit(studio: Open) -> None:
     page = await studio()
-    await opens_text(page, "import time\nprint('hi')\ntime.sleep(1000)\n")  # of robot time, which stands still
+    await opens_text(page, f"import time\nprint({ENDED!r})\ntime.sleep(1000)\n")  # of robot time, which stands still
     await page.keyboard.press("F5")
     await until(page, "document.querySelector('.cm-line.here')?.textContent === 'time.sleep(1000)'")
     colours = [await page.evaluate(COLOUR, name) for name in (".cm-gutters", "header")]
     assert colours[0] == colours[1]  # the theme's, not the editor's
     await page.keyboard.press("Shift+F5")
     await until(page, "!document.querySelector('.cm-line.here')")
+    log = "[...document.querySelectorAll('.printed li')].map(line => line.textContent)"
+    await shows(page, log, [ENDED, ENDED])
+    await page.click("header >> text=中文")
+    await shows(page, log, [ENDED, "由用户结束"])  # the program's words are its own
     assert page.errors == []
 
 

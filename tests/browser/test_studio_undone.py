@@ -7,7 +7,7 @@ import json
 import pytest
 
 from tests.browser.served import shows, until
-from tests.browser.test_studio import Open, loaded, phase, prints, studio
+from tests.browser.test_studio import READY, Open, loaded, phase, prints, studio
 
 __all__ = ["studio"]  # the fixture
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -46,6 +46,11 @@ async def test_run_ends_with_what_was_refused(studio: Open) -> None:
     await page.click("header >> text=中文")
     zh = "x_velocity = 5 超出 -1.6 到 1.6 m/s"
     await shows(page, "document.querySelector('.value-bubble[data-of=fast] text')?.textContent", zh)
+    await page.reload()  # the page is another, the run is the same
+    await until(page, READY)
+    await shows(page, WORD, "已结束：机器人没能全部做到")
+    await page.wait_for_selector(f".panel .failure[role=status] >> text={zh}")
+    await until(page, "document.querySelector('.wrong')?.dataset.id === 'fast'")
     assert page.errors == []
 
 

@@ -25,7 +25,7 @@ OUTSIDE = ("config.py", "console/", "model/", "rehearsal.py", "runtime.py", "sim
 TAILS = "spelling.py"  # what it returns is added to sentences
 NAMED = {"why", "reason", "words", "wrong"}  # variables and arguments that hold such a sentence
 # Position of the argument, where not the first.
-LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1, "state": 1, "_answer": 1}
+LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1, "write": 1, "state": 1, "_answer": 1}
 HOLE = "{}"
 
 

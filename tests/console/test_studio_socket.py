@@ -28,6 +28,7 @@ from tests.console.conftest import Shown
 
 ATTACKS = sorted((Path(__file__).parent.parent / "programs" / "attacks").rglob("*.py"))
 SAVE = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now", "describe": "t"}
+RUN = {"type": "task", "operate": "run", "target_id": ["t"], "mode": "single", "condition": "now"}
 
 
 class Page:
@@ -90,7 +91,7 @@ async def test_program_is_saved_run_halted_and_stepped(shown: Shown) -> None:
         stops = {"target_id": "t", "operate": "break", "first_block": True, "watched": True}
         await studio.say(type="debug", id=5, text=json.dumps(stops))
         assert json.loads((await studio.kind("debugged"))["text"])["error"] == ""
-        await studio.frame(type="task", operate="run", target_id=["t"], id="2", mode="single", condition="now")
+        await studio.frame(**RUN, id="2")
         await studio.until(lambda m: m["type"] == "frame" and "now state is suspend" in m["text"])
         assert [m["variables"] for m in studio.heard if m["type"] == "variables"][-1] == {"n": "1"}
         await studio.say(type="debug", id=6, text=json.dumps({"target_id": "t", "operate": "step_block"}))
@@ -117,11 +118,10 @@ print(3)
 async def test_steps_go_over_and_out_of_functions(shown: Shown) -> None:
     async with page(shown) as studio:
         assert (await studio.frame(**SAVE, id="1", body=CALLING))["feedback"]["state"] == 0
-        await studio.say(
-            type="debug", id=5, text=json.dumps({"target_id": "t", "operate": "break", "first_block": True})
-        )
+        stops = {"target_id": "t", "operate": "break", "first_block": True}
+        await studio.say(type="debug", id=5, text=json.dumps(stops))
         await studio.kind("debugged")
-        await studio.frame(type="task", operate="run", target_id=["t"], id="2", mode="single", condition="now")
+        await studio.frame(**RUN, id="2")
         blocks = []
         for id, operate in enumerate(("over_block", "step_block", "out_block", "where"), start=6):
             await studio.until(lambda m: m["type"] == "frame" and "now state is suspend" in m["text"])
@@ -142,7 +142,7 @@ async def test_page_lights_only_blocks_of_its_own_program(shown: Shown) -> None:
         await theirs.kind("opened")
         body = "cyberdog.task.block('one')\nprint(1)\n"
         await mine.frame(**SAVE, id="1", body=body)
-        await mine.frame(type="task", operate="run", target_id=["t"], id="2", mode="single", condition="now")
+        await mine.frame(**RUN, id="2")
         for one in (mine, theirs, every):
             await one.until(lambda m: m["type"] == "frame" and "stop task" in m["text"])
         heard = [[m["type"] for m in one.heard if '"begin"' in m.get("text", "") or m["type"] == "log"]
@@ -382,11 +382,19 @@ async def test_functions_that_answer_nothing_are_no_readings(shown: Shown) -> No
     async with page(shown) as studio:
         body = "import time\ntime.sleep(0)\ntime.monotonic()\nprint('end')\n"
         await studio.frame(**SAVE, id="1", body=body)
-        await studio.say(
-            type="frame",
-            text=json.dumps(
-                {"type": "task", "operate": "run", "target_id": ["t"], "id": "2", "mode": "single", "condition": "now"}
-            ),
-        )
+        await studio.say(type="frame", text=json.dumps({**RUN, "id": "2"}))
         await studio.kind("log")
         assert [m["function"] for m in studio.heard if m["type"] == "reading"] == ["time.monotonic"]
+
+
+async def test_later_pages_learn_what_was_refused(shown: Shown) -> None:
+    found = []
+    for body in "for n in (7.0, 7.0, 8.0):\n    cyberdog.motion.go_straight(n)\n", "print(1)\n":
+        async with page(shown) as studio:
+            await studio.frame(**SAVE, id="1", body=body)
+            await studio.say(type="frame", text=json.dumps({**RUN, "id": "2"}))
+            await studio.until(lambda m: m["type"] == "frame" and "stop task" in m["text"])
+        async with page(shown) as later:
+            await later.say(type="fetch", id=5, program="t")
+            found += [(c["line"], c["refused"].split()[2]) for c in (await later.kind("fetched"))["refused"]]
+    assert found == [(2, "7"), (2, "8")]  # the second run leaves none

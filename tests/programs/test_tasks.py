@@ -18,6 +18,7 @@ from roboglot.model.components.system.firmware import (
 )
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sensing import BatteryState
+from roboglot.programs.tasks.reports import REFUSED_MAX, NewestRun, Reading
 from roboglot.programs.tasks.robot_modes import ALLOWED, RobotMode, mode_of
 from roboglot.programs.tasks.states import TaskOperation, TaskState, next_state
 
@@ -130,3 +131,11 @@ def test_power_and_firmware_decide_the_mode(
     progress = FirmwareProgress(firmware)
     robot.add(Firmware, cast(Firmware, SimpleNamespace(progress=progress, restarting=restarting)))
     assert mode_of(robot) == mode
+
+
+def test_run_keeps_its_first_refused_calls_once() -> None:
+    run = NewestRun(0.0)
+    run.note(Reading("t", 1, "", "block", "cyberdog.motion.turn", "(State)"))
+    for n in range(3 * REFUSED_MAX):
+        run.note(Reading("t", 2, "", "block", "cyberdog.motion.turn", "(State)", f"reason {n // 2}"))
+    assert [call.refused for call in run.refused] == [f"reason {n}" for n in range(REFUSED_MAX)]

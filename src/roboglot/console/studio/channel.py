@@ -305,6 +305,7 @@ class Session:
             found = await (service.library.get(request.program) if request.module else service.get(request.program))
         entries = await service.log(request.program) if request.log and not request.module else []
         where = await service.whereabouts(request.program)
+        newest = service.newest.get(request.program)
         self.post(
             {
                 "type": "fetched",
@@ -312,7 +313,8 @@ class Session:
                 "program": found,
                 "log": [_entry(request.program, entry) for entry in entries],
                 "where": where,
-                "began": service.began.get(request.program),  # its newest run; null: before the server did
+                "began": newest and newest.began,  # its newest run; null: before the server did
+                "refused": newest.refused if newest else [],
             }
         )
 

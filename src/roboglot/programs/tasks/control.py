@@ -30,8 +30,11 @@ class ControlWatch:
         """Number of motions refused or ended, and the last reason; empty without any."""
         if not self._count:
             return ""
-        motions = "1 motion was" if self._count == 1 else f"{self._count} motions were"
-        return f"{motions} not carried out: {self._reason}"
+        if self._count == 1:
+            words = f"1 motion was not carried out: {self._reason}"
+        else:
+            words = f"{self._count} motions were not carried out: {self._reason}"
+        return words
 
     def _refused(self, event: ControlRefused) -> None:
         if event.client != self._client:
@@ -39,4 +42,5 @@ class ControlWatch:
         self._count += 1
         if event.reason != self._reason:
             self._reason = event.reason
-            self._write(f"{event.doing} was not carried out: {event.reason}")
+            words = f"{event.doing} was not carried out: {event.reason}"
+            self._write(words)

@@ -21,10 +21,10 @@ def settle(stores: Stores, now: float) -> dict[str, str]:
     states = {task.id: "run_wait" if task.mode == "cycle" else "shutdown" for task in left if task.id not in lost}
     if states:
         log.warning("%d tasks were lost when the server ended: %s", len(states), ", ".join(states)[:500])
-        note = "the server ended while the task was under way; it was not continued"
-        stores.tasks.settle_now(states, LogEntry(now, "error", note))
+        words = "the server ended while the task was under way; it was not continued"
+        stores.tasks.settle_now(states, LogEntry(now, "error", words))
     if lost:
-        note = "the server ended while the task was under way; it is suspended: recover it to go on, or shut it down"
-        entry = LogEntry(now, "note", note)
+        words = "the server ended while the task was under way; it is suspended: recover it to go on, or shut it down"
+        entry = LogEntry(now, "note", words)
         stores.tasks.settle_now(dict.fromkeys(lost, TaskState.SUSPEND.value), entry)
     return lost

@@ -62,6 +62,26 @@ class Reading:
     refused: str = ""
 
 
+REFUSED_MAX = 20  # refused calls that are kept of a run
+
+
+@dataclass(frozen=True, slots=True)
+class NewestRun:
+    """Record of a run that is kept until the task's next: its start and its first refused calls.
+
+    ``began``: Unix s, 0 for a run that a crash interrupted. A call is kept once for each place and reason.
+    """
+
+    began: float
+    refused: list[Reading] = field(default_factory=list)
+
+    def note(self, call: Reading) -> None:
+        """Keep a call if it was refused."""
+        known = [(one.line, one.module, one.refused) for one in self.refused]
+        if call.refused and len(known) < REFUSED_MAX and (call.line, call.module, call.refused) not in known:
+            self.refused.append(call)
+
+
 @dataclass(frozen=True, slots=True)
 class Variables:
     """Values of a watched task's variables, as short text."""

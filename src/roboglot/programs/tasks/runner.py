@@ -20,7 +20,7 @@ from roboglot.programs.errors import CannotExecute, EngineTimeout, ProgramError,
 from roboglot.programs.functions import ability_set
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LogEntry, StoredProgram, Stores
-from roboglot.programs.tasks.reports import Audience, Insight, Pace, TaskReport, done
+from roboglot.programs.tasks.reports import Audience, Insight, NewestRun, Pace, TaskReport, done
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, state_after
 from roboglot.programs.tasks.task_run import Outcome, RunListeners, TaskRun, in_units
 from roboglot.values import dataclass
@@ -59,7 +59,7 @@ class Runner:
     """Starter and supervisor of runs.
 
     ``runs``: running and suspended tasks by id; ``stops``: breakpoints of later starts by the task's id.
-    ``began``: ``TaskRun.started`` of the newest run of each task.
+    ``newest``: what is kept of the newest run of each task since the server's start.
     ``ended`` is called with each ended task and its new state.
     """
 
@@ -76,7 +76,7 @@ class Runner:
     ) -> None:
         self.runs: dict[str, TaskRun] = {}
         self.stops: dict[str, Stops] = {}
-        self.began: dict[str, float] = {}
+        self.newest: dict[str, NewestRun] = {}
         self.reports = Audience[[TaskReport]]()
         self.log_entries = Audience[[str, LogEntry]]()
         self.pace, self.log_pace = Pace(), Pace()
@@ -199,10 +199,10 @@ class Runner:
             await run.kill()  # no client could know of it
             raise
         self.runs[task.id] = living
-        self.began[task.id] = living.started
+        self.newest[task.id] = living.lasting
         return living
 
-    async def end(self, id: str, why: str) -> TaskState:
+    async def end(self, id: str, *, why: str) -> TaskState:
         """Kill a run and store the state of its task."""
         run = self.runs[id]
         await run.kill()

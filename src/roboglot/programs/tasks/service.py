@@ -40,8 +40,8 @@ class ProgramService:
 
     ``reports`` publishes changes of tasks, ``log_entries`` new lines of their logs, ``insights`` results of functions
     and values of variables. Programs wait for the front ends in ``pace`` after each block, for the readers in
-    ``log_pace`` after each line. ``began``: start of a task's newest run since the server's, in seconds since 1970,
-    0 for one that a crash interrupted. ``zone`` is the time zone of conditions and of ``time.localtime``.
+    ``log_pace`` after each line. ``newest``: what is kept of each task's newest run since the server's start. ``zone``
+    is the time zone of conditions and of ``time.localtime``.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class ProgramService:
             ended=self._timetable.wait_again,
         )
         self.reports, self.log_entries, self.pace = self._runner.reports, self._runner.log_entries, self._runner.pace
-        self.began = self._runner.began
+        self.newest = self._runner.newest
         self.insights, self.log_pace = self._runner.insights, self._runner.log_pace
         self._runs = self._runner.runs
         self._fires = Background()
@@ -94,7 +94,7 @@ class ProgramService:
         async with self._lock:
             for run in self._runs.values():
                 run.call_off()
-            await asyncio.gather(*(self._runner.end(id, _shut_down(run)) for id, run in tuple(self._runs.items())))
+            await asyncio.gather(*(self._runner.end(id, why=_shut_down(run)) for id, run in tuple(self._runs.items())))
         await self._fires.done()
         await self._runner.done()
         self._timetable.clear()
@@ -151,7 +151,7 @@ class ProgramService:
         async with self._turns.take():
             uses = self.library.ids(names)
             if DEBUG in self._runs:
-                await self._runner.end(DEBUG, "another debug run took over")
+                await self._runner.end(DEBUG, why="another debug run took over")
             kept = await self._keep(
                 replace(task, id=DEBUG, mode="single", condition="now", owner=identity()),
                 TaskOperation.DEBUG,
@@ -261,7 +261,7 @@ class ProgramService:
 
     async def _shut_down(self, id: str, before: TaskState) -> TaskState:
         if id in self._runs:
-            return await self._runner.end(id, "ended by the user")
+            return await self._runner.end(id, why="ended by the user")
         task = await self._store.get(id)
         state = state_after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
         await self._store.set_state(id, state)
@@ -274,14 +274,14 @@ class ProgramService:
             await self._check_table(TaskOperation.DELETE, id)
             await self._store.remove(id)
             self._runner.stops.pop(id, None)
-            self._runner.began.pop(id, None)
+            self._runner.newest.pop(id, None)
 
     async def end_of(self, owner: str, why: str) -> None:
         """End all runs of ``owner``."""
         for id in [id for id, run in self._runs.items() if run.task.owner == owner]:
             async with self._turns.take():
                 if id in self._runs:
-                    await self._runner.end(id, why)
+                    await self._runner.end(id, why=why)
 
     async def _check_table(self, operation: TaskOperation, id: str) -> TaskState:
         """Return the task's current state if the tables allow ``operation``. Raises NotAllowed."""
@@ -342,5 +342,8 @@ class ProgramService:
 
 def _shut_down(run: TaskRun) -> str:
     """Return the note in the log of a task that an orderly end of the server ends."""
-    doing = "suspended" if run.state is TaskState.SUSPEND else "under way"
-    return f"the server shut down while the task was {doing}; the task was ended"
+    if run.state is TaskState.SUSPEND:
+        why = "the server shut down while the task was suspended; the task was ended"
+    else:
+        why = "the server shut down while the task was under way; the task was ended"
+    return why

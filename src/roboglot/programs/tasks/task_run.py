@@ -38,6 +38,7 @@ from roboglot.programs.tasks.reports import (
     Audience,
     Insight,
     LogListener,
+    NewestRun,
     Pace,
     Reading,
     Report,
@@ -111,6 +112,7 @@ class TaskRun:
         self._block_stops = BlockStops(run.position, stops)
         self._insights = listeners.insights
         self.started = 0.0 if replaying else robot.clock.epoch()  # this run's log begins here
+        self.lasting = NewestRun(self.started)
         self.variables: dict[str, str] = {}
 
         def notice(held: dict[str, str]) -> None:
@@ -295,11 +297,11 @@ class TaskRun:
         if request.name in MARKS:
             await self._pace.wait()
             self._halts |= self._block_stops.halts(self.block)
-        elif value is not None and self._insights.listening:
+        elif value is not None and ((why := refusal(value)[:SHORT_MAX]) or self._insights.listening):
             place = self.line, self.module, self.block
-            self._insights.publish(
-                Reading(self.task.id, *place, request.name, in_short(value), refusal(value)[:SHORT_MAX])
-            )
+            reading = Reading(self.task.id, *place, request.name, in_short(value), why)
+            self.lasting.note(reading)
+            self._insights.publish(reading)
         if request.name == "time.monotonic" and isinstance(value, float):
             value += self._replay.ahead
         return value

@@ -8,7 +8,7 @@ import { blocksOfLines } from "./blocks.js";
 import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
 import { body, continueAsText, program } from "./program.js";
-import { failure, line, lit, phase, halt, printed, problems, readings, refused, textBreaks, variables } from "./runner.js";
+import { failure, line, lineOf, lit, phase, halt, printed, problems, readings, refused, textBreaks, variables } from "./runner.js";
 import { Refused, Simulate } from "./missions.js";
 import { makeText } from "./text.js";
 
@@ -90,7 +90,7 @@ export function Output() {
     if (box) box.scrollTop = box.scrollHeight;
   }, [printed.value.length]);
   return html`<${Failure} />
-    <ol class="printed" aria-label=${t("studio.tab.output")} aria-live="polite">${printed.value.length ? printed.value.map((e) => html`<li key=${e.key} class=${e.level}>${e.text || " "}</li>`) : html`<li class="muted">${t("studio.output.none")}</li>`}</ol><span ref=${end}></span>`;
+    <ol class="printed" aria-label=${t("studio.tab.output")} aria-live="polite">${printed.value.length ? printed.value.map((e) => html`<li key=${e.key} class=${e.level}>${lineOf(e) || " "}</li>`) : html`<li class="muted">${t("studio.output.none")}</li>`}</ol><span ref=${end}></span>`;
 }
 
 export function Values() {

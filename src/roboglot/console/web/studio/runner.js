@@ -14,7 +14,7 @@ export const phase = signal(/** @type {"idle" | "starting" | "running" | "paused
 export const lit = signal(""); // the block
 export const line = signal(0); // of a program that is text
 export const module = signal(""); // whose block is lit, "" for the program's own
-export const printed = signal(/** @type {{text: string, level: string, key: number}[]} */ ([]));
+export const printed = signal(/** @type {{text: string, level: string, key: number, en?: string, zh?: string}[]} */ ([]));
 export const variables = signal(/** @type {Record<string, string>} */ ({}));
 export const readings = signal(/** @type {any[]} */ ([]));
 export const problems = signal(/** @type {any[]} */ ([])); // of the checker
@@ -159,10 +159,10 @@ const HELD = /** @type {Record<string, "running" | "paused">} */ ({ run: "runnin
 /** What was missed of the program while the page was away. */
 async function rejoin() {
   await learn(python());
-  const { id } = program.value, began = runs, { log, where, program: stored, began: last } = await ask({ type: "fetch", program: id });
+  const { id } = program.value, began = runs, { log, where, program: stored, began: last, refused: calls } = await ask({ type: "fetch", program: id });
   if (!mine(id) || began !== runs) return; // another was opened or it was started meanwhile
   const lines = log.filter((/** @type {any} */ e) => last !== null && e.stamp >= last).slice(-LINES_MAX);
-  if (last !== null) printed.value = lines.map(entry);
+  if (last !== null) { printed.value = lines.map(entry); refused.value = calls.map((/** @type {any} */ one) => ({ ...one, words: one.refused })); }
   if (!HELD[where.state]) { settle("idle"); if (last !== null) ended(lines, stored?.body ?? ""); return; }
   under.value = stored?.body ?? null;
   failure.value = null;
@@ -170,6 +170,7 @@ async function rejoin() {
   bubbles.held(where.variables);
   phase.value = HELD[where.state];
   place(where.block, where.line, where.module);
+  show();
 }
 
 /** How the last run ended. @param {any[]} lines @param {string} text of the program then */
@@ -210,7 +211,9 @@ async function look() {
   if (where) place(where.block, where.line, where.module);
 }
 
-const entry = (/** @type {any} */ e) => ({ text: e.en ? `${words(e)}\n${e.text}` : e.text, level: e.level, key: next++ });
+const entry = (/** @type {any} */ e) => ({ ...e, key: next++ });
+/** A line of the log as it is shown: what the program did not print itself are the server's words. @param {any} e */
+export const lineOf = (e) => (e.en ? `${words(e)}\n${e.text}` : e.level === "print" ? e.text : translated(e.text));
 
 effect(() => { if (unknown.value) untracked(() => place("", 0, "")); }); // it may be anywhere by now
 const LOOK_EVERY = 100; // ms between two looks at the line of a text: no block says it
