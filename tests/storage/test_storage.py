@@ -22,7 +22,7 @@ from roboglot.model.events import EventStream, PlacesChanged
 from roboglot.model.geodesy import GlobeAnchor
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
-from roboglot.storage.database import ROBOTS, Database, connect
+from roboglot.storage.database import ROBOTS, Database, _migrate, connect
 from roboglot.storage.maps import StoredMaps
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
@@ -62,6 +62,16 @@ def test_programs_may_open_a_new_file_at_once(schema: str, tmp_path: Path) -> No
     with ThreadPoolExecutor(PROGRAMS) as programs:
         versions = [opening.result() for opening in [programs.submit(open_new) for _ in range(PROGRAMS)]]
     assert min(versions) == max(versions) > 0
+
+
+@pytest.mark.parametrize("schema", [ROBOTS, *(f"{ROBOTS}.{name}" for name in ("access", "audit", "sessions"))])
+def test_new_file_equals_one_of_all_versions(schema: str, tmp_path: Path) -> None:
+    with closing(sqlite3.connect(tmp_path / "old.db", isolation_level=None)) as old:
+        _migrate(old, schema, in_steps=True)
+        with closing(connect(tmp_path / "new.db", schema)) as new:
+            for wanted in ("PRAGMA user_version", "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY name"):
+                assert new.execute(wanted).fetchall() == old.execute(wanted).fetchall() != []
+            assert list(new.iterdump()) == list(old.iterdump())
 
 
 async def test_places_come_back_in_order_and_per_robot(open_database: Open) -> None:

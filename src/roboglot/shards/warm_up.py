@@ -89,18 +89,20 @@ def _compile() -> None:
 
 
 def _rehearse() -> None:
-    """Build a world once and drop it, so that every fork inherits the caches of decoders, parts and physics."""
+    """Build a world and tables once, so that every fork inherits the caches of decoders, parts, physics and schemas."""
     from roboglot.model.clock import LockstepClock
     from roboglot.model.robot import Robot
     from roboglot.shards.shard import settings_of
     from roboglot.simulation.world.world import RobotPlacement, World
     from roboglot.simulation.world.world_files import load_world
+    from roboglot.storage.database import newest_tables
 
     config, clock = settings_of({}), LockstepClock()
     name = config.robots[0].name
     world = World(load_world(config.world), [RobotPlacement(name)], clock=clock)
     world.equip(Robot(name, world.description_of(name), clock))
     world.close()
+    newest_tables()
 
 
 def refuse_threads() -> None:

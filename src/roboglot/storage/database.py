@@ -24,6 +24,7 @@ from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseErro
 T = TypeVar("T")
 Work = Callable[[Connection], object]
 ROBOTS = "roboglot.storage.schema"  # tables of the robots' memory
+TRANSACTION = ("BEGIN TRANSACTION;", "COMMIT;")  # around a dump
 WAIT = 5.0  # s for other programs that use the file
 
 
@@ -238,12 +239,24 @@ def _log_ahead(connection: sqlite3.Connection) -> None:
 def _empty(schema: str) -> bytes:
     """Return an empty database with the newest schema."""
     with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
-        _migrate(connection, schema)
+        _migrate(connection, schema, in_steps=True)
         return connection.serialize()
 
 
-def _migrate(connection: sqlite3.Connection, schema: str) -> None:
-    """Apply the schema files that this database has not seen yet; other programs may do so at the same time."""
+@cache
+def newest_tables(schema: str = ROBOTS) -> tuple[str, ...]:
+    """Return the statements that make a new database of the newest schema."""
+    with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
+        _migrate(connection, schema, in_steps=True)
+        version = f"PRAGMA user_version={_version(connection)}"
+        return (*(line for line in connection.iterdump() if line not in TRANSACTION), version)
+
+
+def _migrate(connection: sqlite3.Connection, schema: str, *, in_steps: bool = False) -> None:
+    """Apply the schema files that this database has not seen yet; other programs may do so at the same time.
+
+    A new database gets the result of all at once, with one flush of the disk; ``in_steps``: it does not.
+    """
     files = Path(*import_module(schema).__path__)
     versions = sorted(int(m[1]) for f in files.iterdir() if (m := re.fullmatch(r"v(\d+)\.sql", f.name)))
     while (current := _version(connection)) != versions[-1]:
@@ -253,10 +266,10 @@ def _migrate(connection: sqlite3.Connection, schema: str) -> None:
             )
         connection.execute("BEGIN IMMEDIATE")  # an error closes the connection, which undoes it
         if _version(connection) == current:  # else another program was faster
+            new = not in_steps and not connection.execute("SELECT * FROM sqlite_master").fetchone()
             version = next(version for version in versions if version > current)
-            for statement in _statements((files / f"v{version}.sql").read_text(encoding="utf-8")):
+            for statement in newest_tables(schema) if new else _statements(files / f"v{version}.sql", version):
                 connection.execute(statement)
-            connection.execute(f"PRAGMA user_version={version}")
         connection.execute("COMMIT")
 
 
@@ -264,11 +277,12 @@ def _version(connection: sqlite3.Connection) -> int:
     return int(connection.execute("PRAGMA user_version").fetchone()[0])
 
 
-def _statements(script: str) -> Iterator[str]:
-    """Yield each statement; ``executescript`` would end the transaction."""
+def _statements(script: Path, version: int) -> Iterator[str]:
+    """Yield each statement that leads to ``version``; ``executescript`` would end the transaction."""
     statement = ""
-    for line in script.splitlines(keepends=True):
+    for line in script.read_text(encoding="utf-8").splitlines(keepends=True):
         statement += line
         if sqlite3.complete_statement(statement):
             yield statement
             statement = ""
+    yield f"PRAGMA user_version={version}"
