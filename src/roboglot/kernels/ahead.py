@@ -128,7 +128,7 @@ def _forget(names: Sequence[str]) -> None:
 
 
 def _mark(name: str) -> str:
-    stats = [(HERE / f"{source}.py").stat() for source in _sources(name)]
+    stats = [os.stat(f"{HERE}/{source}.py") for source in _sources(name)]  # every start asks for all of them
     text = f"{_machine()} {HERE} {[(stat.st_mtime_ns, stat.st_size) for stat in stats]}"
     return f"roboglot-{name}.{hashlib.sha256(text.encode()).hexdigest()[:16]}.compiled"
 

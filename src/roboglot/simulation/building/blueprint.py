@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from enum import StrEnum
+from functools import lru_cache
 
 from roboglot.model.geometry import Pose
 from roboglot.simulation.world.description import Box, Cylinder, Floor, Lift, Material, Person, Shelf, Spot, Wall
@@ -17,6 +18,7 @@ DOCK_WIDTH, DOCK_DEPTH, DOCK_HEIGHT = 0.36, 0.12, 0.45
 SHAFT_WALL = 0.10
 OUTER_WALL = 0.20
 SHELF_LEG = 0.04
+FLOORS_MAX = 64  # whose solids are kept: a world's parts each ask for those of all its floors
 
 
 class SolidKind(StrEnum):
@@ -63,6 +65,15 @@ class Rectangle:
 
 def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> tuple[Solid, ...]:
     """Return all still solids of one floor. ``lift_here``: the car is parked here, so the landing door is open."""
+    try:
+        hash(floor)
+    except TypeError:  # created by hand, with lists
+        return tuple(_solids(floor, lift, lift_here))
+    return _kept_solids(floor, lift, lift_here)
+
+
+@lru_cache(FLOORS_MAX)
+def _kept_solids(floor: Floor, lift: Lift | None, lift_here: bool) -> tuple[Solid, ...]:
     return tuple(_solids(floor, lift, lift_here))
 
 

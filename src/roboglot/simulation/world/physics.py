@@ -71,7 +71,8 @@ class Physics:
         self._shape_of = np.full(model.ngeom, -1)  # by geom: the first geom of its robot
         for hull in self.hulls.values():
             self._shape_of[hull.shape] = hull.shape[0]
-        self._docks = {geom for geom in range(model.ngeom) if model.geom(geom).name.startswith("dock ")}
+        names = [model.geom(geom).name for geom in range(model.ngeom)]
+        self._docks = {geom for geom, name in enumerate(names) if name.startswith("dock ")}
         people = [walker.body for walker in keyed([floor.people for floor in world.floors])] + visitors()
         self._persons = {int(model.body(person).geomadr[0]) for person in people}
         self._places = self._data.mocap_pos
@@ -85,8 +86,7 @@ class Physics:
         self._car = (model.joint("car").qposadr[0], model.actuator("car").id) if world.lift else None
         self.obstacles: dict[int, tuple[int, Solid]] = {}  # by its number: floor and box
         self._touched: dict[Hull, list[tuple[float, float]]] = {}  # where (world, m)
-        self._feet = sum(model.geom(geom).name.split(" ")[-1] == "foot" for geom in range(model.ngeom))
-        self._feet += sum(len(hull.wheels) for hull in self.hulls.values())
+        self._feet = sum(name.split(" ")[-1] == "foot" for name in names) + sum(len(h.wheels) for h in self._all_hulls)
         self._light = {
             model.geom(f"thing {thing.name}").id
             for floor in world.floors

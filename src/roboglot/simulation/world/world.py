@@ -215,12 +215,15 @@ class World:
         """Switch the sensors to the compiled kernels; missing ones are compiled first, in a separate process."""
         with contextlib.suppress(KernelsUnavailable):  # autonomy reports it; sensors continue without it
             await compile_beside(WORLD)
-            await load(self._environment.sight.load_kernel)
-            await load(self._environment.rays.load_kernel)
-            await load(self._physics.rows.load_kernels)
-            await load(self._physics.load_kernels)
-            await load(self._crowd.load_kernels)
-            await load(self._ticking.load_kernels)
+            await load(self._use_kernels)
+
+    def _use_kernels(self) -> None:
+        self._environment.sight.load_kernel()
+        self._environment.rays.load_kernel()
+        self._physics.rows.load_kernels()
+        self._physics.load_kernels()
+        self._crowd.load_kernels()
+        self._ticking.load_kernels()
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""
