@@ -104,8 +104,13 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Set the markers that follow from where a test stands and from the fixtures that it uses."""
+def pytest_collection_modifyitems(items: list[pytest.Item], config: pytest.Config) -> None:
+    """Set the markers that follow from where a test stands and from the fixtures that it uses.
+
+    Only for a choice that asks for them: each worker would read all tests for nothing.
+    """
+    if not {"process", "simulated"} & set(re.findall(r"\w+", config.option.markexpr)):
+        return
     for item in items:
         folder = item.path.relative_to(TESTS).parts[0]
         if folder in PROCESSES or folder.endswith(".py"):
