@@ -2,7 +2,8 @@
 
 ``install`` has ``subprocess.Popen``, and with it asyncio and execnet, start such commands like this, in a tenth of the
 processor time. The process is a child of ours as if we had started it ourselves: output, signals, exit status and
-waiting are the same. So do ``python -m tests.…``, and ``python -c`` with a program whose first line is ``# warm``.
+waiting are the same. So do ``python -m tests.…``, and ``python -c`` with a program whose first line is ``# warm``; and
+zygotes of visual programs, each from a process that has loaded what they load (``tests/programs/zygote_bed.py``).
 Commands with an environment for another interpreter, and all other programs, start cold; so do those with
 ``ROBOGLOT_TESTS_COLD=1`` in theirs. A worker is born with a process that forks of its own.
 """
@@ -22,8 +23,8 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
@@ -32,6 +33,7 @@ from execnet.gateway_io import popen_bootstrapline
 
 from roboglot.cli.warm.command import surroundings
 from roboglot.shards.warm_up import end_with, fork
+from tests.programs import zygote_bed
 
 COLD = "ROBOGLOT_TESTS_COLD"
 WORKER = [sys.executable, "-u", "-c", popen_bootstrapline]
@@ -47,8 +49,11 @@ PLAIN = {
     "process_group": -1,
 }
 OF_THE_INTERPRETER = ("PYTHON", "LC_", "LANG", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_", "GRPC_", "LD_", "MALLOC_")
-MESSAGE_MAX = 1 << 20
+ZYGOTE = "from roboglot.programs.worker import zygote\nzygote.main("  # in its code
 PR_SET_CHILD_SUBREAPER = 36
+
+SOURCES = str(Path(__file__).parents[1] / "src")
+ZYGOTES = {"PYTHONHASHSEED": "0"}  # the environment
 
 _execute_cold: Any = subprocess.Popen._execute_child  # type: ignore[attr-defined]
 _signature = inspect.signature(_execute_cold)
@@ -105,7 +110,8 @@ def install() -> None:
 def _execute(process: Any, *arguments: Any, **named: Any) -> None:
     """Start a process in place of ``Popen._execute_child``, with its arguments."""
     wanted = _signature.bind(process, *arguments, **named).arguments
-    if not _is_warm(wanted):
+    zygote = _is_zygote(wanted)
+    if not zygote and not _is_warm(wanted):
         _execute_cold(process, *arguments, **named)
         return
     ends = [wanted[name] for name in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")]
@@ -114,12 +120,13 @@ def _execute(process: Any, *arguments: Any, **named: Any) -> None:
         "words": [str(os.fspath(word)) for word in wanted["args"][1:]],
         "folder": str(wanted["cwd"] or Path.cwd()),
         "environment": dict(os.environ if wanted["env"] is None else wanted["env"]),
-        "descriptors": [0, 1, 2],
+        "descriptors": [0, 1, 2, *wanted["pass_fds"]],
         "session": bool(wanted["start_new_session"]),
         "parent": os.getpid(),
+        "zygote": zygote,
     }
     try:
-        process.pid = _parent.start(wish, given)
+        process.pid = _parent.start(wish, [*given, *wanted["pass_fds"]])
         process._child_created = True
     finally:
         process._close_pipe_fds(*ends)
@@ -134,6 +141,15 @@ def _is_warm(wanted: Mapping[str, Any]) -> bool:
         return False
     environment = os.environ if wanted["env"] is None else wanted["env"]
     return COLD not in environment and _of_the_interpreter(environment) == _of_the_interpreter(os.environ)
+
+
+def _is_zygote(wanted: Mapping[str, Any]) -> bool:
+    """True for a zygote that nothing keeps from starting warm."""
+    match wanted["args"]:
+        case [sys.executable, "-s", "-S", "-P", "-c", str(code), str(path), _, _] if path == SOURCES and ZYGOTE in code:
+            unusual = any(wanted.get(name, usual) != usual for name, usual in PLAIN.items())
+            return COLD not in os.environ and wanted["env"] == ZYGOTES and not unusual
+    return False
 
 
 def _is_ours(words: list[Any]) -> bool:
@@ -155,23 +171,29 @@ def _of_the_interpreter(environment: Mapping[Any, Any]) -> dict[Any, Any]:
 
 def serve(line: socket.socket) -> None:
     """Fork a process for each message until the other end closes."""
+    bed: socket.socket | None = None
     while True:
-        message, descriptors, _, _ = socket.recv_fds(line, MESSAGE_MAX, 3)
+        message, descriptors = zygote_bed.receive(line)
         if not message:
             return
-        reading, writing = os.pipe()
-        if (middle := fork()) == 0:
-            middle = os.getpid()
-            if (pid := os.fork()) == 0:
-                while os.getppid() == middle:  # it outlives us
-                    time.sleep(0.0005)
-                _become(json.loads(message), descriptors)
-            os.write(writing, str(pid).encode())
-            os._exit(0)
-        os.waitpid(middle, 0)
-        line.send(os.read(reading, 64))
-        for descriptor in (*descriptors, reading, writing):
+        wish = json.loads(message)
+        if wish["zygote"]:
+            bed = bed or _make_bed()
+            socket.send_fds(bed, [message], descriptors)
+            answer = bed.recv(64)
+        else:
+            answer = zygote_bed.born(partial(_become, wish, descriptors), fork)
+        line.send(answer)
+        for descriptor in descriptors:
             os.close(descriptor)
+
+
+def _make_bed() -> socket.socket:
+    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with its:
+        command = [sys.executable, "-s", "-S", "-P", zygote_bed.__file__, SOURCES, str(its.fileno())]
+        subprocess.Popen(command, env=ZYGOTES, stdin=subprocess.DEVNULL, pass_fds=[its.fileno()]).returncode = 0
+    return ours
 
 
 def _become(wish: Any, descriptors: list[int]) -> NoReturn:

@@ -28,6 +28,7 @@ from roboglot.programs.engine.events import (
     Output,
 )
 from tests.programs.playing import PRELUDE, Played, open_descriptors, play, process_state
+from tests.warm_start import COLD
 
 # They use up twenty seconds of processor time at the lowest priority: minutes on a busy machine.
 pytestmark = pytest.mark.timeout(380)
@@ -126,6 +127,7 @@ async def played(request: pytest.FixtureRequest, world: World) -> AsyncIterator[
     with pytest.MonkeyPatch.context() as patch:
         # A tenth of them uses up a second of processor time, which takes minutes on a busy machine.
         patch.setattr(engine_module, "STEPS_BACK_AFTER", 1e6)
+        patch.setenv(COLD, "1")  # in a zygote as users have it
         results = await attack_all(world, attacks, policy=rules)
     assert open_descriptors() <= before
     yield rules, {path.stem: result for path, result in zip(attacks, results, strict=True)}

@@ -26,6 +26,7 @@ from roboglot.programs.engine.events import (
 from roboglot.programs.engine.processor_group import ProcessorGroup
 from roboglot.programs.worker import zygote
 from tests.programs.playing import PRELUDE, children_of, open_descriptors, play, process_state, until
+from tests.warm_start import COLD
 
 BUSY = "print('ready')\nwhile True: pass"
 
@@ -41,8 +42,9 @@ async def test_zygote_gives_way_after_a_moment(monkeypatch: pytest.MonkeyPatch, 
         assert bool(stepped) is gives_way
 
 
-def test_modules_of_the_zygote_stay_compiled() -> None:
+def test_modules_of_the_zygote_stay_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Else each start compiles them, which takes a fifth of it."""
+    monkeypatch.setenv(COLD, "1")
     compiled = Path(importlib.util.cache_from_source(zygote.__file__))
     compiled.unlink(missing_ok=True)
 

@@ -4,16 +4,43 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
+from typing import Any
 
 import pytest
 
 from roboglot.programs.engine import launcher
 from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.launcher import Launcher
+from tests.warm_start import COLD, SOURCES
+
+# What a zygote starts with, in place of what it would do.
+REPORT = """
+import gc, json, os, signal, sys, threading
+gc.disable()
+sys.path.insert(0, sys.argv[1])
+from roboglot.programs.worker import zygote
+
+def report(*given, **named):
+    zygote._import_ahead()
+    os.umask(umask := os.umask(0))
+    print(json.dumps({
+        "modules": sorted(sys.modules), "given": [given, named], "words": sys.argv[:-2], "path": sys.path,
+        "environment": dict(os.environ), "folder": os.getcwd(), "umask": umask, "collects": gc.isenabled(),
+        "leads": os.getsid(0) == os.getpid(), "flags": list(sys.flags), "threads": threading.active_count(),
+        "names": sorted(name for name in globals() if "__" not in name),
+        "order": list(set("these have an order".split())),
+        "ignored": [n for n in range(1, 32) if signal.getsignal(n) == signal.SIG_IGN],
+        "descriptors": [n for n in range(100) if os.path.exists(f"/proc/self/fd/{n}")],
+    }), flush=True)
+
+zygote.main = report
+sys.path.remove(sys.argv[1])
+"""
 
 
 async def test_cancelled_start_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,3 +86,26 @@ async def test_zygote_that_is_ready_too_late_is_ignored(event: str) -> None:
     late._ready.cancel()
     late._handle(launcher._decode(json.dumps({"event": event})), [])
     assert late.pid == 0
+
+
+def test_tests_own_zygotes_begin_as_cold_ones_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    reading, writing = os.pipe()
+    with open(reading, "rb"), open(writing, "wb"):
+        words = [sys.executable, *launcher._FLAGS, "-c", REPORT + launcher._BOOT, SOURCES, str(writing), "filter"]
+
+        def start() -> Any:
+            done = subprocess.run(
+                words,
+                env=launcher._ENVIRONMENT,
+                cwd="/",
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                pass_fds=[writing],
+                start_new_session=True,
+                check=True,
+            )
+            return json.loads(done.stdout)
+
+        warm = start()
+        monkeypatch.setenv(COLD, "1")
+        assert warm == start()
