@@ -10,6 +10,7 @@ from roboglot.model.actions import Actions
 from roboglot.model.admission import Admission
 from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
+from roboglot.model.components.motion.actuators import Actuators
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.events import EventStream
 from roboglot.model.inputs.fairness import Fairness
@@ -43,6 +44,7 @@ class Robot:
     clock: Clock
     events: EventStream = field(default_factory=EventStream)
     actions: Actions = field(init=False)
+    actuators: Actuators = field(init=False)
     tap: Tap = field(init=False)
     outside: Outside = field(init=False)
     admission: Admission = field(default_factory=Admission)
@@ -52,6 +54,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         self.actions = Actions(self.clock, self.events)
+        self.actuators = Actuators(self.actions)
         self.tap = Tap(self.id, self.clock)
         self.outside = Outside(self.id, self.clock)
 

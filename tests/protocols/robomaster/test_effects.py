@@ -10,6 +10,7 @@ from roboglot.model.components.interaction.blaster import Blaster
 from roboglot.model.components.interaction.input_device import InputDevice, MouseButton
 from roboglot.model.components.interaction.light import DARK, Colour, Light
 from roboglot.model.components.motion.arm import Arm
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.motion.servo import Servos
 from roboglot.model.components.sensing.camera import Camera
@@ -376,3 +377,14 @@ async def test_the_end_puts_everything_back(client, robot, forward, connect) -> 
     assert not robot[RangeSensors].measuring
     assert not robot.actions.running()
     assert await (await connect()).ask("robot mode ?;") == "not in sdk mode;"
+
+
+@pytest.mark.world("empty", body="universal")
+async def test_arm_and_gripper_fail_while_stopped(robot, connect):
+    client = await connect()
+    await client.ask("command;")
+    moves = ("robotic_arm recenter;", "robotic_gripper close leve 1;", "servo angle id 1 angle 9;", "blaster fire;")
+    robot[EmergencyStop].engage()
+    assert [await client.ask(move) for move in moves] == ["fail;"] * 4
+    robot[EmergencyStop].release()
+    assert await client.ask(moves[-1]) == "ok;"

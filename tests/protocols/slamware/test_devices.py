@@ -321,3 +321,28 @@ async def test_emergency_stop_of_another_door_shows_in_health(
     robot[Legs].stand()
     await forward(seconds=4)
     assert (await client.get(HEALTH)).json()["hasSystemEmergencyStop"] is False
+
+
+async def test_jack_and_doors_are_refused_while_stopped(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    (cargo,) = {part["id"] for part in (await client.get("/api/delivery/v1/cargos")).json()[:1]}
+    box = f"/api/delivery/v1/cargos/{cargo}/boxes/0"
+    assert (await client.post(f"{SYSTEM}/jack/status", json="Up")).status_code == 200
+    assert (await client.put(f"{box}/:open")).status_code == 200
+    await forward(seconds=0.2)
+    assert await put(client, "base.emergency_stop", "on") == 200
+    await forward(seconds=0.1)
+    height, result = robot[Jack].position, (await client.get(f"{box}/operation_result")).json()
+    assert (result["stage"], result["reason"]) == ("FAILED", "the emergency stop is engaged")
+    for refused in (await client.post(f"{SYSTEM}/jack/status", json="Up"), await client.put(f"{box}/:open")):
+        assert (refused.status_code, refused.reason_phrase) == (403, "operation fail")
+        assert refused.text == "operation fail: the emergency stop is engaged"
+    options = {"move_direction": "Up"}
+    sent = await client.post(ACTIONS, json={"action_name": "slamtec.agent.actions.JackMoveAction", "options": options})
+    await forward(seconds=0.5)
+    ended = (await client.get(f"{ACTIONS}/{sent.json()['action_id']}")).json()["state"]
+    assert ended == {"status": 4, "result": -1, "reason": "the emergency stop is engaged"}
+    assert 0.0 < robot[Jack].position == height
+    assert await put(client, "base.emergency_stop", "off") == 200
+    assert (await client.put(f"{box}/:open")).status_code == 200

@@ -81,6 +81,8 @@ class Handover:
             actions = [self._robot[Cargo].open_box(choice.box, source=SOURCE) for choice in boxes]
         except NotFound:
             return Failure.NO_BOX
+        except Refused:  # an emergency stop holds the doors
+            return Failure.DOOR_STUCK
         stuck = [await action.done() is ActionStatus.ABORTED for action in actions]
         return Failure.DOOR_STUCK if any(stuck) else None
 
@@ -99,12 +101,19 @@ class Handover:
         cargo, clock = self._robot[Cargo], self._robot.clock
         patience = clock.time() + self._door_seconds
         while cargo.box(choice.box).door is not DoorState.CLOSED:
-            if await cargo.close_box(choice.box, source=SOURCE).done() is ActionStatus.SUCCEEDED:
+            if await self._close(choice.box):
                 break
             if clock.time() >= patience:
                 return Failure.DOOR_OPEN
             await clock.sleep(SHUT_RETRY)
         return None
+
+    async def _close(self, box: int) -> bool:
+        """Close a box; return whether it is closed, and False while an emergency stop holds the doors."""
+        try:
+            return await self._robot[Cargo].close_box(box, source=SOURCE).done() is ActionStatus.SUCCEEDED
+        except Refused:
+            return False
 
     async def _serve(self, choice: BoxChoice) -> Failure | None:
         """Wait for the person's end or a timeout, then close the box; return the failure, if any."""

@@ -10,6 +10,8 @@ from roboglot.model.action import Action
 from roboglot.model.components.component import Component
 from roboglot.values import dataclass
 
+BOX = "box "  # prefix of the resources of its doors
+
 
 class DoorState(StrEnum):
     """State of a box's door."""

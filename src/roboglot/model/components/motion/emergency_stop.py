@@ -10,6 +10,8 @@ from roboglot.model.components.component import Component
 class EmergencyStop(Component):
     """While engaged or with the brake released, the base refuses to drive with ``EmergencyStopped``.
 
+    While it is engaged, so do all other actuators: a jack, doors of boxes, an arm.
+
     Publishes ``EmergencyStopChanged`` and ``BrakeChanged``.
     """
 
@@ -20,7 +22,7 @@ class EmergencyStop(Component):
 
     @abstractmethod
     def engage(self) -> None:
-        """Stop at once; running drives are cancelled."""
+        """Stop all that moves at once; running drives and motions are cancelled."""
 
     @abstractmethod
     def release(self) -> None:

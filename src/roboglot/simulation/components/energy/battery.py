@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from roboglot.model.components.energy.battery import Battery
-from roboglot.model.events import BatteryChanged, EventStream
+from roboglot.model.events import BatteryChanged
+from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState, Supply
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
@@ -17,6 +18,7 @@ from roboglot.simulation.bodies.quantities import Fraction, NotNegative, Positiv
 from roboglot.simulation.bodies.support import GRAVITY
 from roboglot.simulation.components.energy.dock_contact import SimulatedDockContact
 from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.motion.drive_locks import hold_still, let_move
 
 # Open-circuit voltage of a lithium cell by its charge.
 CHARGES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
@@ -63,9 +65,9 @@ class SimulatedBattery(Battery):
         hull: Hull,
         base: SimulatedBase,
         dock: SimulatedDockContact | None,
-        events: EventStream,
+        robot: Robot,
     ) -> None:
-        self._section, self._hull, self._base, self._dock, self._events = section, hull, base, dock, events
+        self._section, self._hull, self._base, self._dock, self._robot = section, hull, base, dock, robot
         self._charge = section.charge
         self._temperature = AMBIENT
         self._charging = False
@@ -179,12 +181,12 @@ class SimulatedBattery(Battery):
         self._charge = min(1.0, max(0.0, self._charge + self._current * seconds / 3600.0 / self._capacity))
         self._drawn += max(0.0, -power) * seconds / 3600.0
         if self._charge == 0.0:
-            self._base.locks.lock("battery", "the battery is empty")
+            hold_still(self._robot, self._base.locks, "battery", "the battery is empty")
         elif self._charge >= REVIVED:
-            self._base.locks.unlock("battery")
+            let_move(self._robot, self._base.locks, "battery")
         if (state := self._words()) != self._published:
             self._published = state
-            self._events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
+            self._robot.events.publish(BatteryChanged(stamp=stamp, percentage=self._charge, charging=self._charging))
 
     def _words(self) -> tuple[int, bool]:
         """Return the values whose changes are published: percent and charging."""
@@ -218,7 +220,7 @@ class SimulatedBattery(Battery):
 
 def _fit(fit: Fitting) -> SimulatedBattery:
     base, dock = fit.get(SimulatedBase), fit.find(SimulatedDockContact)
-    return SimulatedBattery(fit.body[BatterySection], fit.hull, base, dock, fit.robot.events)
+    return SimulatedBattery(fit.body[BatterySection], fit.hull, base, dock, fit.robot)
 
 
 PART = Part(

@@ -18,6 +18,7 @@ from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.energy.battery import SimulatedBattery
 from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.motion.drive_locks import hold_still, let_move
 from roboglot.simulation.components.motion.legs import SimulatedLegs
 from roboglot.simulation.components.sensing.lidar import SimulatedLidar
 
@@ -35,7 +36,7 @@ class PowerSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedPower(Power):
-    """Power modes of a simulated robot: unless awake, its base is locked and its motors are off."""
+    """Power modes of a simulated robot: unless awake, its base is locked and all motors are off."""
 
     def __init__(
         self,
@@ -136,9 +137,9 @@ class SimulatedPower(Power):
         self._mode, self._lying_since = mode, None
         awake = mode is PowerMode.AWAKE
         if awake:
-            self._base.locks.unlock(POWER)
+            let_move(self._robot, self._base.locks, POWER)
         else:
-            self._base.locks.lock(POWER, f"the robot is {mode}")
+            hold_still(self._robot, self._base.locks, POWER, f"the robot is {mode}")
         if self._legs:
             self._legs.off = "" if awake else f"the robot is {mode}"
         if self._lidar:

@@ -66,6 +66,7 @@ class SimulatedBlaster(Blaster):
         return self._due > 0
 
     def fire(self) -> int:
+        self._robot.actuators.check()
         if not self._ammo:
             raise Refused("the magazine is empty")
         if self._due:
@@ -86,7 +87,9 @@ class SimulatedBlaster(Blaster):
         return not self._due and not self._wait
 
     def control(self, seconds: float) -> None:
-        """Fire a bead when it is due."""
+        """Fire a bead when it is due; the rest of the shot is lost once the robot holds still."""
+        if self._robot.actuators.held:
+            self._due = 0
         if self.idle:
             self.busy.end()
             return

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action
-from roboglot.model.components.logistics.cargo import BoxState, Cargo, Compartment, DoorState, Stock
+from roboglot.model.components.logistics.cargo import BOX, BoxState, Cargo, Compartment, DoorState, Stock
 from roboglot.model.errors import Blocked, NotFound, Refused
 from roboglot.model.events import BoxChanged
 from roboglot.model.robot import Robot
@@ -112,7 +112,7 @@ class SimulatedCargo(Cargo):
             await self._move(box, direction, action)
 
         name = "open box" if direction > 0 else "close box"
-        return self._robot.actions.start(name, run, resources={f"box {box.id}"}, goal=box.id, source=source)
+        return self._robot.actions.start(name, run, resources={f"{BOX}{box.id}"}, goal=box.id, source=source)
 
     async def _move(self, box: _Box, direction: int, action: Action) -> None:
         """Move the door to its end; at any end of the action, stop the door. Raises Blocked."""

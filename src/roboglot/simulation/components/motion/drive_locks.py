@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from roboglot.model.errors import Refused
+from roboglot.model.robot import Robot
 
 
 class DriveLocks:
@@ -40,3 +41,15 @@ class DriveLocks:
         """Raise the first lock's Refused, if there is a lock."""
         if self._locks:
             raise next(iter(self._locks.values()))
+
+
+def hold_still(robot: Robot, locks: DriveLocks, who: str, reason: str | Refused) -> None:
+    """Stop wheels and all other actuators, and refuse to move them until ``let_move``."""
+    locks.lock(who, reason)
+    robot.actuators.hold(who, reason)
+
+
+def let_move(robot: Robot, locks: DriveLocks, who: str) -> None:
+    """End what ``who`` held still."""
+    locks.unlock(who)
+    robot.actuators.release(who)

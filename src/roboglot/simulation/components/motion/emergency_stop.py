@@ -21,7 +21,7 @@ class EmergencyStopSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedEmergencyStop(EmergencyStop):
-    """Emergency stop that locks the base and cuts the motors; what applications asked for ends with a restart."""
+    """Emergency stop that cuts the drive and holds all actuators; what applications asked for ends with a restart."""
 
     def __init__(self, base: SimulatedBase, robot: Robot) -> None:
         self._base, self._robot = base, robot
@@ -81,8 +81,10 @@ class SimulatedEmergencyStop(EmergencyStop):
         self._engaged = engaged
         if engaged:
             self._hold(WHO, "the emergency stop is engaged")
+            self._robot.actuators.hold(WHO, EmergencyStopped("the emergency stop is engaged"))
         else:
             self._base.locks.unlock(WHO)
+            self._robot.actuators.release(WHO)
         self._robot.events.publish(EmergencyStopChanged(stamp=self._robot.clock.time(), engaged=engaged))
 
     def _hold(self, who: str, reason: str) -> None:

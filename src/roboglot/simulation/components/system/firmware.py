@@ -34,6 +34,7 @@ from roboglot.model.sensing import Supply
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
 from roboglot.simulation.components.motion.base import SimulatedBase
+from roboglot.simulation.components.motion.drive_locks import hold_still, let_move
 from roboglot.simulation.components.system.firmware_record import FirmwareRecord
 
 PACKAGE = "firmware package"  # the entry that occupies its space on the disk
@@ -151,13 +152,13 @@ class SimulatedFirmware(Firmware):
                 raise Refused("the battery is too low for an update")
             if self._robot.actions.running(BASE):
                 raise Refused("the robot is moving")
-            self._base.locks.lock(FIRMWARE, "the robot is being updated")
+            hold_still(self._robot, self._base.locks, FIRMWARE, "the robot is being updated")
             try:
                 await self._go_through(action, FirmwareState.INSTALLING, package, self._section.install_rate)
                 await self._record.put_pending(package.version, {**self.modules, **package.modules})
                 await self._record.put_downloaded(None)
             finally:
-                self._base.locks.unlock(FIRMWARE)
+                let_move(self._robot, self._base.locks, FIRMWARE)
             self._robot[Disk].release(PACKAGE)
             self._report(action, FirmwareProgress(FirmwareState.INSTALLED, 1.0, package))
 
@@ -203,7 +204,7 @@ class SimulatedFirmware(Firmware):
 
     async def _restart(self, action: Action) -> None:
         robot, seconds = self._robot, self._section.reboot_time
-        self._base.locks.lock("reboot", "the robot restarts")
+        hold_still(robot, self._base.locks, "reboot", "the robot restarts")
         robot.events.publish(Rebooting(stamp=self._clock.time(), seconds=seconds))
         self._report(action, replace(self._progress, state=FirmwareState.REBOOTING, share=0.0))
         for other in robot.actions.running():
@@ -213,7 +214,7 @@ class SimulatedFirmware(Firmware):
             await robot[Legs].lie_down().done()
         await self._clock.sleep(seconds)
         await self._record.boot()
-        self._base.locks.unlock("reboot")
+        let_move(self._robot, self._base.locks, "reboot")
         action.report(FirmwareProgress())
         robot.events.publish(Rebooted(stamp=self._clock.time()))
 
@@ -226,13 +227,13 @@ class SimulatedFirmware(Firmware):
             robot, lock = self._robot, f"restart of {module}"
             for action in robot.actions.running(BASE):
                 action.cancel(f"the {module} restarts")
-            self._base.locks.lock(lock, f"the {module} restarts")
+            hold_still(robot, self._base.locks, lock, f"the {module} restarts")
             self._module = module
             try:
                 await self._clock.sleep(RESTART_SECONDS[module])
             finally:
                 self._module = None
-                self._base.locks.unlock(lock)
+                let_move(self._robot, self._base.locks, lock)
             robot.events.publish(ModuleRestarted(stamp=self._clock.time(), module=module))
 
         for holder in self._robot.actions.running(FIRMWARE):
