@@ -11,6 +11,7 @@ from roboglot.model.admission import Admission
 from roboglot.model.clock import Clock
 from roboglot.model.components.component import Component
 from roboglot.model.components.motion.actuators import Actuators
+from roboglot.model.components.system.starts import Starts
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.events import EventStream
 from roboglot.model.inputs.fairness import Fairness
@@ -45,6 +46,7 @@ class Robot:
     events: EventStream = field(default_factory=EventStream)
     actions: Actions = field(init=False)
     actuators: Actuators = field(init=False)
+    starts: Starts = field(init=False)
     tap: Tap = field(init=False)
     outside: Outside = field(init=False)
     admission: Admission = field(default_factory=Admission)
@@ -55,6 +57,7 @@ class Robot:
     def __post_init__(self) -> None:
         self.actions = Actions(self.clock, self.events)
         self.actuators = Actuators(self.actions)
+        self.starts = Starts(self.events)
         self.tap = Tap(self.id, self.clock)
         self.outside = Outside(self.id, self.clock)
 

@@ -7,8 +7,17 @@ from roboglot.model.actions import Action
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.navigation import NavigationFeedback
+from roboglot.model.components.system.firmware import Module
 from roboglot.model.errors import Blocked, DockNotFound, RobotError, Unreachable
-from roboglot.model.events import BatteryChanged, BumperPressed, DockContactChanged, PathBlocked
+from roboglot.model.events import (
+    BatteryChanged,
+    BumperPressed,
+    DockContactChanged,
+    ModuleRestarted,
+    PathBlocked,
+    Rebooted,
+    Rebooting,
+)
 from roboglot.model.geometry import Path
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.platform.event_log import EVENTS_MAX
@@ -49,6 +58,37 @@ async def test_unread_events_are_bounded(bare: Robot, bare_client: httpx.AsyncCl
     events = (await bare_client.get(EVENTS)).json()
     assert len(events) == EVENTS_MAX
     assert events[0]["timestamp"] == "10000"
+
+
+async def test_time_and_events_begin_anew_at_a_restart(
+    bare: Robot, bare_client: httpx.AsyncClient, forward: Forward
+) -> None:
+    await forward(seconds=100)
+    assert (await bare_client.get("/api/platform/v1/timestamp")).json() == "100000"
+    bare.events.publish(BumperPressed(stamp=99.0, zone="front"))
+    bare.events.publish(Rebooting(stamp=100.0, seconds=30.0))
+    await forward(seconds=30)
+    bare.events.publish(BumperPressed(stamp=129.0, zone="rear"))
+    bare.events.publish(Rebooted(stamp=130.0))
+    await forward(seconds=2)
+    bare.events.publish(BumperPressed(stamp=131.5, zone="left"))
+    assert (await bare_client.get("/api/platform/v1/timestamp")).json() == "2000"
+    events = [(event["type"], event["timestamp"]) for event in (await bare_client.get(EVENTS)).json()]
+    assert events == [("ROBOT_REBOOT", "0"), ("BUMPER_TRIGGERED", "1500")]
+    bare.events.publish(ModuleRestarted(stamp=132.0, module=Module.SOFTWARE))
+    assert (await bare_client.get("/api/platform/v1/timestamp")).json() == "2000"
+
+
+async def test_imu_time_counts_from_the_base_start(client: httpx.AsyncClient, robot: Robot, forward: Forward) -> None:
+    await forward(seconds=5)
+    paths = [f"/api/core/{path}" for path in ("slam/v1/imu", "system/v1/rawimu", "system/v1/rawadcimu")]
+    for path in paths:
+        assert 4000 < (await client.get(path)).json()["timestamp"] <= 5000
+    robot.events.publish(ModuleRestarted(stamp=robot.clock.time(), module=Module.BASE))
+    await forward(seconds=1)
+    for path in paths:
+        assert 500 < (await client.get(path)).json()["timestamp"] <= 1000
+    assert (await client.get("/api/platform/v1/timestamp")).json() == "6000"
 
 
 async def test_history_can_be_kept(bare: Robot) -> None:

@@ -84,9 +84,9 @@ def stage_of(action: Action, *, going_home: bool) -> str:
             return ""
 
 
-def milliseconds(stamp: float) -> str:
-    """Return robot time (s) in the API's form: milliseconds since the start, as text."""
-    return str(int(stamp * 1000))
+def milliseconds(stamp: float, start: float) -> int:
+    """Return robot time (s) in the API's form: milliseconds since ``start``, the last one of the robot or its base."""
+    return int(max(0.0, stamp - start) * 1000)
 
 
 def pose3d(pose: Pose) -> Pose3D:

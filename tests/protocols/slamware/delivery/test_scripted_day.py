@@ -11,7 +11,7 @@ import pytest
 
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.logistics.cargo import Cargo
-from roboglot.model.components.system.firmware import Firmware
+from roboglot.model.components.system.firmware import Firmware, FirmwareState
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
@@ -234,6 +234,8 @@ async def test_a_day(day: Day, robot: Robot, world: World) -> None:  # noqa: PLR
     await day.ask("POST", f"{CORE}/firmware/v1/autoupdate/:start")
     for _ in range(200):
         await day.forward(seconds=1)
+        if robot[Firmware].progress.state is FirmwareState.INSTALLING:
+            await day.look()  # what is unread does not outlive the restart
         if robot[Firmware].version == new:
             break
     await day.forward(seconds=30)

@@ -43,6 +43,7 @@ from roboglot.wire.slamware.chapters.platform import ElevatorEvent, GeneralEvent
 EVENTS_MAX = 256  # unread events, beyond which the oldest is dropped
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")
 DRIVES = ("navigate to", "dock", "sweep")  # actions that plan routes
+LAST_WORDS = (DeliveryEvent.ROBOT_REBOOT, GeneralEvent.POWER_OFF)  # clients read them after the restart
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
 OCCUPIED_AGAIN = 5.0  # s until the same obstacle is reported again
 SAME_PLACE = 0.5  # m within which it is the same one
@@ -56,6 +57,7 @@ class EventLog:
         self._actions = actions
         self._keep = keep
         self._ring: deque[RobotEvent] = deque(maxlen=EVENTS_MAX)
+        self._epoch = robot.starts.robot  # from which the events' times count
         self._charging = self._upgrading = False
         self._blocked: tuple[Action, Timer] | None = None
         self._occupied: PathBlocked | None = None  # the last one reported
@@ -95,6 +97,7 @@ class EventLog:
 
     def read(self) -> list[RobotEvent]:
         """Return events since the last read, oldest first."""
+        self._lose_old()
         events = list(self._ring)
         if not self._keep:
             self._ring.clear()
@@ -111,7 +114,16 @@ class EventLog:
 
     def note(self, kind: GeneralEvent | ElevatorEvent | DeliveryEvent, stamp: float | None = None) -> None:
         """Record an event at ``stamp`` (robot time, s), or now."""
-        self._ring.append(RobotEvent(kind, milliseconds(self._robot.clock.time() if stamp is None else stamp)))
+        self._lose_old()
+        since = milliseconds(self._robot.clock.time() if stamp is None else stamp, self._epoch)
+        self._ring.append(RobotEvent(kind, str(since)))
+
+    def _lose_old(self) -> None:
+        """Lose events from before a restart of the robot: it kept them in memory; only its last words remain."""
+        if self._epoch != self._robot.starts.robot:
+            self._epoch = self._robot.starts.robot
+            last_words = [RobotEvent(event.type, "0") for event in self._ring if event.type in LAST_WORDS]
+            self._ring = deque(last_words, maxlen=EVENTS_MAX)
 
     def _dock_changed(self, event: DockContactChanged) -> None:
         self.note(GeneralEvent.ON_DOCK if event.docked else GeneralEvent.OFF_DOCK, event.stamp)

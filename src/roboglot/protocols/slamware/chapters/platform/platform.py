@@ -13,8 +13,8 @@ API = "/api/platform/v1"
 
 @TABLE.on(f"GET {API}/timestamp", right=Right.SEE)
 def get_timestamp(context: Context) -> str:
-    """Return milliseconds since the start, as text."""
-    return milliseconds(context.robot.clock.time())
+    """Return milliseconds since the robot started, as text; a hard restart begins anew."""
+    return str(milliseconds(context.robot.clock.time(), context.robot.starts.robot))
 
 
 @TABLE.on(f"GET {API}/events", right=Right.SEE)

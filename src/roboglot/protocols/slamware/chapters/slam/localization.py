@@ -18,7 +18,7 @@ from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.system.raw_imu import in_units
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.protocols.slamware.vocabulary import pose3d, pose_of
+from roboglot.protocols.slamware.vocabulary import milliseconds, pose3d, pose_of
 from roboglot.wire.slamware.chapters.slam.localization import (
     IMU_ACCELEROMETER,
     IMU_EULER,
@@ -118,7 +118,8 @@ def get_imu(context: Context) -> ImuData:
     """Return attitude (rad), acceleration (m/s2) and turning rates (rad/s) in the robot's frame."""
     require_heard(context.robot)
     robot = context.robot
-    return imu_data(robot[Imu].reading, robot[ImuConverters].raw if ImuConverters in robot else None)
+    raw = robot[ImuConverters].raw if ImuConverters in robot else None
+    return imu_data(robot[Imu].reading, raw, robot.starts.base)
 
 
 @TABLE.on(f"GET {API}/knownarea", right=Right.SEE, needs=(Mapping,))
@@ -128,8 +129,11 @@ def get_known_area(context: Context) -> Rectangle:
     return Rectangle(grid.origin.x, grid.origin.y, grid.width * grid.resolution, grid.height * grid.resolution)
 
 
-def imu_data(reading: ImuReading, raw: RawImu | None = None) -> ImuData:
-    """Return ``reading`` with its quaternion; the calibrated compass, and a missing ``raw``, are marked unavailable."""
+def imu_data(reading: ImuReading, raw: RawImu | None = None, base_start: float = 0.0) -> ImuData:
+    """Return ``reading`` with its quaternion, its time since ``base_start`` (robot time).
+
+    The calibrated compass, and a missing ``raw``, are marked unavailable.
+    """
     attitude, turning, acceleration = reading.orientation, reading.angular_velocity, reading.linear_acceleration
     (cr, sr), (cp, sp), (cy, sy) = (
         (math.cos(half), math.sin(half)) for half in (attitude.roll / 2, attitude.pitch / 2, attitude.yaw / 2)
@@ -154,7 +158,7 @@ def imu_data(reading: ImuReading, raw: RawImu | None = None) -> ImuData:
         raw_acc=raw_acceleration,
         raw_gyro=raw_rate,
         raw_compass=raw_field,
-        timestamp=int(reading.stamp * 1000),
+        timestamp=milliseconds(reading.stamp, base_start),
         vendor_availability=available,
         availability=available,
     )

@@ -7,6 +7,7 @@ from roboglot.model.sensing import RawImu
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
+from roboglot.protocols.slamware.vocabulary import milliseconds
 from roboglot.wire.slamware.chapters.system.system import ImuCounts, ImuValues
 
 API = "/api/core/system/v1"
@@ -16,7 +17,7 @@ API = "/api/core/system/v1"
 def get_imu_raw_adc_data(context: Context) -> ImuCounts:
     """Return the counts of accelerometer, gyro and compass."""
     raw = context.robot[ImuConverters].raw
-    return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, _milliseconds(raw))
+    return ImuCounts(*raw.acceleration, *raw.rate, *raw.field, milliseconds(raw.stamp, context.robot.starts.base))
 
 
 @TABLE.on(f"GET {API}/rawimu", right=Right.SEE, needs=(ImuConverters,))
@@ -24,7 +25,8 @@ def get_imu_raw_data(context: Context) -> ImuValues:
     """Return the uncorrected readings in m/s2, rad/s and microtesla."""
     raw = context.robot[ImuConverters].raw
     a, r, f = in_units(raw)
-    return ImuValues(a[0], a[1], a[2], r[0], r[1], r[2], f[0], f[1], f[2], _milliseconds(raw))
+    stamp = milliseconds(raw.stamp, context.robot.starts.base)
+    return ImuValues(a[0], a[1], a[2], r[0], r[1], r[2], f[0], f[1], f[2], stamp)
 
 
 def in_units(raw: RawImu) -> tuple[list[float], list[float], list[float]]:
@@ -32,7 +34,3 @@ def in_units(raw: RawImu) -> tuple[list[float], list[float], list[float]]:
     acceleration = [count * raw.acceleration_unit for count in raw.acceleration]
     rate = [count * raw.rate_unit for count in raw.rate]
     return acceleration, rate, [count * raw.field_unit * 1e6 for count in raw.field]
-
-
-def _milliseconds(raw: RawImu) -> int:
-    return int(raw.stamp * 1000)
