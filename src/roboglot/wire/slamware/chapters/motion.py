@@ -93,20 +93,26 @@ class Speed(msgspec.Struct):
     omega: float
 
 
+MoveFlag = Literal[
+    "precise", "with_yaw", "fail_retry_count", "find_path_ignoring_dynamic_obstacles", "with_directed_virtual_track"
+]
+
+
 class MoveOptions(msgspec.Struct):
     """Options of a move. ``yaw`` and ``fail_retry_count`` have an effect only if ``flags`` names them.
 
-    Real clients send flags as a list, 0, null or [null], and 0 for unused numbers.
+    ``mode``: 0 free, 1 strictly on tracks, 2 rather on tracks. Real clients send flags as a list, 0, null or [null],
+    and 0 for unused numbers.
     """
 
-    mode: int = 0
-    flags: list[str | None] | int | None = None
+    mode: Annotated[int, msgspec.Meta(ge=0, le=2)] = 0
+    flags: list[MoveFlag | None] | Annotated[int, msgspec.Meta(ge=0, le=0)] | None = None
     yaw: Radians | None = None
     acceptable_precision: Annotated[float, msgspec.Meta(ge=0)] | None = None
     fail_retry_count: Annotated[int, msgspec.Meta(ge=0, le=RETRIES_MAX)] | None = None
     speed_ratio: Annotated[float, msgspec.Meta(ge=0, le=10)] | None = None
 
-    def has(self, flag: str) -> bool:
+    def has(self, flag: MoveFlag) -> bool:
         """Return True if ``flag`` is set."""
         return isinstance(self.flags, list) and flag in self.flags
 

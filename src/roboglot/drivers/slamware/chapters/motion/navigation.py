@@ -23,6 +23,7 @@ from roboglot.model.geometry import Path, Point
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters.motion import (
     ActionInfo,
+    MoveFlag,
     MoveOptions,
     MoveToOptions,
     PathQuery,
@@ -98,7 +99,7 @@ class SlamwareNavigation(Navigation):
 
 def move_options(options: NavigationOptions) -> MoveOptions:
     """Return the options in the form of the API."""
-    flags: list[str | None] = []
+    flags: list[MoveFlag | None] = []
     if options.yaw is not None:
         flags.append("with_yaw")
     if options.tolerance <= PRECISE:

@@ -38,7 +38,7 @@ from roboglot.wire.slamware.chapters.delivery import (
     WorkModeEntry,
     WrappedSettings,
 )
-from roboglot.wire.slamware.chapters.motion import MoveOptions
+from roboglot.wire.slamware.chapters.motion import MoveFlag, MoveOptions
 
 API = "/api/delivery/v1"
 PASSWORD = "slamware.delivery_password"
@@ -121,21 +121,19 @@ def _clock(seconds: int) -> str:
 @TABLE.on(f"GET {API}/admin/move_options", right=Right.SEE, needs=(Delivery,))
 def get_move_options(context: Context) -> MoveOptions:
     """Return the settings for driving in tasks."""
-    return _effective(msgspec.convert(dict(context.robot[Delivery].policy.words), MoveOptions))
+    return _effective(msgspec.convert(_stored(context.robot[Delivery].policy), MoveOptions))
 
 
 @TABLE.on(f"PUT {API}/admin/move_options", right=Right.EDIT, needs=(Delivery,))
 async def set_move_options(context: Context, body: dict[str, object] | None = None) -> OperationReply:
     """Change the given settings, or reset all by an empty body; applies from the next drive."""
     policy = context.robot[Delivery].policy
-    words = {**policy.words, **body} if body else {}
+    words = {**_stored(policy), **body} if body else {}
     words = {name: value for name, value in words.items() if name in MoveOptions.__struct_fields__}
     try:
         how = _effective(msgspec.convert(words, MoveOptions))
     except msgspec.ValidationError as error:
         raise InvalidGoal(why_invalid(error, wanted=MoveOptions)) from None
-    if how.mode not in range(len(TRACKS)):
-        raise InvalidGoal(f"there is no move mode {how.mode}; use one of 0 to {len(TRACKS) - 1}")
     new = replace(
         policy,
         words=words,
@@ -147,9 +145,19 @@ async def set_move_options(context: Context, body: dict[str, object] | None = No
     return await _set(context, new)
 
 
+def _stored(policy: Policy) -> dict[str, object]:
+    """Return the settings; without flags from before this program refused unknown ones."""
+    words = dict(policy.words)
+    try:
+        msgspec.convert(words, MoveOptions)
+    except msgspec.ValidationError:
+        words["flags"] = []
+    return words
+
+
 def _effective(how: MoveOptions) -> MoveOptions:
     """Return the settings normalised: a list for 0, null or [null] as flags, and 0 for unset values."""
-    flags: list[str | None] = [flag for flag in how.flags if flag] if isinstance(how.flags, list) else []
+    flags: list[MoveFlag | None] = [flag for flag in how.flags if flag] if isinstance(how.flags, list) else []
     return MoveOptions(
         how.mode,
         flags,

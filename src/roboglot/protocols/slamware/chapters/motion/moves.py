@@ -64,8 +64,6 @@ def _directed(robot: Robot, goals: Sequence[Point], *, strictly: bool) -> list[P
 
 def navigation_options(robot: Robot, how: MoveOptions, yaw: float | None) -> NavigationOptions:
     """Return the model's options. Raises InvalidGoal for options impossible on this map."""
-    if how.mode not in (0, 1, 2):
-        raise InvalidGoal(f"there is no move mode {how.mode}; use one of 0 to {len(TRACKS) - 1}")
     tracks = TRACKS[how.mode]
     if tracks is Tracks.STRICT and not has_tracks(robot):
         raise InvalidGoal("the map has no tracks to keep to")
