@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import uuid
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from roboglot.model.components.mapping.annotations import Area, AreaKind, MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.system.link import Link, LinkState
-from roboglot.model.geometry import Point, Pose
-from roboglot.model.maps import PointOfInterest
+from roboglot.model.errors import InvalidGoal
+from roboglot.model.events import MapReplaced
+from roboglot.model.geometry import ORIGIN, Point, Pose
+from roboglot.model.maps import OccupancyGrid, PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.slamware.server import SlamwareDoor
@@ -114,3 +119,26 @@ async def test_walls_and_areas_are_heeded_by_the_robot(
     driven[Mapping].load(driven[Mapping].grid, Pose())  # clears the drawings on the robot's map
     await forward(seconds=3)
     assert drawn(near) == drawn(far) == {("dangerous", 2.0, 0.5)}
+
+
+async def test_merged_map_keeps_docks_and_landmarks(
+    robot: Robot, driven: Robot, until: Until, forward: Forward
+) -> None:
+    dock, mark = place("dock", x=0.5), place("reflector", x=2.0)
+    await robot[MapAnnotations].change(lambda now: replace(now, docks=(dock,), landmarks=(mark,)))
+    await driven[Places].put(place("kitchen"))
+    await until(lambda: len(robot[Places].all()) == 1 and bool(driven[Mapping].grid.log_odds.any()))
+    heard, grid = driven.events.subscribe(MapReplaced), driven[Mapping].grid
+    cells = np.pad(grid.log_odds, ((0, 0), (0, 40)))
+    cells[10:20, -1] = 100  # of the map that is added
+    driven[Mapping].load(OccupancyGrid(cells, grid.resolution, grid.origin), driven[Localization].pose, origin=ORIGIN)
+    await until(lambda: robot[Mapping].grid.width == cells.shape[1], patience=5)
+    await forward(seconds=3)
+    notes = robot[MapAnnotations].current
+    assert [[mark.id for mark in marks] for marks in (notes.docks, notes.landmarks)] == [[dock.id], [mark.id]]
+    assert notes.docks[0].pose.distance_to(dock.pose) < 1e-5
+    assert [p.metadata["display_name"] for p in robot[Places].all()] == ["kitchen"]
+    assert same(driven, robot)
+    assert [event.origin for event in heard.drain()] == [ORIGIN]
+    with pytest.raises(InvalidGoal, match="the same origin"):
+        driven[Mapping].load(grid, Pose(), origin=Pose(1.0))

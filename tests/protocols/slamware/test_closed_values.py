@@ -31,8 +31,7 @@ def requests() -> Iterator[tuple[str, Any]]:
     for name, factory in FACTORIES.items():
         yield name, factory.options
     for key in sorted(TABLE.implemented()):
-        operation = TABLE.get(key)
-        for name, parameter in [*inspect.signature(operation.handler, eval_str=True).parameters.items()][1:]:
+        for name, parameter in [*inspect.signature(TABLE[key].handler, eval_str=True).parameters.items()][1:]:
             yield f"{key} {name}", parameter.annotation
 
 

@@ -17,7 +17,7 @@ from roboglot.hosting.event_loop import together
 from roboglot.model.clock import Clock
 from roboglot.model.components.system.link import Link
 from roboglot.model.events import BatteryChanged, DockContactChanged, MapReplaced, PoseJumped, ScanTaken
-from roboglot.model.geometry import Twist, wrap_angle
+from roboglot.model.geometry import Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import OdometryReading
 from roboglot.wire.slamware.chapters.system.system import BatteryPack, DockingStatus
@@ -215,8 +215,8 @@ class TelemetryPoller:
         if before.log_odds.any() and not continues(before, self._reported.grid):
             self._robot.events.publish(MapReplaced(stamp=self._clock.time()))
 
-    async def read_map(self) -> None:
-        """Read the map and the pose after the map was replaced."""
+    async def read_map(self, origin: Pose | None = None) -> None:
+        """Read the map and the pose after the map was replaced; ``origin``: as in ``MapReplaced``."""
         await self._map()
         await self._pose()
-        self._robot.events.publish(MapReplaced(stamp=self._clock.time()))
+        self._robot.events.publish(MapReplaced(stamp=self._clock.time(), origin=origin))

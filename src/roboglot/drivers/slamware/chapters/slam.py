@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 
 from roboglot.clients.slamware import SlamwareClient
@@ -16,7 +16,7 @@ from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.geometry import POSITION_MAX, Point, Pose
+from roboglot.model.geometry import ORIGIN, POSITION_MAX, Point, Pose
 from roboglot.model.maps import OccupancyGrid
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters.motion import (
@@ -25,9 +25,10 @@ from roboglot.wire.slamware.chapters.motion import (
     RecoverMovement,
     RelocalizationOptions,
 )
+from roboglot.wire.slamware.chapters.slam.explore_map import ExploreMap
 from roboglot.wire.slamware.chapters.slam.localization import NewOrigin, Switch
-from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap
-from roboglot.wire.slamware.chapters.slam.stcm_layers import grid_layer
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer
+from roboglot.wire.slamware.chapters.slam.stcm_layers import grid_layer, is_grid
 
 Replacing = Callable[[], AbstractAsyncContextManager[None]]
 
@@ -138,12 +139,15 @@ class SlamwareMapping(ReportedMapping):
     def load(self, grid: OccupancyGrid, pose: Pose, *, origin: Pose | None = None) -> None:
         if grid.width * grid.height > CELLS_MAX:
             raise InvalidGoal(f"a map has at most {CELLS_MAX} cells")
+        if origin not in (None, ORIGIN):
+            raise InvalidGoal("this robot takes over its drawings only to a map with the same origin")
 
         async def load() -> None:
             async with self._replacing():
-                await self._client.set_composite_map(CompositeMap((grid_layer(explored_of(grid)),)))
+                drawn = () if origin is None else (await self._client.get_composite_map()).layers
+                await self._client.set_composite_map(_with_grid(drawn, explored_of(grid)))
             await self._client.set_pose(pose3d(pose))
-            await self._telemetry.read_map()
+            await self._telemetry.read_map(origin)
 
         self._supervisor.send("loading a map", load())
 
@@ -159,6 +163,14 @@ class SlamwareMapping(ReportedMapping):
 
         self._supervisor.send("moving the origin", move())
         return Point(round(point.x / cell) * cell, round(point.y / cell) * cell)
+
+
+def _with_grid(layers: Sequence[Layer], grid: ExploreMap) -> CompositeMap:
+    """Return a map with these layers but another grid, which keeps the name of its floor."""
+    old = [layer for layer in layers if is_grid(layer)]
+    new = grid_layer(grid)
+    named = tuple(pair for layer in old[:1] for pair in layer.pairs if pair[0] not in new.metadata)
+    return CompositeMap((grid_layer(grid, named), *(layer for layer in layers if not is_grid(layer))))
 
 
 async def _nothing(_: ActionInfo) -> None:

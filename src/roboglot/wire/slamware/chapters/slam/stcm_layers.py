@@ -104,9 +104,14 @@ def grid_layer(explored: ExploreMap, extra: Pairs = ()) -> Layer:
     return Layer(_named(EXPLORE, "vnd.slamtec.map-layer/vnd.grid-map+binary", *pairs, *extra), explored.cells.tobytes())
 
 
+def is_grid(layer: Layer) -> bool:
+    """Return whether the layer has a map's grid."""
+    return _is(layer, EXPLORE, "grid-map")
+
+
 def read_grid(layer: Layer) -> ExploreMap | None:
     """Return the explore map in ``layer``; None for another layer. Raises BadMap for a damaged one."""
-    if not _is(layer, EXPLORE, "grid-map"):
+    if not is_grid(layer):
         return None
     values = layer.metadata
     try:
