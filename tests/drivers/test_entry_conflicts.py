@@ -15,11 +15,17 @@ from hypothesis import strategies as st
 from roboglot.drivers.entry_sync import EntrySync
 from roboglot.drivers.local_entries import LocalDrawings, LocalPlaces, key_of
 from roboglot.drivers.supervisor import Supervisor
-from roboglot.model.components.mapping.annotations import Line, LineKind
+from roboglot.model.clock import LockstepClock
+from roboglot.model.components.mapping.annotations import Line, LineKind, MapAnnotations
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.events import PlacesChanged
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
+from roboglot.storage.annotations import StoredAnnotations
+from roboglot.storage.database import Database
+from roboglot.storage.places import StoredPlaces
+from tests.protocols.slamware.conftest import PLATE
 
 Step = tuple[str, str, int]  # the side, what it does, with which entry
 NAMES = range(3)
@@ -30,9 +36,10 @@ others = st.sampled_from((("far", "clear", 0), ("", "sync", 0)))
 class Side:
     """One side's entries."""
 
-    def __init__(self, key: Callable[[Any], Hashable]) -> None:
+    def __init__(self, kind: str) -> None:
         self.entries: dict[Hashable, Any] = {}
-        self._key = key
+        local: Any = LocalPlaces if kind == "places" else LocalDrawings
+        self._key, self.moves, self.merge = KINDS[kind][2], local.moves, local.merge
 
     async def read(self) -> Mapping[Hashable, Any]:
         return dict(self.entries)
@@ -74,9 +81,9 @@ def moved_wall(entry: Line) -> Line:
     return replace(entry, start=start, end=end)
 
 
-KINDS: dict[str, tuple[Any, Any, Any, Any]] = {
-    "places": (place, moved_place, lambda entry: entry.id, LocalPlaces.moves),
-    "drawings": (wall, moved_wall, key_of, LocalDrawings.moves),
+KINDS: dict[str, tuple[Any, Any, Any]] = {
+    "places": (place, moved_place, lambda entry: entry.id),
+    "drawings": (wall, moved_wall, key_of),
 }
 
 
@@ -94,10 +101,10 @@ def after(kind: str, there: set[int], done: list[Step]) -> set[int]:
 
 
 async def play(kind: str, story: list[Step]) -> None:
-    make, moved, key, moves = KINDS[kind]
-    near, far, expected, done = Side(key), Side(key), set[int](), list[Step]()
+    make, moved, key = KINDS[kind]
+    near, far, expected, done = Side(kind), Side(kind), set[int](), list[Step]()
     robot = cast("Robot", SimpleNamespace(events=SimpleNamespace(listen=lambda *_: None)))
-    sync = EntrySync(robot, cast("Supervisor", None), near, far, PlacesChanged, what=kind, moves=moves)
+    sync = EntrySync(robot, cast("Supervisor", None), near, far, PlacesChanged, what=kind)
     for version, (side, what, name) in enumerate((*story, ("", "sync", 0))):
         mine = near if side == "near" else far
         if what == "sync":
@@ -142,3 +149,52 @@ def test_walls_are_moved_only_together() -> None:
         assert LocalDrawings.moves(before, now) == dict(zip(before, now, strict=True))
     for other in (walls(11.0, 12.1, 14.0), walls(11.0, 12.0), walls(11.0, 12.0, 14.0, length=2.1)):
         assert LocalDrawings.moves(before, other) == {}
+
+
+async def test_metadata_given_here_survive_a_clearing() -> None:
+    near, far = Side("places"), Side("places")
+    robot = cast("Robot", SimpleNamespace(events=SimpleNamespace(listen=lambda *_: None)))
+    sync = EntrySync(robot, cast("Supervisor", None), near, far, PlacesChanged, what="places")
+    near.entries = {str(name): place(name, 1) for name in NAMES}
+    await sync.sync()
+    near.entries["0"] = replace(near.entries["0"], metadata={"name": "0", "version": "mine"})
+    near.entries["1"] = replace(near.entries["1"], pose=Pose(7.0, 7.0))  # on a map that is no more
+    far.clear(moved_place)
+    await sync.sync()
+    assert near.entries == far.entries
+    assert (far.entries["0"].metadata["version"], far.entries["0"].pose) == ("mine", Pose(1.5, 2.0))
+    assert far.entries["1"] == moved_place(place(1, 1))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+async def test_removals_under_way_hold_against_a_clearing(kind: str, clock: LockstepClock) -> None:
+    make, moved, key = KINDS[kind]
+    robot, database, far = Robot("a", PLATE, clock), Database(":memory:"), Side(kind)
+    places = StoredPlaces(database, "a", clock, robot.events)
+    drawn = StoredAnnotations(database, "a", clock, robot.events)
+    robot.add(Places, places)
+    robot.add(MapAnnotations, drawn)
+    near: Any = LocalPlaces(robot) if kind == "places" else LocalDrawings(robot)
+    link = cast("Supervisor", SimpleNamespace(link=SimpleNamespace(refusal="none is needed")))
+    sync = EntrySync(robot, link, near, far, PlacesChanged, what=kind)
+    far.entries = {key(entry): entry for entry in (make(0, 1), make(1, 2))}
+    await sync.sync()
+    assert len(await near.read()) == 2
+    far.clear(moved)
+    async with places.turn, drawn.turn:  # the removal waits for the database, and the sync for the removal
+        if kind == "places":
+            removing = asyncio.ensure_future(places.remove("0"))
+        else:
+            removing = asyncio.ensure_future(drawn.change(lambda now: replace(now, lines=now.lines[1:])))
+        await asyncio.sleep(0)
+        syncing = asyncio.ensure_future(sync.sync())
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert len(await near.read()) == 2
+    await syncing
+    await removing
+    assert [entry.metadata["name"] for entry in (await near.read()).values()] == ["1"]
+    await sync.sync()
+    assert far.names == {1}
+    assert await near.read() == far.entries
+    database.close()

@@ -26,10 +26,12 @@ class LocalPlaces:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self._known: dict[Hashable, PointOfInterest] = {}  # when they were read last
 
     async def read(self) -> Mapping[Hashable, PointOfInterest]:
         """Return all places."""
-        return {place.id: place for place in self._robot[Places].all()}
+        self._known = {place.id: place for place in self._robot[Places].all()}
+        return self._known
 
     @staticmethod
     def moves(before: Mapping[Hashable, PointOfInterest], now: Mapping[Hashable, PointOfInterest]) -> Keys:
@@ -40,15 +42,28 @@ class LocalPlaces:
             if (there := now.get(id)) not in (None, place) and replace(there, pose=place.pose) == place
         }
 
+    @staticmethod
+    def merge(here: PointOfInterest, before: PointOfInterest, there: PointOfInterest) -> PointOfInterest | None:
+        """Return the place with what was edited here, where the robot moved it; None if it was moved here, too."""
+        return replace(here, pose=there.pose) if here.pose == before.pose else None
+
     async def write(self, put: Sequence[PointOfInterest], gone: Sequence[PointOfInterest]) -> Collection[Hashable]:
-        """Apply the changes one by one; log what fails."""
-        places = self._robot[Places]
-        try:
-            if put:
-                await places.put(*put)
+        """Apply all changes at once, but to places that have changed since they were read; log a failure."""
+        known = self._known
+
+        def edit(now: Sequence[PointOfInterest]) -> Sequence[PointOfInterest]:
+            places: dict[Hashable, PointOfInterest] = {place.id: place for place in now}
+            for place in put:
+                if places.get(place.id) == known.get(place.id):  # else a removal or edit here was under way
+                    places[place.id] = place
             for place in gone:
-                await places.remove(place.id)
-        except RobotError as error:  # too many, or changed meanwhile
+                if places.get(place.id) == known.get(place.id):
+                    places.pop(place.id, None)
+            return tuple(places.values())
+
+        try:
+            await self._robot[Places].change(edit)
+        except RobotError as error:  # too many
             log.warning("cannot store places of robot %s: %s", self._robot.id, error)
         return ()
 
@@ -58,12 +73,12 @@ class LocalDrawings:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self._known: Mapping[Hashable, Drawing] = {}  # when they were read last
 
     async def read(self) -> Mapping[Hashable, Drawing]:
         """Return all drawings, without ids."""
-        now = self._robot[MapAnnotations].current
-        drawings: tuple[Drawing, ...] = (*now.lines, *now.areas)
-        return {key_of(bare): bare for bare in map(without_id, drawings)}
+        self._known = _drawn(self._robot[MapAnnotations].current)
+        return self._known
 
     @staticmethod
     def moves(before: Mapping[Hashable, Drawing], now: Mapping[Hashable, Drawing]) -> Keys:
@@ -76,20 +91,33 @@ class LocalDrawings:
                 found |= zip(old, new, strict=True)
         return found
 
+    @staticmethod
+    def merge(_here: Drawing, _before: Drawing, _there: Drawing) -> None:
+        """Return None: an edited drawing has another key, and counts as a new one."""
+
     async def write(self, put: Sequence[Drawing], gone: Sequence[Drawing]) -> Collection[Hashable]:
-        """Apply all changes at once; log a failure."""
-        lost = set(map(key_of, gone))
+        """Apply all changes at once, without what was removed since it was read; log a failure."""
+        lost, known = set(map(key_of, gone)), self._known
+        moves = self.moves(known, {key_of(drawing): drawing for drawing in put})
 
         def edit(now: Annotations) -> Annotations:
             lines = tuple(line for line in now.lines if key_of(without_id(line)) not in lost)
             areas = tuple(area for area in now.areas if key_of(without_id(area)) not in lost)
-            return replace(now, lines=lines, areas=areas).with_new(*put)
+            removed = {moves.get(key, key) for key in known.keys() - _drawn(now).keys()}
+            new = [drawing for drawing in put if key_of(drawing) not in removed]
+            return replace(now, lines=lines, areas=areas).with_new(*new)
 
         try:
             await self._robot[MapAnnotations].change(edit)
         except RobotError as error:
             log.warning("cannot store drawings on the map of robot %s: %s", self._robot.id, error)
         return ()
+
+
+def _drawn(notes: Annotations) -> Mapping[Hashable, Drawing]:
+    """Return lines and areas by content, without ids."""
+    drawings: tuple[Drawing, ...] = (*notes.lines, *notes.areas)
+    return {key_of(bare): bare for bare in map(without_id, drawings)}
 
 
 def without_id(drawing: Drawing) -> Drawing:

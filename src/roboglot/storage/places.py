@@ -43,6 +43,13 @@ class StoredPlaces(Places):
             self._places |= {place.id: place for place in places}
         self._publish()
 
+    async def change(self, edit: Callable[[Sequence[PointOfInterest]], Sequence[PointOfInterest]]) -> None:
+        async with self.turn:
+            places = edit(self.all())
+            await self._database.run(self.writing(places, alone=True))
+            self._places = {place.id: place for place in places}
+        self._publish()
+
     def writing(self, places: Sequence[PointOfInterest], *, alone: bool = False) -> Callable[[Connection], object]:
         """Return the transaction that writes places; ``alone``: replace all others. Raises InvalidGoal for too many."""
         new = {place.id: place for place in places}

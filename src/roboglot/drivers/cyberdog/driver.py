@@ -112,7 +112,6 @@ class CyberDogDriver(Driver):
             CyberDogPlaces(robot, self._client),
             PlacesChanged,
             what="places",
-            moves=LocalPlaces.moves,
         )
         self._optional = OptionalComponents(robot, self._client, self.supervisor, self._status)
 

@@ -48,7 +48,6 @@ class OptionalComponents:
             SlamwarePlaces(client),
             PlacesChanged,
             what="places",
-            moves=LocalPlaces.moves,
         )
         self._drawings = EntrySync(
             robot,
@@ -57,7 +56,6 @@ class OptionalComponents:
             SlamwareDrawings(client),
             AnnotationsChanged,
             what="drawings",
-            moves=LocalDrawings.moves,
         )
         self.parts: tuple[tuple[str, float, Ask], ...] = (
             ("health", 0.5, self._health.refresh),

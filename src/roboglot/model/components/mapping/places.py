@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from roboglot.model.components.component import Component
 from roboglot.model.maps import PointOfInterest
@@ -23,6 +23,10 @@ class Places(Component):
     @abstractmethod
     async def put(self, *places: PointOfInterest) -> None:
         """Add places, replacing those with the same id; all or none."""
+
+    @abstractmethod
+    async def change(self, edit: Callable[[Sequence[PointOfInterest]], Sequence[PointOfInterest]]) -> None:
+        """Replace all places by ``edit`` of them, after every change under way, at once and all or none."""
 
     @abstractmethod
     async def remove(self, id: str) -> None:
