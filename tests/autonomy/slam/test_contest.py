@@ -127,6 +127,23 @@ def test_new_objects_do_not_overrule_the_wheels(scans: int, believes_wheels: boo
     assert (found is not None) is believes_wheels
 
 
+def test_new_neighbours_move_none_that_stands() -> None:
+    """It has just come among others, which then drive on together; no wall shows its place in the corridor."""
+    from roboglot.autonomy.slam.contradictions import contested
+    from roboglot.autonomy.slam.matcher import FREE, fit
+    from roboglot.autonomy.slam.painting import paint
+
+    grid, here = EvidenceGrid(), 20.0  # no pillar is in sight
+    for _ in range(3):
+        paint(grid, scanned(here), Pose(here), fill=True)
+    scan = scanned(here, tuple((x + LEFT, y) for x, y in ALONG))
+    misled = fit(grid, scan, Pose(here - LEFT), FREE)
+    assert misled.pose.distance_to(Pose(here - LEFT)) < 0.02  # otherwise the test proves nothing
+    found = contested(grid, scan, Pose(here), misled, TIGHT, 0.0, 0.004)
+    assert found is not None
+    assert found.pose.distance_to(Pose(here)) < 0.01
+
+
 def test_past_that_was_overruled_does_not_testify(left: EvidenceGrid) -> None:
     """A standing robot that was misled for a moment returns to its place, and stays there."""
     from roboglot.autonomy.slam.contradictions import WheelWitness

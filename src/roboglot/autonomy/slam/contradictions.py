@@ -155,9 +155,10 @@ def contested(
     least = max(GAP_MIN, TELLING * apart)
     for_wheels = np.count_nonzero((off_scan - off_wheels > least) & (off_wheels < FITS))
     for_scan = np.count_nonzero(votes := (off_wheels - off_scan > least) & (off_scan < FITS))
-    if way > STOOD and for_scan and contradiction > FRESH_SIGMAS * sigma:
+    if for_scan and contradiction > FRESH_SIGMAS * sigma:
         fresh = _fresh(grid, scan.in_frame(best.pose, points[votes & ~on_walls(points)]))
-        for_wheels, for_scan = for_wheels + fresh, for_scan - fresh
+        if way > STOOD or 2 * fresh > for_scan:  # walls show that a robot which stood was moved
+            for_wheels, for_scan = for_wheels + fresh, for_scan - fresh
     jumped = apart >= NOISE_MAX and way <= STOOD
     if for_wheels < VOTES_MIN and not jumped:
         return None
