@@ -6,7 +6,8 @@ import numpy as np
 
 from roboglot.kernels.arrays import FloatArray, Int16Array, Int32Array, IntArray, SingleArray
 from roboglot.kernels.compiled import kernel
-from roboglot.kernels.obstacles import beside_occupied, still_noted
+from roboglot.kernels.obstacles import still_noted
+from roboglot.kernels.occupancy import is_surface
 
 LOW, FLOOR = 0.10, 0.04  # m above the floor: lower objects are stepped over; certainly floor
 STEEP = 0.7  # slope from which a surface is a wall
@@ -114,7 +115,7 @@ def remember_low(
         x = cos * obstacles[i, 0] - sin * obstacles[i, 1] + pose[0]
         y = sin * obstacles[i, 0] + cos * obstacles[i, 1] + pose[1]
         row, col = int(np.floor((y - corner[1]) / resolution)), int(np.floor((x - corner[0]) / resolution))
-        if not (1 <= row < height - 1 and 1 <= col < width - 1) or beside_occupied(evidence, row, col):
+        if not (1 <= row < height - 1 and 1 <= col < width - 1) or is_surface(evidence, row, col):
             continue
         is_new = True
         for k in range(len(echoes)):

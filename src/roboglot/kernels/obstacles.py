@@ -6,21 +6,12 @@ import numpy as np
 
 from roboglot.kernels.arrays import ByteArray, FloatArray, Int16Array, Int32Array, SingleArray
 from roboglot.kernels.compiled import kernel
+from roboglot.kernels.occupancy import is_surface
 
 CELL_SQUARE = 0.5001  # squared distance from a cell's centre to its corner, in cells, with a margin
 CELL_HALF = 0.7072  # its root
 FEW = 800  # cells up to which choosing the rays that come near them is cheaper than tracing all
 SECTORS = 128  # of all directions, by which rays are sorted
-
-
-@kernel("boolean(int16[:,::1], int64, int64)")
-def beside_occupied(evidence: Int16Array, row: int, col: int) -> bool:
-    """Return whether the cell or one of its eight neighbours is occupied."""
-    for r in range(max(0, row - 1), min(evidence.shape[0], row + 2)):
-        for c in range(max(0, col - 1), min(evidence.shape[1], col + 2)):
-            if evidence[np.uintp(r), np.uintp(c)] > 0:
-                return True
-    return False
 
 
 @kernel("int64(float64, float64, float64, int32[:,::1], int64, float64[:,::1])")
@@ -112,7 +103,7 @@ def _note(
         echoes[met, 0], echoes[met, 1] = ends[i, 0] + pose[3], ends[i, 1] + pose[4]
         met += 1
         col, row = int(np.floor(ends[i, 0] / resolution)), int(np.floor(ends[i, 1] / resolution))
-        if not (0 <= row < height and 0 <= col < width) or beside_occupied(evidence, row, col):
+        if not (0 <= row < height and 0 <= col < width) or is_surface(evidence, row, col):
             continue
         if seen[row, col] == 0.0 and count >= 0:
             if count < noted.shape[0]:
@@ -249,7 +240,7 @@ def _unexplained(
     (height, width), count = evidence.shape, 0
     for i in range(points.shape[0]):
         row, col = int(np.floor((points[i, 1] - y) / resolution)), int(np.floor((points[i, 0] - x) / resolution))
-        if 0 <= row < height and 0 <= col < width and not beside_occupied(evidence, row, col):
+        if 0 <= row < height and 0 <= col < width and not is_surface(evidence, row, col):
             odd[count, 0], odd[count, 1] = points[i, 0], points[i, 1]
             count += 1
     return count
