@@ -1,6 +1,8 @@
-"""Commands of ROS's usual topics (cmd_vel, goal_pose, initialpose), for every door that has them."""
+"""Commands of ROS's usual topics (cmd_vel, goal_pose, initialpose), and levels of errors, for all doors with them."""
 
 from __future__ import annotations
+
+import logging
 
 from roboglot.model.actions import Action
 from roboglot.model.clock import RealClock
@@ -9,11 +11,21 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.sensing.odometry import Odometry
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.errors import Busy, InvalidGoal, Refused, RobotError
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 
 FAR = 1e6  # m, m/s: larger values are mistakes
+LEVELS: dict[type[RobotError], int] = {
+    Busy: logging.WARNING,
+    Refused: logging.WARNING,
+    RobotError: logging.ERROR,
+}
+
+
+def level_of(error: RobotError) -> int:
+    """Return the level of ``error``, by its nearest ancestor in the table; rcl's levels are Python's."""
+    return next(LEVELS[kind] for kind in type(error).__mro__ if kind in LEVELS)
 
 
 def drive(robot: Robot, request: Twist, dead_man: float, source: str) -> None:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from roboglot.model.errors import Busy, Refused, RobotError
+import logging
+
+from roboglot.model.errors import RobotError
+from roboglot.protocols import ros_commands
 from roboglot.wire.foxglove.messages import Level, Request, asset_failure, message
 
-LEVELS: dict[type[RobotError], Level] = {
-    Busy: Level.WARNING,
-    Refused: Level.WARNING,
-    RobotError: Level.ERROR,
-}
+LEVELS = {logging.WARNING: Level.WARNING, logging.ERROR: Level.ERROR}
 
 
 def level_of(error: RobotError) -> Level:
-    """Return the level of ``error``, by its nearest ancestor in the table."""
-    return next(LEVELS[kind] for kind in type(error).__mro__ if kind in LEVELS)
+    """Return the level of ``error`` in the protocol's numbers."""
+    return LEVELS[ros_commands.level_of(error)]
 
 
 def refusal(request: Request, why: str, level: Level = Level.ERROR) -> str | bytes:
