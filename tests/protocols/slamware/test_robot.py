@@ -17,7 +17,7 @@ from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.health import FaultLevel, Health
-from roboglot.model.events import LoopClosed
+from roboglot.model.events import LoopClosed, Rebooted
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
@@ -298,6 +298,33 @@ async def test_places_are_adjusted_after_a_loop_was_closed(
         assert found["far"] == pytest.approx((8.8, 0.1, math.pi / 2))
         assert (found["moved"][:2], found["new"][:2]) == ((5.0, 5.0), (1.0, 0.5))
         await client.post(f"{POIS}/:adjust")
+
+
+@pytest.mark.parametrize("again", ["restart", "reload"])
+async def test_shifts_are_saved_with_their_map(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, again: str
+) -> None:
+    async def adjusted() -> float:
+        await client.post(f"{POIS}/:adjust")
+        return robot[Places].get("near").pose.x
+
+    multi = "/api/multi-floor/map/v1/stcm"
+    await forward(seconds=1)
+    await client.post(POIS, json={"id": "near", "pose": {"x": 1.0, "y": 0.5, "yaw": 0.0}})
+    robot.events.publish(LoopClosed(stamp=1.0, shift=0.1, moved=((Pose(1.0), Pose(1.5)),)))
+    assert (await client.post(f"{multi}/:save")).status_code == 200
+    if again == "restart":
+        robot.events.publish(Rebooted(stamp=robot.clock.time()))
+        await forward(seconds=0.5)
+    else:
+        assert (await client.post(f"{multi}/:reload")).status_code == 200
+    assert robot[Places].get("near").pose.x == pytest.approx(1.0)
+    assert await adjusted() == pytest.approx(1.5)
+    # A closure that was not saved is lost with the map that it corrected.
+    assert (await client.post(f"{multi}/:save")).status_code == 200
+    robot.events.publish(LoopClosed(stamp=2.0, shift=0.1, moved=((Pose(1.0), Pose(1.5)),)))
+    assert (await client.post(f"{multi}/:reload")).status_code == 200
+    assert await adjusted() == pytest.approx(1.5)
 
 
 async def test_doubts_about_the_place_are_reset(

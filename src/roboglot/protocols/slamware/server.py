@@ -52,19 +52,19 @@ class SlamwareDoor:
         self.port = config.port
         actions = ActionBook(robot, config.action_prefix)
         events = EventLog(robot, actions, keep=config.keep_events)
-        cloud = CloudFolder(robot, config.cloud)
+        cloud, shifts = CloudFolder(robot, config.cloud), PoiShifts(robot)
         self._voice = Voice(robot)
         self._context = Context(
             robot,
             actions,
             events,
             Laser(robot),
-            MapKeeper(robot, cloud, lambda: events.note(GeneralEvent.SYNC_MAP_FROM_CLOUD)),
+            MapKeeper(robot, cloud, shifts, lambda: events.note(GeneralEvent.SYNC_MAP_FROM_CLOUD)),
             SpeedLimits(robot),
             Totals(robot),
             Updater(robot),
             BoxLog(robot),
-            PoiShifts(robot),
+            shifts,
             cloud,
         )
         self._rides = GivenUpRides(self._context)

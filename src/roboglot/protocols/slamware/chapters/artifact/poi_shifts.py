@@ -1,4 +1,7 @@
-"""Shifts of points of interest after loop closures, which correct the map but not the points."""
+"""Shifts of points of interest after loop closures, which correct the map but not the points.
+
+They belong to the corrected map, and are saved and loaded with it: on the map of before a closure the points are right.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from roboglot.model.components.mapping.places import Places
+from roboglot.model.components.system.settings import Settings
 from roboglot.model.events import LoopClosed, MapReplaced
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
+
+SAVED = "slamware.poi_shifts"  # the setting that holds those of the map on disk
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +35,8 @@ class PoiShifts:
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
-        """Start following loop closures."""
+        """Start following loop closures; what was not saved is forgotten, as is its map."""
+        self._shifts = {}
         listen = self._robot.events.listen
         self._endings = [listen(LoopClosed, self._closed), listen(MapReplaced, lambda _: self._shifts.clear())]
 
@@ -37,6 +44,17 @@ class PoiShifts:
         """Stop following loop closures."""
         for end in self._endings:
             end()
+
+    def settings(self, digest: str, floor: str) -> dict[str, object]:
+        """Return the setting to store with the map in memory, which is saved as ``floor`` of the file ``digest``."""
+        numbers = {id: [*_numbers(shift.has), *_numbers(shift.should)] for id, shift in self._shifts.items()}
+        return {SAVED: {"map": digest, "floor": floor, "shifts": numbers}}
+
+    def load(self, digest: str, floor: str) -> None:
+        """Take up the shifts saved with this map, which has been loaded."""
+        saved = dict(self._robot[Settings].get(SAVED, {}))
+        if (saved.get("map"), saved.get("floor")) == (digest, floor):
+            self._shifts = {id: Shift(Pose(*n[:3]), Pose(*n[3:])) for id, n in saved["shifts"].items()}
 
     async def adjust(self) -> None:
         """Move places that were on the map at loop closures to their corrected poses."""
@@ -53,6 +71,10 @@ class PoiShifts:
             before = known.get(place.id)
             should = before.should if before and before.has == place.pose else place.pose
             self._shifts[place.id] = Shift(place.pose, _moved(should, event.moved))
+
+
+def _numbers(pose: Pose) -> tuple[float, float, float]:
+    return pose.x, pose.y, pose.yaw
 
 
 def _moved(pose: Pose, moved: Sequence[tuple[Pose, Pose]]) -> Pose:

@@ -29,6 +29,7 @@ from roboglot.model.geometry import ORIGIN, Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
+from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
 from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, before, home_dock, known_docks, settle_home
 from roboglot.protocols.slamware.chapters.slam.clearing import Clearing
@@ -54,8 +55,8 @@ BASIS = "slamware.map_origins"
 class MapKeeper:
     """Map keeper of one robot; changes of its maps, in memory and on disk, are made one after the other."""
 
-    def __init__(self, robot: Robot, cloud: CloudFolder, synced: Callable[[], None]) -> None:
-        self._robot, self._cloud, self._synced = robot, cloud, synced
+    def __init__(self, robot: Robot, cloud: CloudFolder, shifts: PoiShifts, synced: Callable[[], None]) -> None:
+        self._robot, self._cloud, self._shifts, self._synced = robot, cloud, shifts, synced
         self._turn, self._parsing = asyncio.Lock(), asyncio.Lock()
         self._loading = False
         self._layers: tuple[Layer, ...] = ()  # of the map in memory, of unknown type
@@ -136,7 +137,8 @@ class MapKeeper:
             if (floors := await self._count_saved_floors()) > 1:
                 raise Refused(f"the saved map has {floors} floors, but only one is in memory")
             data = self.export()
-            settings = {BASIS: {_digest(data): NOT_MOVED}, FLOOR: self.current.map_id}
+            digest, floor = _digest(data), self.current.map_id
+            settings = {BASIS: {digest: NOT_MOVED}, FLOOR: floor} | self._shifts.settings(digest, floor)
 
             def edit(now: Drawings) -> Replacement:
                 docks = known_docks(self._robot)  # as in the file, including the robot's own
@@ -185,6 +187,7 @@ class MapKeeper:
                 self.status = MapLoadStatus.ERROR
                 raise
             self._loaded.hold(floors, digest)
+            self._shifts.load(digest, floor.name.map_id)
             self.status = MapLoadStatus.LOADED
 
     async def _fetch(self) -> None:
