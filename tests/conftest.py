@@ -155,14 +155,24 @@ def _text(path: Path) -> str:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
-    """Share tests out by files, but give all those with a browser to one worker: the others start none."""
+    """Share tests out by files, but give all those with a browser, or PostgreSQL, to one worker: others start none."""
     from xdist.scheduler import LoadFileScheduling
 
-    class OneBrowser(LoadFileScheduling):
+    class OneServer(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return "tests/browser" if nodeid.startswith("tests/browser/") else super()._split_scope(nodeid)
+            return _server_of(nodeid.partition("::")[0]) or super()._split_scope(nodeid)
 
-    return OneBrowser(config, log) if config.getoption("dist") == "loadfile" else None
+    return OneServer(config, log) if config.getoption("dist") == "loadfile" else None
+
+
+@functools.cache
+def _server_of(file: str) -> str:
+    """Return the folder whose server a file of tests needs, or ""."""
+    for folder in ("tests/browser", "tests/storage"):
+        if file.startswith(f"{folder}/"):
+            return folder
+    path = TESTS.parent / file
+    return "tests/storage" if path.is_file() and "db_server" in _text(path) else ""
 
 
 def pytest_collection_finish() -> None:

@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -154,7 +155,13 @@ class App:
 
     def of(self, code: int) -> list[Any]:
         """Return the pushes under ``code``."""
-        return [json.loads(text) for name, text in self.pushed if name == code]
+        return [_read(text) for name, text in self.pushed if name == code]
+
+
+@lru_cache(4096)
+def _read(text: str) -> Any:
+    """Read a push once, however often a test that waits asks for it."""
+    return json.loads(text)
 
 
 async def until(condition: Callable[[], object], patience: float = PATIENCE) -> None:
