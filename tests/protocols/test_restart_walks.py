@@ -37,6 +37,7 @@ LEFT_OUT = SILENCING | {
     "PUT /api/core/slam/v1/mapping/:enable",
     "PUT /api/core/slam/v1/loopclosure/:enable",
     "PUT /api/core/sensors/v1/depth/:enable",
+    "PUT /api/core/sensors/v1/masks",
     "POST /api/core/system/v1/aeb/control",
     "POST /api/core/system/v1/jack/status",
     "POST /api/core/system/v1/power/:hibernate",
