@@ -99,11 +99,18 @@ async def test_held_key_does_not_drive_another_robot(served: Served, open_consol
     await page.keyboard.up("w")
 
 
-async def test_buttons_say_that_there_is_no_connection(served: Served, open_console: OpenConsole) -> None:
+async def test_page_without_connection_says_so(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.click("#tab-actions")
     await page.wait_for_selector("text=Record")
     await page.context.set_offline(True)
     await page.click("button:has-text('Record')")
     await page.wait_for_selector(".notice.bad >> text=Refused: No connection")
+    await page.click("#tab-state")
+    await page.wait_for_selector("text=All is well.")
+    await page.evaluate("import('/link.js').then((link) => { link.status.value = 'lost'; })")
+    for view, place in (("live", "#panel"), ("robots", ".tile")):
+        await page.evaluate(f"location.hash = '#/{view}'")
+        await page.wait_for_selector(f"{place} .warned >> text=Last known:")
+        assert await page.locator(".allwell, .thumbnail").count() == 0
     await page.context.set_offline(False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from pathlib import Path
 from typing import Any
 
@@ -131,9 +132,19 @@ async def test_axe_finds_nothing_serious(theme: str, served: Served, open_consol
             assert serious == [], (view, tab, theme)
 
 
+class Calm(Console):
+    """A console whose robots have all that a tile shows."""
+
+    async def fetch(self, *path: str, body: bytes | None = None) -> bytes:
+        if path[-1] == "map.png":
+            return await super().fetch(*path, body=body)
+        shown = {"safety": {}, "control": {}, "faults": [], "actions": [], "parts": ["mapping"]}
+        return json.dumps(shown | {"battery": {"charge": 0.5}}).encode()
+
+
 async def test_fleet_page_filters_its_robots(browser: Any, tmp_path: Path) -> None:
     fleet = Overview(fleet_of(9, tmp_path), "127.16.3.1", 0)
-    fleet._snapshots = Snapshots(fleet._fleet_host, Console)
+    fleet._snapshots = Snapshots(fleet._fleet_host, Calm)
     fleet.open()
     await fleet.ready()
     context = await browser.new_context(viewport={"width": 390, "height": 844}, **STILL)
@@ -148,5 +159,14 @@ async def test_fleet_page_filters_its_robots(browser: Any, tmp_path: Path) -> No
     await page.locator("input[type=search]").fill("FAILED")
     await becomes(tiles.count, 1)
     assert await page.evaluate(SMALL_TARGETS) == []
+    await page.locator("input[type=search]").fill("a2")
+    await page.wait_for_selector(".tile:has(.thumbnail) >> text=All is well.")
+    await fleet.close()  # the page says so where it is seen, and calls no robot well
+    await page.wait_for_selector(".tile >> text=Last known:")
+    assert await page.locator(".allwell, .thumbnail").count() == 0
+    for width in (390, 1280):
+        await page.set_viewport_size({"width": width, "height": 844})
+        banner = await page.locator(".banner.bad").bounding_box()
+        assert (banner["x"], banner["width"]) == (0, width)
+        assert banner["y"] < 100
     await context.close()
-    await fleet.close()

@@ -29,7 +29,7 @@ export const current = computed(() => {
   return robots.some((r) => r.name === chosen.value) ? chosen.value : robots[0]?.name ?? "";
 });
 export const state = computed(() => states.value[current.value] ?? null);
-export const stale = computed(() => Boolean(state.value?.faults?.some((f) => f.name === "link lost"))); // the values are old
+export const stale = computed(() => status.value === "lost" || Boolean(state.value?.faults?.some((f) => f.name === "link lost"))); // the values are old
 export const simulated = computed(() => Boolean(hello.value?.robots.find((r) => r.name === current.value)?.simulated));
 effect(() => {
   const robot = hello.value?.robots.find((r) => r.name === current.value);

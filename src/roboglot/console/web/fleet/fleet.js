@@ -53,17 +53,17 @@ function Tile({ robot, world }) {
   const up = world.state === "ready", state = up ? states.value[robot.name] : undefined, known = state && !state.error;
   const task = known ? state.actions[state.actions.length - 1] : undefined;
   const worst = known ? ["FATAL", "ERROR", "WARNING"].find((level) => state.faults.some((/** @type {any} */ f) => f.level === level)) : undefined;
-  const kind = up ? worst?.toLowerCase() ?? "" : "error";
+  const kind = up ? worst?.toLowerCase() ?? (lost.value ? "warning" : "") : "error";
   return html`<li class=${`tile ${kind}`} ref=${self} data-robot=${robot.name}>
-    ${known && state.parts.includes("mapping") && html`<img class="thumbnail" src=${`/api/fleet/${encodeURIComponent(robot.name)}/map.png?beat=${seen.has(robot.name) ? beat.value : 0}`} alt=${t("robot.map", { name: robot.name })} />`}
+    ${known && !lost.value && state.parts.includes("mapping") && html`<img class="thumbnail" src=${`/api/fleet/${encodeURIComponent(robot.name)}/map.png?beat=${seen.has(robot.name) ? beat.value : 0}`} alt=${t("robot.map", { name: robot.name })} />`}
     <h2>${t("robot.named", { name: robot.name })}<small>${robot.body} · ${robot.address}</small></h2>
-    <dl><div class="row"><dt>${t("fleet.world")}</dt><dd>${world.name} · ${up ? t("fleet.pace", { factor: world.factor.toFixed(2) }) : t(`fleet.${world.state}`)}</dd></div>
+    ${lost.value && html`<p class="warned">${t("link.stale")}</p>`}<dl><div class="row"><dt>${t("fleet.world")}</dt><dd>${world.name} · ${up ? t("fleet.pace", { factor: world.factor.toFixed(2) }) : t(`fleet.${world.state}`)}</dd></div>
       ${known && html`<div class="row"><dt>${t("battery")}</dt><dd class=${state.battery?.low ? "bad" : ""}>${state.battery ? `${Math.round(state.battery.charge * 100)} %` : "–"}${state.battery?.charging ? ` · ${t("charging")}` : ""}</dd></div>
       <div class="row"><dt>${t("task")}</dt><dd>${task ? robotWord(task.name) : state.safety.docked ? t("docked") : t("task.none")}</dd></div>
       <div class="row"><dt>${t("control")}</dt><dd>${state.control.taken_by || state.control.holder || t("control.nobody")}</dd></div>`}</dl>
     ${!up && world.reason ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("fleet.why", { why: world.reason })}</p>` : null}
     ${state?.error ? html`<p class="muted">${t("fleet.why", { why: state.error })}</p>` : null}
-    ${known && (state.safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : state.faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(state.faults[0].name)}</p>` : html`<p class="allwell">${t("faults.none")}</p>`)}
+    ${known && (state.safety.emergency_stop ? html`<p class="warned"><${Icon} name="alert" size=${16} />${t("estop.on")}</p>` : state.faults.length ? html`<p class="warned"><${Icon} name="alert" size=${16} />${robotWord(state.faults[0].name)}</p>` : !lost.value && html`<p class="allwell">${t("faults.none")}</p>`)}
     ${up && world.console && html`<div class="buttons"><a class="button main" href=${`${world.console}/#/live`} target="_blank" rel="noopener"><span>${t("show")}</span></a></div>`}</li>`;
 }
 
@@ -80,8 +80,8 @@ function Page() {
   return html`<header><a class="brand" href="/fleet/"><img src="/icon.svg" alt="" width="28" height="28" /><b>roboglot</b></a><span class="grow"></span>
       <button type="button" class="button plain" lang=${language.value === "zh" ? "en" : "zh-CN"} onClick=${() => { language.value = language.value === "zh" ? "en" : "zh"; }}>${language.value === "zh" ? "EN" : "中文"}</button>
       <${Button} compact kind="plain" icon=${theme.value === "dark" ? "sun" : "moon"} label=${t("theme")} onClick=${() => { theme.value = theme.value === "dark" ? "light" : "dark"; }} /></header>
-    ${lost.value && html`<div class="banner bad" role="alert">${t("fleet.lost")}</div>`}
-    <main class="lone"><section class="robots" aria-label=${t("view.robots")}><div class="bar"><h1>${t("fleet.all", { robots: robots.length, worlds: all.length })}</h1>
+    <main class="lone">${lost.value && html`<div class="banner bad" role="alert">${t("fleet.lost")}</div>`}
+      <section class="robots" aria-label=${t("view.robots")}><div class="bar"><h1>${t("fleet.all", { robots: robots.length, worlds: all.length })}</h1>
       ${down > 0 && html`<span class="chip bad">${t("fleet.down", { n: down })}</span>`}
       <span class="muted" role="status">${wanted.value.trim() ? t("fleet.shown", { n: shown.length, all: robots.length }) : ""}</span>
       ${robots.length > FEW && html`<label class="filter"><span class="unseen">${t("fleet.filter")}</span><input type="search" placeholder=${t("fleet.filter")} value=${wanted.value} onInput=${(/** @type {any} */ e) => { wanted.value = e.target.value; }} /></label>`}</div>

@@ -50,7 +50,7 @@ function Row({ name, children, kind = "" }) {
 
 function Faults() {
   const faults = state.value.faults;
-  if (!faults.length) return html`<p class="allwell">${t("faults.none")}</p>`;
+  if (!faults.length) return stale.value ? null : html`<p class="allwell">${t("faults.none")}</p>`;
   return html`<ul class="faults">${faults.map((f) => html`<li class=${f.level.toLowerCase()}><${Icon} name="alert" size=${18} />
     <span><b>${robotWord(f.name)}</b>${robotWord(f.message) !== robotWord(f.name) && html`<small>${robotWord(f.message)}</small>`}</span></li>`)}</ul>`;
 }
