@@ -1,6 +1,6 @@
 // Driving by hand: a pad that must be held, keys, a gamepad; and panels for what else this body has.
 import { useEffect, useRef } from "preact/hooks";
-import { signal } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
 import { Button, fixed, html, lacks, robotWord, t, translated } from "../base.js";
 import { command, current, drive, padRefused, state } from "../link.js";
 import { later } from "./later.js";
@@ -16,7 +16,7 @@ let timer = 0, changes = 0;
 /** Drive so from now on; nothing at all lets go. @param {number} x @param {number} y @param {number} yaw */
 function push(x, y, yaw) {
   const held = Boolean(x || y || yaw);
-  if (lacks("drive") || (!held && !hand.value.held)) return;
+  if (held ? lacks("drive") : !hand.value.held) return;
   hand.value = { x, y, yaw, held };
   const send = () => drive(hand.value.x * share.value, hand.value.y * share.value, hand.value.yaw * share.value * 0.6);
   send();
@@ -62,6 +62,7 @@ function useKeys() {
 function useGamepad() {
   useEffect(() => {
     let driving = false, waits = Boolean(changes++); // another robot is driven once the stick was let go
+    const leave = effect(() => { void current.value; return () => { driving = false; waits = true; }; });
     const look = setInterval(() => {
       const pad = navigator.getGamepads?.().find(Boolean);
       if (!pad) return;
@@ -71,8 +72,8 @@ function useGamepad() {
       if (waits) return;
       if (x || y || yaw) { driving = true; push(x, y, yaw); } else if (driving) { driving = false; push(0, 0, 0); }
     }, PERIOD);
-    return () => clearInterval(look);
-  }, [current.value]);
+    return () => { leave(); clearInterval(look); };
+  }, []);
 }
 
 function Pad() {
@@ -133,7 +134,7 @@ function shine(colour) {
 export function Drive() {
   useKeys();
   useGamepad();
-  useEffect(() => letGo, [current.value]); // what is held was meant for the other robot
+  useEffect(() => effect(() => { void current.value; return letGo; }), []); // at once: what is held was meant for the other robot
   const { parts, body, about } = state.value;
   return html`${parts.includes("driving") && html`<div class="card"><h3>${t("pad.title")}</h3><${Pad} />
       ${(lacks("drive") || padRefused.value) && html`<p class="warned">${lacks("drive") || translated(padRefused.value)}</p>`}
