@@ -122,7 +122,8 @@ function Actions() {
 }
 
 const plots = () => import("./plots.js").then((m) => m.Plots);
-setTimeout(plots, 2000); // it notes from then on
+const note = () => { setTimeout(() => plots().catch(note), 2000); }; // from then on; without a server later
+note();
 const TABS = { state: State, drive: Drive, actions: Actions, plots: later(plots) };
 
 export function Tabs({ tabs, chosen, label }) {
