@@ -120,7 +120,7 @@ class Proofs:
         if not self._tries.take(host):
             raise LockedOut("too many wrong passwords and tokens from your address: wait a minute")
         if name and not self._tries_of_name.take(name):
-            raise LockedOut(f"too many wrong passwords for {name}: wait a minute")
+            raise LockedOut(f"too many wrong passwords for {name}: wait a minute, or use a token")
         return [(self._tries, host), (self._tries_of_name, name)]
 
     def device(self, name: str, shown: str) -> str:
