@@ -173,6 +173,8 @@ async def test_it_navigates_and_reports_map_and_pose(driven: Robot, robot: Robot
     )
     with pytest.raises(Refused):
         driven[Localization].set_pose(Pose())
+    with pytest.raises(Refused, match="cannot drive by itself"):  # it was ignored
+        driven[Localization].relocalize(may_move=True)
 
 
 async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Robot, until: Until, world: World) -> None:

@@ -100,6 +100,8 @@ async def test_servos_turn(script: Script, robot: Robot, driven_ep: Robot) -> No
     assert robot[Servos].angle(1) == still
     with pytest.raises(NotFound):
         driven_ep[Servos].angle(4)
+    with pytest.raises(Refused, match="speed of its servos"):  # it was ignored
+        driven_ep[Servos].move_to(1, 0.5, speed=0.1)
 
 
 async def test_the_blaster_fires_as_many_as_asked(script: Script, robot: Robot, driven_ep: Robot) -> None:

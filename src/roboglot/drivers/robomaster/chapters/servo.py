@@ -10,7 +10,7 @@ from roboglot.drivers.robomaster import motion
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.servo import Servos, servo_resource
-from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.errors import InvalidGoal, NotFound, Refused
 from roboglot.model.geometry import bounded, wrap_angle
 from roboglot.model.robot import Robot
 
@@ -19,7 +19,7 @@ GOOD = math.radians(1.0)
 
 
 class RoboMasterServos(Servos):
-    """The servos that answer, without gaps from the first on. The robot sets their speed: ``speed`` is ignored."""
+    """The servos that answer, without gaps from the first on. The robot alone sets how fast they go to an angle."""
 
     limit, speed = math.pi, math.radians(1800)
 
@@ -48,6 +48,8 @@ class RoboMasterServos(Servos):
 
     def move_to(self, number: int, angle: float, *, speed: float | None = None, source: str = "") -> Action:
         index = self._index(number)
+        if speed is not None:
+            raise Refused("this robot sets the speed of its servos itself")
         if not abs(angle) <= self.limit + 1e-9:
             raise InvalidGoal(f"a servo goes to at most {self.limit:.4g} rad, not {angle}")
 

@@ -67,5 +67,7 @@ class CyberDogLocalization(Localization):
     def relocalize(self, region: Region | None = None, *, may_move: bool = False, source: str = "") -> Action:
         if region is not None:
             raise Refused("this robot searches the whole map")
+        if may_move:
+            raise Refused("this robot cannot drive by itself while it searches for its place")
         skills = self._skills
         return skills.start("relocalize", [skills.relocalize], goal=None, source=source, resource=LOCALIZATION)
