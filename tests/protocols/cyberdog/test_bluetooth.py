@@ -47,6 +47,8 @@ async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
     assert await client.ask(8005) == {"success": True, "message": "1.0.3"}
     assert (await client.ask(8006)) == {"connected": True, "persentage": device["battery_level"]}
     assert await client.ask(8001, {}) == {"device_info_list": []}  # the history omits the connected one
+    again = (await client.ask(8001, {"scan_seconds": 3}))["device_info_list"]  # at once, without a scan
+    assert {device["mac"] for device in again} == {device["mac"] for device in found}, "the last scan's list"
     assert await client.ask(8002) == {"result": 0}
     assert robot[Bluetooth].connected is None
     assert await client.ask(8002) == {"result": 3}

@@ -13,6 +13,8 @@ from roboglot.model.components.interaction.skin import ElectronicSkin, Shade, Sk
 from roboglot.model.components.interaction.speaker import SPEAKER, Speaker
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import Refused
 from roboglot.model.events import Spoke
 from roboglot.model.geometry import Pose
 from roboglot.protocols.cyberdog.config import CyberDogConfig
@@ -44,11 +46,17 @@ async def test_nickname_is_kept_and_can_be_switched_off(client: Client) -> None:
     assert await client.ask(1010) == {"error_code": 323}
 
 
-async def test_the_volume_is_the_loudspeaker_s(client, robot) -> None:
+async def test_the_volume_is_the_loudspeaker_s(client, robot, monkeypatch) -> None:
+    async def no_space(key: str, value: object) -> None:
+        raise Refused("the disk is full")
+
     assert await client.ask(1012, {"volume": 35}) == {"success": True}
     assert robot[Speaker].volume == pytest.approx(0.35)
     assert (await client.ask(1001, {"is_volume": True}))["volume"] == 35
     assert await client.ask(1012, {"volume": 101}) == {"success": False}
+    with monkeypatch.context() as full:
+        full.setattr(robot[Settings], "put", no_space)
+        assert await client.ask(1012, {"volume": 36}) == {"error_code": 322}, "it was acknowledged before it was stored"
     assert robot[Speaker].volume == pytest.approx(0.35)
     robot[Speaker]._volume = None  # as after a restart
     assert robot[Speaker].volume == pytest.approx(0.35)
@@ -187,6 +195,8 @@ async def test_voice_board_is_activated_by_token_that_holds(client, app, robot, 
     assert (await client.ask(1001, {"is_audio_state": True, "uid": "77"}))["audio_state"] is False
     token = {"uid": 77, "token_access": "a", "token_fresh": "b", "token_expires_in": "60"}
     assert await client.ask(3002, {**token, "token_expires_in": "soon"}) == {"result": False}
+    for wrong in (-1, "-1", 2**64, "", "who", "7" * 65):
+        assert await client.ask(3002, {**token, "uid": wrong}) == {"result": False}, wrong
     assert await client.ask(3002, token) == {"result": True}
     assert (await client.ask(1001, {"is_audio_state": True, "uid": "77"}))["audio_state"] is True
     assert (await client.ask(1001, {"is_audio_state": True, "uid": "78"}))["audio_state"] is False

@@ -50,6 +50,9 @@ class Recorder(Speaker):
     def set_volume(self, volume: float) -> None:
         raise NotImplementedError
 
+    async def store_volume(self, volume: float) -> None:
+        raise NotImplementedError
+
     def say(self, text: str, *, source: str = "") -> Action:
         os.write(self._file, f"{source} {text}\n".encode())
         return cast(Action, None)

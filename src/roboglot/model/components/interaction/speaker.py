@@ -35,7 +35,11 @@ class Speaker(Component):
 
     @abstractmethod
     def set_volume(self, volume: float) -> None:
-        """Set the volume. Raises InvalidGoal unless 0..1."""
+        """Set the volume, without waiting until it is stored. Raises InvalidGoal unless 0..1."""
+
+    @abstractmethod
+    async def store_volume(self, volume: float) -> None:
+        """Set the volume; return once it is stored. Raises InvalidGoal unless 0..1."""
 
     @abstractmethod
     def say(self, text: str, *, source: str = "") -> Action:

@@ -54,6 +54,12 @@ class SimulatedSpeaker(Speaker):
         if Settings in self._robot:
             self._keeping = asyncio.get_running_loop().create_task(self._robot[Settings].keep(VOLUME, volume))
 
+    async def store_volume(self, volume: float) -> None:
+        check_volume(volume)
+        if Settings in self._robot:
+            await self._robot[Settings].put(VOLUME, volume)
+        self._volume = volume
+
     def say(self, text: str, *, source: str = "") -> Action:
         check_text(text)
 

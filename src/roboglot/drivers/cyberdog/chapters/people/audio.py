@@ -38,6 +38,13 @@ class CyberDogSpeaker(Speaker):
 
         self._supervisor.send("setting the volume", change())
 
+    async def store_volume(self, volume: float) -> None:
+        check_volume(volume)
+        self._supervisor.link.require()
+        with robot_errors():
+            await self._client.set_volume(round(volume * 100))
+            await self._status.ask()
+
     def say(self, text: str, *, source: str = "") -> Action:
         check_text(text)
         self._supervisor.link.require()

@@ -21,6 +21,7 @@ TRAINED = push(Code.VOICE_TRAINED)
 ASK_VOICEPRINTS = push(Code.VOICEPRINTS)
 DEVICES = uuid.UUID("6f1d1c0e-9f55-5d0b-8a57-52f3d7a1c2b4")  # the name space of device ids
 ID_MAX = 64  # characters
+UID_MAX = 2**64 - 1
 TOKEN_MAX = 8192
 VOICEPRINTS_MAX = 65_536
 LASTS_MAX = 10 * 365 * 86_400  # s
@@ -47,8 +48,10 @@ async def audio_token(
     call.context.robot[Hearing]
     lasts = _seconds(token_expires_in)
     account = str(uid)
-    if not account or len(account) > ID_MAX or not token_access or lasts is None:
-        return call.refused({"result": False}, "uid, token_access and a time to live are needed")
+    if not (account.isascii() and account.isdecimal() and len(account) <= ID_MAX and int(account) <= UID_MAX):
+        return call.refused({"result": False}, f"uid is a whole number, 0 to {UID_MAX}")
+    if not token_access or lasts is None:
+        return call.refused({"result": False}, "token_access and a time to live are needed")
     if max(len(token_access), len(token_fresh)) > TOKEN_MAX:
         return call.refused({"result": False}, f"a token has at most {TOKEN_MAX} characters")
     await call.context.robot[Settings].put(ACCOUNT, {"uid": account, "until": call.context.robot.clock.epoch() + lasts})

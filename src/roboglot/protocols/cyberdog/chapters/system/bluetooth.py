@@ -42,7 +42,7 @@ class WireDevice(msgspec.Struct):
 async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, object]:
     """Return new devices found in ``scan_seconds``; 0: devices connected before.
 
-    While a device is connected, the results of the last scan are returned. A scan ends when the last app that waits for
+    While a device is connected, the last scan's whole list is returned. A scan ends when the last app that waits for
     it has gone.
     """
     radio = call.context.robot[Bluetooth]
@@ -56,7 +56,7 @@ async def scan(call: Call, *, scan_seconds: float = 0.0) -> dict[str, object]:
                 await call.context.robot.clock.wait_for(scanning.succeeded(), max(6.0, 1.5 * scan_seconds))
         except TimeoutError:
             return {"error_code": int(InBandError.TIMEOUT)}
-    known = {device.address for device in radio.history}
+    known = set() if here else {device.address for device in radio.history}
     return _listed(device for device in radio.found if device.address not in known)
 
 

@@ -54,10 +54,10 @@ async def set_nickname(call: Call, *, nick_name: Name, wake_name: str = "") -> d
 
 @TABLE.on(Code.SET_VOLUME, right=Right.EDIT, needs=(Speaker,))
 async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
-    """Set the volume, 0 (silent) to 100."""
+    """Set the volume, 0 (silent) to 100; true once it is stored."""
     if not 0 <= volume <= 100:
         return call.refused({"success": False}, "volume is 0 to 100")
-    call.context.robot[Speaker].set_volume(volume / 100.0)
+    await call.context.robot[Speaker].store_volume(volume / 100.0)
     return {"success": True}
 
 
