@@ -38,6 +38,7 @@ LEFT_OUT = SILENCING | {
     "PUT /api/core/slam/v1/loopclosure/:enable",
     "PUT /api/core/sensors/v1/depth/:enable",
     "PUT /api/core/sensors/v1/masks",
+    "PUT /api/core/system/v1/parameter",  # a restart resets the limit of the speed, which caps that of lines
     "POST /api/core/system/v1/aeb/control",
     "POST /api/core/system/v1/jack/status",
     "POST /api/core/system/v1/power/:hibernate",
