@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import shutil
+import sqlite3
 from pathlib import Path
 
 import msgspec
@@ -33,8 +34,8 @@ class CommandServer(LocalServer):
                     await self._grant(request)
         except msgspec.DecodeError as refused:
             error = why_invalid(refused, "the request", wanted=Request)
-        except (LookupError, ValueError, OSError) as refused:
-            error = str(refused.args[0]) if refused.args else type(refused).__name__
+        except (LookupError, ValueError, OSError, sqlite3.Error) as refused:
+            error = _why(refused)
         rows = [_row(shard) for shard in self._host.shards.values()]
         return msgspec.json.encode(Answer(rows, self._host.nursery, error))
 
@@ -57,10 +58,30 @@ class CommandServer(LocalServer):
 
 
 async def _reset(host: FleetHost, shard: Shard) -> None:
-    """Delete a shard's stored data (programs, maps, places, certificates) and restart it."""
+    """Delete a shard's stored data (programs, maps, places, certificates) and restart it.
+
+    Raises ValueError if the data is in a database, OSError if the folder cannot be deleted.
+    """
+    if shard.plan.settings.get("database"):
+        raise ValueError("reset deletes the folders of shards, but these robots store in the database")
     await host.stop(shard)
-    await asyncio.to_thread(shutil.rmtree, shard.plan.settings["data"], ignore_errors=True)
-    await host.restart(shard)
+    try:
+        await asyncio.to_thread(_delete, Path(shard.plan.settings["data"]))
+    finally:
+        await host.restart(shard)
+
+
+def _delete(folder: Path) -> None:
+    """Delete a folder, if it is there. Raises OSError."""
+    if folder.exists():
+        shutil.rmtree(folder)
+
+
+def _why(error: Exception) -> str:
+    """Return the reason of a failed command in one sentence."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error.args[0]) if error.args else type(error).__name__
 
 
 def _row(shard: Shard) -> Row:

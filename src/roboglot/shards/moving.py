@@ -18,7 +18,7 @@ async def move_robot(supervisor: FleetHost, robot: str, to: str) -> None:
     """Move a robot to shard ``to``; both shards are down meanwhile. Raises LookupError, ValueError if it cannot move.
 
     Its rows are copied, then the plan is changed, then the old rows are removed: a crash at any moment leaves the robot
-    in one shard, with all its rows.
+    in one shard, with all its rows. So does a full disk, which raises OSError or sqlite3.Error.
     """
     plan = supervisor.plan
     old, new = plan.home_of(robot), plan.shard(to)
@@ -36,9 +36,15 @@ async def move_robot(supervisor: FleetHost, robot: str, to: str) -> None:
     await asyncio.gather(*map(supervisor.stop, both))
     try:
         await asyncio.to_thread(copy_robot, robot, _database(old), _database(new))
-        old.settings["robots"].remove(settings)
+        at = old.settings["robots"].index(settings)
+        del old.settings["robots"][at]
         new.settings["robots"].append(moved)
-        await asyncio.to_thread(save, plan, supervisor.folder)
+        try:
+            await asyncio.to_thread(save, plan, supervisor.folder)
+        except BaseException:  # the stored plan has it in the old shard, so it must run there
+            new.settings["robots"].remove(moved)
+            old.settings["robots"].insert(at, settings)
+            raise
         await asyncio.to_thread(forget_robot, robot, _database(old))
     finally:
         await asyncio.gather(*map(supervisor.restart, running))
