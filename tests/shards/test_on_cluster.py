@@ -155,7 +155,7 @@ def manifest(text: str) -> RayCluster | RayJob:
         ("memory: 4Gi", "memory: 4GB"),
         ('cpu: "2"', "cpu: 2"),
         ("containerPort: 6379", "port: 6379"),
-        ("secretKeyRef:", "secretRef:"),
+        ("containers:", "container:"),
         ("runAsNonRoot: true", 'runAsNonRoot: "true"'),
         ("kind: RayCluster", "kind: RayClusters"),
     ],
