@@ -112,15 +112,17 @@ class Operation(Generic[K]):
         """The first line of the handler's docstring."""
         return (self.handler.__doc__ or "").strip().partition("\n")[0]
 
-    def parse(self, values: Mapping[str, object], kinds: Mapping[str, str] = KINDS) -> dict[str, object]:
+    def parse(
+        self, values: Mapping[str, object], kinds: Mapping[str, str] = KINDS, *, strict: bool = False
+    ) -> dict[str, object]:
         """Convert and check wire values by name; zeros before a number are ignored, and unknown names if not ``exact``.
 
-        Raises BadParameters, in the words of ``kinds`` for types.
+        ``strict``: only whole numbers become other values (floats). Raises BadParameters, in the words of ``kinds``.
         """
         try:
-            checked = msgspec.convert(dict(values), self.parameters, strict=False)
+            checked = msgspec.convert(dict(values), self.parameters, strict=strict)
         except msgspec.ValidationError as error:
-            if (plain := self.schema.without_zeros(values)) != values:
+            if not strict and (plain := self.schema.without_zeros(values)) != values:
                 return self.parse(plain, kinds)
             raise BadParameters(why_invalid(error, kinds=kinds, wanted=self.parameters)) from None
         return {name: getattr(checked, name) for name in self.names}

@@ -6,7 +6,7 @@ import pytest
 
 from roboglot.programs.functions.prelude import ability_set, implemented
 from roboglot.programs.functions.session import TaskEnded
-from roboglot.programs.functions.table import ABILITIES, SPELLINGS
+from roboglot.programs.functions.table import ABILITIES, SPELLINGS, TIME, bind
 from roboglot.wire.contracts import contract
 from tests.programs.functions.calling import Caller, field
 
@@ -40,6 +40,25 @@ async def test_arguments_bind_as_in_python(
 ) -> None:
     with pytest.raises(TypeError, match=words):
         await bare_caller("cyberdog.motion.turn", *args, **kwargs)
+
+
+@pytest.mark.parametrize(("kind", "value"), [("int", "7"), ("float", "7"), ("bool", "1"), ("int", 7.0), ("str", 7)])
+def test_no_function_converts_arguments(kind: str, value: object) -> None:
+    """The robot's bindings of C++ make no number of a text, and no whole one of another."""
+    tried = 0
+    for operation in (*ABILITIES, *TIME):
+        for name in operation.names:
+            if operation.handler.__annotations__[name] == kind:
+                tried += 1
+                with pytest.raises(TypeError, match=rf"{name} must be"):
+                    bind(operation, (), {name: value})
+    assert tried
+
+
+def test_truth_values_are_numbers_and_the_reverse() -> None:
+    turn, log = (next(found for found in ABILITIES if found.key == f"cyberdog.motion.{n}") for n in ("turn", "set_log"))
+    assert bind(turn, (True,), {})["angle"] == 1.0
+    assert bind(log, (1,), {}) == {"log": True}
 
 
 async def test_huge_numbers_are_refused_like_any_other(bare_caller: Caller) -> None:

@@ -86,7 +86,7 @@ def log_call(session: Session, name: str, args: Sequence[object], kwargs: Mappin
 
 
 def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str, object]) -> dict[str, object]:
-    """Return the arguments by name, converted, bound as in Python. Raises TypeError with Python's texts."""
+    """Return the arguments by name, bound as in Python, of the declared types. Raises TypeError with Python's texts."""
     names = operation.names
     if operation.key in JOINED and len(args) > 1 and all(isinstance(arg, str) for arg in args):
         args = ["".join(map(str, args))]
@@ -100,10 +100,18 @@ def bind(operation: Operation[str], args: Sequence[object], kwargs: Mapping[str,
         if name in values:
             raise TypeError(f"{operation.key}() got multiple values for argument '{name}'")
         values[name] = value
+    kinds = operation.handler.__annotations__
     try:
-        return operation.parse(values, PYTHON)
+        return operation.parse({n: _as_bound(value, kinds[n]) for n, value in values.items()}, PYTHON, strict=True)
     except BadParameters as error:
         raise TypeError(f"{operation.key}(): {error}") from None
+
+
+def _as_bound(value: object, kind: str) -> object:
+    """Return truth values as numbers and the reverse, as bindings of C++ functions do; they convert no text."""
+    if isinstance(value, bool) and kind in ("int", "float"):
+        return int(value)
+    return bool(value) if isinstance(value, int) and kind == "bool" else value
 
 
 def state_of(result: object) -> Record | None:
