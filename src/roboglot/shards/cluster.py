@@ -175,11 +175,16 @@ class ClusterFleet:
             self.shards.turn_to(shard, State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
-        """Restart a shard, or start it; return when it is ready or has failed."""
-        await self.stop(shard)
-        shard.hopeless, shard.reason = False, ""
-        await asyncio.to_thread(self._begin, shard)
-        await asyncio.wait_for(self.shards.until(lambda: shard.is_settled), START_MAX)
+        """Restart a shard, or start it; return when it is ready or has failed. Raises OSError in one sentence."""
+        try:
+            await self.stop(shard)
+            shard.hopeless, shard.reason = False, ""
+            await asyncio.to_thread(self._begin, shard)
+            await asyncio.wait_for(self.shards.until(lambda: shard.is_settled), START_MAX)
+        except TimeoutError:
+            raise TimeoutError(f"shard {shard.plan.name} is not up yet; perhaps the cluster has no room") from None
+        except RayError as error:
+            raise OSError(str(error).strip().splitlines()[0]) from None
 
     def _begin(self, shard: Shard) -> None:
         """Create the shard's actor, or find a running one."""

@@ -21,6 +21,7 @@ from roboglot.shards.warm_up import ENVIRONMENT
 
 log = logging.getLogger(__name__)
 AGAIN_SECONDS = 5.0  # s between two attempts to start a nursery that does not become ready
+ENDING_SECONDS = 0.5  # s between the end of the nursery's socket and of its process, at most
 WARM_SECONDS_MAX = 240.0  # s to load everything; compiling kernels takes a minute
 
 
@@ -154,20 +155,36 @@ class NurseryClient:
         self._let_go()
         if self._closed:
             return
-        assert self._process is not None
-        status = self._process.wait()
+        status = self._status()
         if not self._was_warm:
             self._warm.set_exception(NotWarm(f"the nursery ended with {status} before it was ready"))
             return
         log.error("the nursery ended with %d; it is started again, and %d shards with it", status, len(self._living))
+        living, self._living = self._living, set()
         if self._warm.done():
             self._warm = asyncio.get_running_loop().create_future()
-            self.open()
+            self._open_again()
         else:  # it died again before it was ready
-            self._again = asyncio.get_running_loop().call_later(AGAIN_SECONDS, self.open)
-        living, self._living = self._living, set()
+            self._again = asyncio.get_running_loop().call_later(AGAIN_SECONDS, self._open_again)
         for number in living:
             self._dead(number, -signal.SIGKILL)
+
+    def _status(self) -> int:
+        """Return the status with which the nursery ended; one that only closed its socket is killed."""
+        assert self._process is not None
+        try:
+            return self._process.wait(ENDING_SECONDS)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            return self._process.wait()
+
+    def _open_again(self) -> None:
+        """Start the nursery, now or when there is room for another process."""
+        try:
+            self.open()
+        except OSError as error:
+            log.error("cannot start the nursery: %s; the next attempt is in %g s", error, AGAIN_SECONDS)
+            self._again = asyncio.get_running_loop().call_later(AGAIN_SECONDS, self._open_again)
 
     def _let_go(self) -> None:
         if self._control is not None:
