@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from roboglot.protocols.slamware.server import SlamwareDoor  # noqa: F401 - it fills the table
+from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.contracts import contract
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,6 +25,13 @@ def test_every_operation_was_answered_in_its_example() -> None:
     for row in contract("slamware"):
         block = PAGE.partition(f"### `{row.key}`\n")[2].partition("```http")[2].partition("```")[0]
         assert re.search(r"^20[04]$", block, re.MULTILINE), row.key
+
+
+def test_every_operation_is_described_as_in_the_code() -> None:
+    for row in contract("slamware"):
+        text = PAGE.partition(f"### `{row.key}`\n")[2].partition("```http")[0]
+        summary = operation.summary if (operation := TABLE.get(row.key)) else ""
+        assert " ".join(text.split()).startswith(summary.replace("``", "`")), f"{row.key}: run scripts/operations.py"
 
 
 @pytest.mark.slow  # the whole tour of 167 operations; tests/protocols/slamware has each
