@@ -29,7 +29,7 @@ def receive(line: socket.socket) -> tuple[bytes, list[int]]:
 
 
 def born(become: Callable[[], NoReturn], fork: Callable[[], int] = os.fork) -> bytes:
-    """Return the id of a new process that calls ``become``, once whoever adopts our orphans is its parent."""
+    """Return the id of a new process that calls ``become``, once the process that adopts our orphans is its parent."""
     reading, writing = os.pipe()
     if (middle := fork()) == 0:
         middle = os.getpid()

@@ -43,7 +43,7 @@ from roboglot.wire.slamware.chapters.platform import ElevatorEvent, GeneralEvent
 EVENTS_MAX = 256  # unread events, beyond which the oldest is dropped
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")
 DRIVES = ("navigate to", "dock", "sweep")  # actions that plan routes
-LAST_WORDS = (DeliveryEvent.ROBOT_REBOOT, GeneralEvent.POWER_OFF)  # clients read them after the restart
+KEPT_AT_RESTARTS = (DeliveryEvent.ROBOT_REBOOT, GeneralEvent.POWER_OFF)  # clients read them after the restart
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
 OCCUPIED_AGAIN = 5.0  # s until the same obstacle is reported again
 SAME_PLACE = 0.5  # m within which it is the same one
@@ -119,11 +119,11 @@ class EventLog:
         self._ring.append(RobotEvent(kind, str(since)))
 
     def _lose_old(self) -> None:
-        """Lose events from before a restart of the robot: it kept them in memory; only its last words remain."""
+        """Lose events from before a restart of the robot: it kept them in memory. Few kinds remain."""
         if self._epoch != self._robot.starts.robot:
             self._epoch = self._robot.starts.robot
-            last_words = [RobotEvent(event.type, "0") for event in self._ring if event.type in LAST_WORDS]
-            self._ring = deque(last_words, maxlen=EVENTS_MAX)
+            kept = [RobotEvent(event.type, "0") for event in self._ring if event.type in KEPT_AT_RESTARTS]
+            self._ring = deque(kept, maxlen=EVENTS_MAX)
 
     def _dock_changed(self, event: DockContactChanged) -> None:
         self.note(GeneralEvent.ON_DOCK if event.docked else GeneralEvent.OFF_DOCK, event.stamp)
