@@ -35,9 +35,15 @@ def turned(yaw: float) -> Any:
     return message("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
 
 
-def transform(stamp: float, above: str, frame: str, pose: Pose) -> Any:
+def rolled(yaw: float, roll: float) -> Any:
+    """Return the rotation by ``roll``, then by ``yaw``."""
+    c, s, d, t = math.cos(yaw / 2), math.sin(yaw / 2), math.cos(roll / 2), math.sin(roll / 2)
+    return message("geometry_msgs/msg/Quaternion", x=c * t, y=s * t, z=s * d, w=c * d)
+
+
+def transform(stamp: float, above: str, frame: str, pose: Pose, roll: float = 0.0) -> Any:
     place = message("geometry_msgs/msg/Vector3", x=pose.x, y=pose.y, z=0.0)
-    inner = message("geometry_msgs/msg/Transform", translation=place, rotation=turned(pose.yaw))
+    inner = message("geometry_msgs/msg/Transform", translation=place, rotation=rolled(pose.yaw, roll))
     kind = "geometry_msgs/msg/TransformStamped"
     return message(kind, header=header(stamp, above), child_frame_id=frame, transform=inner)
 
@@ -74,7 +80,7 @@ def scan(stamp: float, count: int) -> Any:
     )
 
 
-def bag(path: Path, plugin: StoragePlugin, *, by_tf: bool) -> Path:
+def bag(path: Path, plugin: StoragePlugin, *, by_tf: bool = False, roll: float = 0.0) -> Path:
     """Return a drive along x at 0.5 m/s; odometry comes 20 ms before each scan."""
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         tf = writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=STORE)
@@ -84,8 +90,8 @@ def bag(path: Path, plugin: StoragePlugin, *, by_tf: bool) -> Path:
         def write(connection: Any, stamp: float, content: Any) -> None:
             writer.write(connection, round(stamp * 1e9), STORE.serialize_cdr(content, connection.msgtype))
 
-        mount = transform(9.0, "base_link", "laser", MOUNT)
-        write(tf, 9.0, message("tf2_msgs/msg/TFMessage", transforms=[mount]))
+        mount = transform(9.0, "base_link", "plate", Pose(), roll), transform(9.0, "plate", "laser", MOUNT)
+        write(tf, 9.0, message("tf2_msgs/msg/TFMessage", transforms=list(mount)))
         for number in range(COUNT + 1):
             stamp = 10.0 + 0.1 * number
             pose = Pose(0.5 * (stamp - 0.02 - 10.0))
@@ -109,6 +115,17 @@ def test_ros_2_bag_equals_the_drive_it_records(tmp_path: Path, plugin: StoragePl
         assert (item.scan.mount.x, item.scan.mount.yaw) == pytest.approx((MOUNT.x, MOUNT.yaw))
         assert np.isposinf(item.scan.ranges[[0, 2]]).all()
         assert np.isnan(item.scan.ranges[1])
+
+
+def test_hanging_lasers_turn_the_other_way(tmp_path: Path) -> None:
+    for name, roll in (("standing", 0.0), ("hanging", math.pi)):
+        scan = read_drive_log(bag(tmp_path / name, StoragePlugin.SQLITE3, roll=roll)).scans[0].scan
+        way = math.cos(roll)
+        # The plate turns with the laser: what was to the left is to the right.
+        assert scan.mount.yaw == pytest.approx(way * MOUNT.yaw)
+        assert scan.angles[[0, -1]] == pytest.approx([-way, way])
+    with pytest.raises(BadDriveLog, match="leans"):
+        read_drive_log(bag(tmp_path / "leaning", StoragePlugin.SQLITE3, roll=0.5))
 
 
 def test_a_bag_without_what_is_needed_says_so(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.datasets.drive_log import FILE_BYTES_MAX, RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
+from roboglot.datasets.mounts import level_mount, rotation
 from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 from roboglot.values import dataclass
@@ -28,7 +29,6 @@ HEADER = re.compile(NAME_BEGINS + b"(" + b"|".join(name.encode() for name in (SC
 POSE_HEADER = re.compile(NAME_BEGINS + POSE.encode())
 POSE_WITHIN = 200  # bytes after a movement's header within which its mean pose begins
 EPOCH = 11_644_473_600  # s from 1601, the epoch of MRPT, to 1970
-LEVEL = math.radians(5.0)  # a scanner tilted further sees no floor plan
 LABEL_MAX = 1000  # characters
 RANGE_MIN = 0.03  # m
 
@@ -182,13 +182,7 @@ def _mount(reader: _Reader) -> tuple[Pose, bool]:
     version = reader.begin()
     if version == 2:
         x, y, _, w, i, j, k = reader.take("7d")
-        turned = np.array(
-            [
-                [1 - 2 * (j * j + k * k), 2 * (i * j - w * k), 2 * (i * k + w * j)],
-                [2 * (i * j + w * k), 1 - 2 * (i * i + k * k), 2 * (j * k - w * i)],
-                [2 * (i * k - w * j), 2 * (j * k + w * i), 1 - 2 * (i * i + j * j)],
-            ]
-        )
+        turned = rotation(w, i, j, k)
     elif version == 3:
         x, y, _ = reader.take("3d")
         turned = reader.array("<f8", 9).reshape(3, 3).astype(np.float64)
@@ -200,9 +194,7 @@ def _mount(reader: _Reader) -> tuple[Pose, bool]:
             raise ValueError("no matrix of a pose")
         turned, x, y = matrix[:3, :3], float(matrix[0, 3]), float(matrix[1, 3])
     reader.end()
-    if abs(turned[2, 2]) < math.cos(LEVEL):
-        raise ValueError("the scanner leans")
-    return Pose(x, y, math.atan2(turned[1, 0], turned[0, 0])), bool(turned[2, 2] < 0)
+    return level_mount(turned, x, y)
 
 
 def _scan(data: bytes, at: int, odometry: Pose | None) -> _Scan:

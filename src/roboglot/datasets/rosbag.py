@@ -6,6 +6,7 @@ laser's mount from tf, else the origin of the base.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import Counter
 from collections.abc import Iterator
@@ -16,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan
+from roboglot.datasets.mounts import level_mount, rotation
 from roboglot.datasets.track import Track, with_odometry
 from roboglot.extras import explaining
-from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
+from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
 
 SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
@@ -26,6 +28,7 @@ TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 ODOM_FRAMES, BASE_FRAMES = ("odom",), ("base_link", "base_footprint")
 CHAIN_MAX = 16  # frames between base and laser
 RAY_SECONDS_MAX = 0.01  # plausible s between two rays
+Frames = dict[str, tuple[str, NDArray[np.float64]]]  # frame: its parent, and its pose there as a matrix (4, 4)
 
 
 class Stamp(Protocol):
@@ -121,7 +124,7 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
     """Return scans with odometry, from messages in the order of arrival."""
     scans: list[ScanMessage] = []
     wheels, tf_wheels = Track(), Track()
-    fixed: dict[str, tuple[str, Pose]] = {}  # frame: its parent and its pose in the parent
+    fixed: Frames = {}
     unread: Counter[str] = Counter()
     for kind, _, message in messages:
         if kind == SCAN:
@@ -136,8 +139,9 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
     track = wheels if len(wheels) else tf_wheels
     if not len(track):
         raise BadDriveLog(f"{name}: no odometry: neither {ODOMETRY} nor tf from odom to base_link")
+    mounted = functools.cache(lambda frame: _mount(fixed, frame))
     recorded = [
-        RecordedScan(_scan(message, stamp, _mount(fixed, message.header.frame_id)), odometry)
+        RecordedScan(_scan(message, stamp, *mounted(message.header.frame_id)), odometry)
         for message, stamp, odometry in with_odometry(scans, _stamp_of, track, unread)
     ]
     if not recorded:
@@ -146,28 +150,32 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
     return DriveLog(name, recorded, dict(unread))
 
 
-def _take(transform: TransformStamped, fixed: dict[str, tuple[str, Pose]], wheels: Track) -> None:
+def _take(transform: TransformStamped, fixed: Frames, wheels: Track) -> None:
     """Store a transform of tf: the base in odom, or a part on the robot."""
     above, frame = (name.strip("/") for name in (transform.header.frame_id, transform.child_frame_id))
-    pose = _pose(transform.transform.translation, transform.transform.rotation)
+    place, turned = transform.transform.translation, transform.transform.rotation
     if above in ODOM_FRAMES and frame in BASE_FRAMES:
-        wheels.add(_seconds(transform.header.stamp), pose)
+        wheels.add(_seconds(transform.header.stamp), _pose(place, turned))
     elif above not in ("map", *ODOM_FRAMES) and len(fixed) < 1000:
-        fixed[frame] = above, pose
+        moved = np.eye(4)
+        moved[:3, :3], moved[:3, 3] = rotation(turned.w, turned.x, turned.y, turned.z), (place.x, place.y, place.z)
+        fixed[frame] = above, moved
 
 
-def _mount(fixed: dict[str, tuple[str, Pose]], frame: str) -> Pose:
-    """Return the laser's pose on the robot, composed up tf's tree as far as it reaches."""
-    mount, frame = ORIGIN, frame.strip("/")
+def _mount(fixed: Frames, frame: str) -> tuple[Pose, bool]:
+    """Return the laser's pose on the robot, composed up tf's tree as far as it reaches; True if it is upside down."""
+    mount, below = np.eye(4), frame.strip("/")
     for _ in range(CHAIN_MAX):
-        if frame in BASE_FRAMES or frame not in fixed:
+        if below in BASE_FRAMES or below not in fixed:
             break
-        frame, pose = fixed[frame]
-        mount = pose.compose(mount)
-    return mount
+        below, moved = fixed[below]
+        mount = moved @ mount
+    if not np.isfinite(mount).all():
+        raise BadDriveLog(f"the pose of {frame} is no number")
+    return level_mount(mount[:3, :3], float(mount[0, 3]), float(mount[1, 3]))
 
 
-def _scan(message: ScanMessage, stamp: float, mount: Pose) -> LaserScan:
+def _scan(message: ScanMessage, stamp: float, mount: Pose, flipped: bool) -> LaserScan:
     ranges = np.array(message.ranges, np.float32)
     with np.errstate(invalid="ignore"):
         ranges[ranges > message.range_max] = np.inf
@@ -178,7 +186,8 @@ def _scan(message: ScanMessage, stamp: float, mount: Pose) -> LaserScan:
         raise BadDriveLog("a scan without limits or angles")
     increment = float(message.time_increment)
     increment = increment if 0.0 < increment < RAY_SECONDS_MAX else 0.0
-    angles = float(message.angle_min), float(message.angle_increment)
+    way = -1.0 if flipped else 1.0  # seen from above
+    angles = way * float(message.angle_min), way * float(message.angle_increment)
     return LaserScan(stamp, ranges, *angles, least, most, mount=mount, time_increment=increment)
 
 
@@ -191,7 +200,7 @@ def _seconds(stamp: Stamp) -> float:
 
 
 def _pose(position: Vector, q: Quaternion) -> Pose:
-    """Return the planar part of a pose; it has no rotation by pi around x (a laser upside down)."""
+    """Return the planar part of the robot's pose."""
     yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
     x, y = float(position.x), float(position.y)
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):

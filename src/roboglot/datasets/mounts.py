@@ -1,0 +1,33 @@
+"""Poses of scanners on their robots: upright, or upside down as below a shelf."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboglot.model.geometry import Pose
+
+LEVEL = math.radians(5.0)  # a scanner tilted further sees no floor plan
+
+
+def rotation(w: float, x: float, y: float, z: float) -> NDArray[np.float64]:
+    """Return the matrix (3, 3) of a unit quaternion."""
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def level_mount(turned: NDArray[np.float64], x: float, y: float) -> tuple[Pose, bool]:
+    """Return the pose in the plane of what is ``turned`` (3, 3) at ``x``, ``y`` (m), and True if it is upside down.
+
+    Raises ValueError if it leans.
+    """
+    if abs(turned[2, 2]) < math.cos(LEVEL):
+        raise ValueError("the scanner leans")
+    return Pose(x, y, math.atan2(turned[1, 0], turned[0, 0])), bool(turned[2, 2] < 0)
