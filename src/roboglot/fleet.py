@@ -216,7 +216,7 @@ def _add_memory(robot: Robot, clock: Clock, database: Transactions) -> None:
     settings = StoredSettings(database, robot.id)
     robot.add(Places, places)
     robot.add(MapAnnotations, annotations)
-    robot.add(MapMemory, StoredMapMemory(database, places, annotations, settings, files))
+    robot.add(MapMemory, StoredMapMemory(robot, database, places, annotations, settings, files))
     robot.add(MapLibrary, StoredMaps(database, robot.id))
     robot.add(FileStore, files)
     robot.add(Settings, settings)

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import astuple
 
+from roboglot.fleet import UNKNOWN
 from roboglot.model.clock import LockstepClock
-from roboglot.model.components.mapping.annotations import Annotations, Line, LineKind
-from roboglot.model.components.mapping.map_memory import Drawings, Replacement
-from roboglot.model.errors import InvalidGoal, NotFound
-from roboglot.model.events import EventStream
-from roboglot.model.geometry import Point, Pose
+from roboglot.model.components.mapping.annotations import Annotations, Area, AreaKind, Line, LineKind
+from roboglot.model.components.mapping.map_memory import Drawings, Replacement, moved
+from roboglot.model.components.system.settings import Settings
+from roboglot.model.errors import InvalidGoal, NotFound, Refused
+from roboglot.model.events import MapReplaced
+from roboglot.model.geometry import ORIGIN, Point, Pose
 from roboglot.model.maps import PointOfInterest
+from roboglot.model.robot import Robot
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.database import Database
 from roboglot.storage.files import StoredFiles
@@ -31,6 +36,7 @@ OLD, NEW = PointOfInterest("old", Pose(1, 2, 3), {}), PointOfInterest("new", Pos
 class Parts:
     """The stores as one start of the robot sees them."""
 
+    robot: Robot
     places: StoredPlaces
     annotations: StoredAnnotations
     settings: StoredSettings
@@ -39,11 +45,13 @@ class Parts:
 
 
 def parts(database: Database) -> Parts:
-    events, clock = EventStream(), LockstepClock()
+    robot = Robot("a", UNKNOWN, LockstepClock())
+    events, clock = robot.events, robot.clock
     places, annotations = StoredPlaces(database, "a", clock, events), StoredAnnotations(database, "a", clock, events)
     settings, files = StoredSettings(database, "a"), StoredFiles(database, "a", clock)
-    memory = StoredMapMemory(database, places, annotations, settings, files)
-    return Parts(places, annotations, settings, files, memory)
+    memory = StoredMapMemory(robot, database, places, annotations, settings, files)
+    robot.add(Settings, settings)
+    return Parts(robot, places, annotations, settings, files, memory)
 
 
 @pytest.fixture
@@ -101,3 +109,66 @@ async def test_places_that_come_meanwhile_are_not_lost(database: Database) -> No
     await here.memory.replace(lambda now: Replacement(Drawings([*now.places, NEW], now.annotations)))
     await put
     assert list(here.places.all()) == list(parts(database).places.all()) == [OLD, NEW]
+
+
+CURVE = Line(0, LineKind.TRACK, Point(1, 1), Point(3, 1), (Point(1, 2), Point(3, 2)), {"route": "七"})
+ICE = Area(0, AreaKind.DANGEROUS, Point(1, 1), Point(2, 1), 0.5)
+DOCK, MARK = PointOfInterest("d", Pose(1, 1, 0), {}), PointOfInterest("m", Pose(0, 1, 0), {})
+
+
+async def test_drawings_stay_under_moved_origin(database: Database) -> None:
+    """No door is open that would care."""
+    here = parts(database)
+    await here.places.put(OLD)
+    await here.annotations.change(lambda now: replace(now.with_new(CURVE, ICE), docks=(DOCK,), landmarks=(MARK,)))
+    for origin in (Pose(1, 0, math.pi / 2), ORIGIN, None, Pose(0, 1)):
+        here.robot.events.publish(MapReplaced(stamp=0.0, origin=origin))
+    assert not here.memory.settled
+    await asyncio.sleep(0)
+    await here.places.put(NEW)  # on the new map
+    await here.memory.settle()
+    for seen in (here, parts(database)):
+        old, new = seen.places.all()
+        assert astuple(old.pose) == pytest.approx((2, -1, 3 - math.pi / 2))
+        assert new == NEW
+        (line,), (area,) = seen.annotations.current.lines, seen.annotations.current.areas
+        assert line.control is not None
+        spots = [line.start, line.end, *line.control, area.start, area.end]
+        expected = [(1, -1), (1, -3), (2, -1), (2, -3), (1, -1), (1, -2)]
+        assert [(round(p.x, 9), round(p.y, 9)) for p in spots] == expected
+        assert line.metadata == CURVE.metadata
+        (dock,), (mark,) = seen.annotations.current.docks, seen.annotations.current.landmarks
+        assert astuple(dock.pose) == pytest.approx((1, -1, -math.pi / 2))
+        assert astuple(mark.pose) == pytest.approx((1, 0, -math.pi / 2))
+        assert astuple(moved(seen.robot)) == pytest.approx((0, 0, math.pi / 2))
+
+
+async def test_door_with_more_to_store_moves_drawings(database: Database) -> None:
+    here, moves = parts(database), list[Pose]()
+    await here.places.put(OLD)
+
+    async def mover(origin: Pose) -> None:
+        moves.append(origin)
+
+    here.memory.mover = mover
+    here.robot.events.publish(MapReplaced(stamp=0.0, origin=OLD.pose))
+    with here.memory.left_to_caller():
+        here.robot.events.publish(MapReplaced(stamp=0.0, origin=NEW.pose))
+    await here.memory.settle()
+    assert (moves, here.places.get("old")) == ([OLD.pose], OLD)
+    await here.memory.close()
+    here.robot.events.publish(MapReplaced(stamp=0.0, origin=OLD.pose))
+    await here.memory.settle()
+    assert astuple(here.places.get("old").pose) == pytest.approx((0, 0, 0))
+
+
+async def test_failed_move_of_drawings_is_logged(database: Database, caplog: pytest.LogCaptureFixture) -> None:
+    here = parts(database)
+
+    async def mover(_: Pose) -> None:
+        raise Refused("the disk is full")
+
+    here.memory.mover = mover
+    here.robot.events.publish(MapReplaced(stamp=0.0, origin=OLD.pose))
+    await here.memory.settle()
+    assert caplog.messages == ["cannot move the drawings of robot a to the new map: the disk is full"]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from roboglot.model.components.mapping.map_memory import Drawings, MapMemory, Replacement
+from roboglot.model.robot import Robot
 from roboglot.storage.annotations import StoredAnnotations
 from roboglot.storage.files import StoredFiles
 from roboglot.storage.places import StoredPlaces
@@ -18,12 +19,14 @@ class StoredMapMemory(MapMemory):
 
     def __init__(
         self,
+        robot: Robot,
         database: Transactions,
         places: StoredPlaces,
         annotations: StoredAnnotations,
         settings: StoredSettings,
         files: StoredFiles,
     ) -> None:
+        super().__init__(robot)
         self._database = database
         self._places, self._annotations, self._settings, self._files = places, annotations, settings, files
 

@@ -26,6 +26,8 @@ from roboglot.model.components.mapping.annotations import (
     MapAnnotations,
 )
 from roboglot.model.components.mapping.floors import Floors, RideStage
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import MapMemory
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.sensing.lidar import Lidar
@@ -186,7 +188,7 @@ async def test_ride_given_up_in_the_car(tour: Tour) -> None:
 async def aboard(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[LiftFloors]:
     """The floors of a robot that takes any place for the car, needs no way into it, and rides five seconds."""
 
-    async def already_there(_goal: Pose, *, backwards: bool) -> None:
+    async def already_there(*, backwards: bool) -> None:
         assert backwards in (True, False)
 
     async def five_seconds(floor: int) -> None:
@@ -235,6 +237,35 @@ async def test_given_up_ride_mixes_no_floors(
     await tour.until(lambda: aboard.current == 1, 1.0)
     assert action.status is ActionStatus.CANCELED
     assert tour.robot[MapAnnotations].current.areas == ()
+
+
+async def test_drawings_are_awaited_after_given_up_ride(
+    tour: Tour, aboard: LiftFloors, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An action that waits for the ride to end would look up places of the floor that the robot has left."""
+    memory, lift, listen = tour.robot[MapMemory], tour.robot[LiftClient], tour.robot.events.listen
+    settled = dict[str, bool]()
+    action = aboard.ride(1, redraw=False)
+    await tour.until(lambda: action.feedback is RideStage.RIDING)
+    monkeypatch.setattr(type(lift), "state", replace(lift.state, floor=1, target=None))
+    action.cancel("the client thinks better of it")
+    listen(FloorReached, lambda event: settled.update({f"floor {event.floor}": memory.settled}))
+    listen(ActionChanged, lambda event: settled.update({event.action.status.name: memory.settled}))
+    await tour.end_of(action)
+    await tour.clock.advance(1.0)
+    assert settled["CANCELED"] is settled["floor 1"] is False
+    assert memory.settled
+
+
+async def test_lift_keeps_its_place_under_moved_origin(tour: Tour) -> None:
+    say_where_the_lift_is(tour)
+    floors = tour.robot[Floors]
+    assert isinstance(floors, LiftFloors)
+    tour.robot[Mapping].move_origin(Point(1.0, -2.0))
+    tour.robot[Mapping].clear()
+    origin = tour.truth.compose(tour.robot[Localization].pose.inverse())
+    places = [origin.compose(place) for place in known(floors._places)]
+    assert [(place.x, place.y) for place in places] == [pytest.approx((x, 10.0), abs=0.1) for x in (2.7, 1.0)]
 
 
 async def test_ride_begins_where_the_car_stopped(

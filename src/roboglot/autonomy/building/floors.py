@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+from contextlib import ExitStack
 from functools import partial
 
 import numpy as np
@@ -23,6 +24,7 @@ from roboglot.model.components.logistics.lift_client import LiftClient, LiftDoor
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.floors import Floors, RideStage
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import exchange
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.navigation import NavigationOptions
@@ -59,6 +61,7 @@ class LiftFloors(Floors):
         self._places: tuple[Pose, Pose] | None = None  # the waiting place, and the place inside the car
         self._stay: asyncio.Task[None] | None = None  # in the car, after a ride that was given up there …
         self._maps_outside = False  # … and that the robot mapped before
+        robot.events.listen(MapReplaced, self._replaced)
 
     @property
     def current(self) -> int:
@@ -75,6 +78,12 @@ class LiftFloors(Floors):
             raise InvalidGoal(f"not places in front of and in a lift: {waiting}, {inside}")
         yaw = waiting.point.bearing_to(inside)
         self._places = Pose(waiting.x, waiting.y, yaw), Pose(inside.x, inside.y, yaw)
+
+    def _replaced(self, event: MapReplaced) -> None:
+        """Keep the lift's places in the world when the map's origin moves."""
+        if self._places is not None and event.origin is not None:
+            waiting, inside = self._places
+            self._places = waiting.relative_to(event.origin), inside.relative_to(event.origin)
 
     def ride(self, floor: int, *, redraw: bool = True, source: str = "") -> Action:
         self._check(floor)
@@ -129,9 +138,9 @@ class LiftFloors(Floors):
     async def _go(self, action: Action, floor: int, redraw: bool, mine: Turn) -> None:
         """Ride to ``floor`` from the floor here, or from the car. Raises what its steps do."""
         assert self._places is not None
-        waiting, inside = self._places
         lift, belief = self.robot[LiftClient], self.belief
         while not mine.aboard:
+            waiting, _ = self._places
             action.report(RideStage.APPROACHING)
             await self.navigation.drive(action, Goal((waiting.point,), NavigationOptions(yaw=waiting.yaw)))
             action.report(RideStage.CALLING)
@@ -144,14 +153,14 @@ class LiftFloors(Floors):
                 await asyncio.wait([stay])  # it may be changing floors
                 await self._follow_car(redraw)
             action.report(RideStage.BOARDING)
-            await self._through(inside, backwards=False)
+            await self._through(backwards=False)
             lift.close_door()
             action.report(RideStage.RIDING)
             await self._comes(floor)
             if floor != self._current:
                 await self._change_to(floor, redraw)
             action.report(RideStage.LEAVING)
-            await self._through(self._places[0], backwards=True)
+            await self._through(backwards=True)
         except BaseException as error:
             closing = isinstance(error, asyncio.CancelledError) and action.status is not ActionStatus.CANCELING
             if not closing and (self._is_aboard or self._current != start):
@@ -165,22 +174,33 @@ class LiftFloors(Floors):
         action.report(RideStage.ARRIVED)
 
     def _begin_stay(self, start: int, redraw: bool) -> None:
-        stay = self._stay_aboard(start, redraw)
+        arrival = ExitStack()
+        arrival.enter_context(exchange(self.robot))  # at once, before another action begins
+        stay = self._stay_aboard(start, redraw, arrival)
         self._stay = asyncio.get_running_loop().create_task(stay, name=f"{self.robot.id} is in the lift")
+        self._stay.add_done_callback(lambda _: arrival.close())
 
-    async def _stay_aboard(self, start: int, redraw: bool) -> None:
-        """Change floors with a car in which a ride from ``start`` was given up, until the robot is outside."""
-        clock, known = self.robot.clock, start
+    async def _stay_aboard(self, known: int, redraw: bool, arrival: ExitStack) -> None:
+        """Change floors with a car in which a ride from ``known`` was given up, until the robot is outside.
+
+        ``arrival`` has others wait until those that draw the new floor have heard of it.
+        """
         while True:
-            await self._follow_car(redraw)
-            if self._current != known:
-                assert self._places is not None
-                known, place = self._current, self.belief.pose.relative_to(self._places[1])
-                self.robot.events.publish(FloorReached(stamp=clock.time(), floor=known, place=place))
+            with arrival:
+                await self._follow_car(redraw)
+                if self._current != known:
+                    known = self._current
+                    self._publish_floor()
             if not self._is_aboard:
                 break
-            await clock.sleep(STAY_PERIOD)
+            await self.robot.clock.sleep(STAY_PERIOD)
+            arrival.enter_context(exchange(self.robot))
         self.belief.mapping = self._end_stay()
+
+    def _publish_floor(self) -> None:
+        assert self._places is not None
+        now, place = self.robot.clock.time(), self.belief.pose.relative_to(self._places[1])
+        self.robot.events.publish(FloorReached(stamp=now, floor=self._current, place=place))
 
     async def _follow_car(self, redraw: bool) -> None:
         """Change to the floor at which the car stands, if the robot is in it."""
@@ -212,13 +232,15 @@ class LiftFloors(Floors):
                 raise Expired(f"the lift did not come to floor {floor} within {COMES_MAX:g} s")
             await clock.sleep(0.2)
 
-    async def _through(self, goal: Pose, *, backwards: bool) -> None:
-        """Drive straight to ``goal`` (map), whose yaw points into the car, holding the door. Raises Blocked."""
+    async def _through(self, *, backwards: bool) -> None:
+        """Drive straight into the car, or ``backwards`` to the waiting place, holding the door. Raises Blocked."""
         robot, base, clock = self.robot, self.robot[Base], self.robot.clock
         way, held_until = (-1.0 if backwards else 1.0), -math.inf
         closest, closest_at = math.inf, clock.time()
         while True:
-            now, seen = clock.time(), robot[Localization].pose.relative_to(goal)
+            assert self._places is not None
+            waiting, inside = self._places  # the map's origin may move
+            now, seen = clock.time(), robot[Localization].pose.relative_to(waiting if backwards else inside)
             left = -seen.x * way
             if left <= THERE:
                 break

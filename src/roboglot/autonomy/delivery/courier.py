@@ -16,6 +16,7 @@ from roboglot.autonomy.delivery.rules import PARKING, place_of_type
 from roboglot.model.admission import Right
 from roboglot.model.client_context import client, set_client
 from roboglot.model.components.logistics.delivery import Failure, Order, OrderKind, OrderStatus, Phase, Policy
+from roboglot.model.components.mapping.map_memory import settle
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.errors import RobotError
 from roboglot.model.events import DeliveryNews
@@ -186,6 +187,7 @@ class Courier:
         robot, readiness = self._robot, self.readiness
         readiness.rest_due = False
         docked = readiness.docked
+        await settle(robot)
         parking = place_of_type(robot, PARKING) if readiness.parks else None
         try:
             if parking:

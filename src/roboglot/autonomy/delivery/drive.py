@@ -10,6 +10,7 @@ from roboglot.autonomy.navigation.course import SPEED_MAX
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.delivery import Failure, Policy
+from roboglot.model.components.mapping.map_memory import settle
 from roboglot.model.components.mapping.storeys import StoreyPlace, Storeys
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
@@ -71,6 +72,7 @@ class DeliveryDrive:
 
     async def go_to(self, name: str, policy: Policy, speed: float | None) -> None:
         """Drive to the place with this name, no faster than ``speed`` (m/s). Raises Failed."""
+        await settle(self._robot)
         try:
             place = place_named(self._robot, name)
         except NotFound:
@@ -105,6 +107,7 @@ class DeliveryDrive:
         maps = self._robot[Storeys].maps
         if maps is None:
             raise Failed(Failure.NO_PLACE)  # the component that knew the floor is gone
+        await settle(self._robot)
         if maps.current != floor:
             await self._drive(lambda: maps.go_to(floor, SOURCE), policy)
 

@@ -16,6 +16,7 @@ from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.traffic.traffic import Traffic
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
+from roboglot.model.components.mapping.map_memory import settle
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationOptions
 from roboglot.model.errors import NotLocalized, RobotError
@@ -58,7 +59,7 @@ class Course:
             raise type(self.unavailable)(str(self.unavailable))
 
     async def ready(self) -> Planner:
-        """Return the planner as soon as it is loaded and there is a map.
+        """Return the planner as soon as it is loaded and there is a map, with its own drawings.
 
         Raises NotLocalized if there is no map in time, NotReady or Refused as ``check_available``.
         """
@@ -69,6 +70,7 @@ class Course:
             if clock.time() > deadline:
                 raise NotLocalized("no scan arrived to make a map from")
             await clock.sleep(0.1)
+        await settle(self.robot)
         return self.planner
 
     @property

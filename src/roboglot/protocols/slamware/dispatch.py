@@ -20,6 +20,7 @@ import msgspec
 
 from roboglot.model.admission import NO_PROOF, Forbidden, LockedOut, Proof, ProofKind, Unknown
 from roboglot.model.client_context import set_client
+from roboglot.model.components.mapping.map_memory import is_settled, settle
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.lateness import late
@@ -65,7 +66,7 @@ from roboglot.protocols.slamware.errors import REASON, HttpError, bad_request, f
 from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.parameters import Parameters
 from roboglot.protocols.slamware.routes import BEYOND, Match, Routes
-from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text
+from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text, concerns_map
 from roboglot.protocols.turns import wait_for_turn
 from roboglot.wire.contracts import Row, contract
 
@@ -161,7 +162,7 @@ class Application:
             return None
         handler = partial(copy_context().run, operation.handler, self._context, **values)
         card = robot[Network] if Network in robot else None  # noqa: SIM401 - one that comes later is real and on time
-        (_, address), fairness, tap = _peer(scope), robot.fairness, self._tap
+        (_, address), fairness, tap, mapped = _peer(scope), robot.fairness, self._tap, concerns_map(operation)
 
         def read() -> bytes | None:
             try:
@@ -174,7 +175,7 @@ class Application:
             return head(*headers, *shared) % len(body) + body
 
         def reply() -> bytes | None:
-            if tap.watched or (card is not None and card.delay):
+            if tap.watched or (card is not None and card.delay) or (mapped and not is_settled(robot)):
                 return None
             return fairness.timed(fairness.of(address), read) if fairness else read()  # a map takes ten times a pose
 
@@ -293,6 +294,8 @@ class Application:
         try:
             if self._admission.enforced and "body" in values:
                 await self._check_again(scope, row.key, operation.right)
+            if concerns_map(operation):
+                await settle(self._context.robot)
             return await operation.call(self._context, values)
         except BadParameters as error:
             raise bad_request(row.key, str(error)) from None

@@ -159,8 +159,7 @@ class SlamwareDoor:
         if Storeys in self._robot:
             self._robot[Storeys].maps = None
         self._close_parts()
-        await self._context.maps.clearing.close()
-        await self._context.maps.place.close()
+        await self._context.maps.close()
         await self._context.totals.close()
         if self._connections is not None:
             await self._cut_off(self._connections)

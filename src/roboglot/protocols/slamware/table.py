@@ -10,7 +10,10 @@ from __future__ import annotations
 
 from enum import Enum
 
-from roboglot.operations import OperationTable
+from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.map_memory import MapMemory
+from roboglot.model.components.mapping.places import Places
+from roboglot.operations import Operation, OperationTable
 from roboglot.protocols.slamware.routes import BEYOND
 from roboglot.values import dataclass
 
@@ -31,6 +34,15 @@ class NoContent(Enum):
 
 
 NO_CONTENT = NoContent.NO_CONTENT
+
+
+DRAWN = {MapAnnotations, MapMemory, Places}
+ON_MAP = ("/api/multi-floor/", "POST /api/core/motion/v1/actions")  # others that look up what lies on the map
+
+
+def concerns_map(operation: Operation[str]) -> bool:
+    """Return whether an operation reads what lies on the map: it has to wait while another map comes into use."""
+    return not DRAWN.isdisjoint(operation.needs | operation.some) or any(part in operation.key for part in ON_MAP)
 
 
 def implemented() -> set[str]:

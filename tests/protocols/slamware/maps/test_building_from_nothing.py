@@ -20,7 +20,7 @@ from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.testing import Forward
 from tests.protocols.slamware.drawings import ok
-from tests.protocols.slamware.maps.test_elevators import ACTIONS, AREAS, LIFT, MULTI, SUCCESS, finish, start
+from tests.protocols.slamware.lift.two_floors import ACTIONS, AREAS, LIFT, MULTI, SUCCESS, finish, start
 
 SLAM, TOWER = "/api/core/slam/v1", Path(__file__).parents[1] / "data" / "tower.toml"
 HELD = 120.0  # s

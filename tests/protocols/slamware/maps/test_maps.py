@@ -265,25 +265,6 @@ async def test_origin_of_an_empty_map_moves_once(
     assert (after.end.x, after.end.y) == pytest.approx((before.end.x - 1.0, before.end.y + 0.5))
 
 
-async def test_drawings_stay_where_another_door_clears_map(
-    robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
-) -> None:
-    """The console and a dog's mapping clear the same map; after a restart the saved one has its own drawings."""
-    await ok(await client.post(f"{MULTI}/stcm/:save"))
-    saved = (await client.get(f"{ARTIFACT}/lines/walls")).json()
-    origin = Pose(2.0, 1.0, math.pi / 2)
-    for _ in range(2):
-        robot[Localization].set_pose(origin)
-        robot[Mapping].clear()
-    await forward(seconds=0.1)
-    (moved,) = robot[MapAnnotations].current.lines_of(LineKind.WALL)
-    expected = Pose(2.0, 1.0).relative_to(origin).relative_to(origin)
-    assert (moved.end.x, moved.end.y) == pytest.approx((expected.x, expected.y), abs=1e-6)
-    await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
-    await forward(seconds=10)
-    assert (await client.get(f"{ARTIFACT}/lines/walls")).json() == saved
-
-
 async def test_moved_origin_is_forgotten_with_map_in_memory(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:

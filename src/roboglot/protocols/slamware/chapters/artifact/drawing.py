@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
 from dataclasses import replace
 
 from roboglot.model.components.mapping.annotations import Area, AreaKind, Line, LineKind
 from roboglot.model.components.mapping.map_memory import Drawings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
-from roboglot.model.maps import PointOfInterest
 from roboglot.wire.slamware import geometry
 from roboglot.wire.slamware.chapters import artifact as wire
 from roboglot.wire.slamware.chapters.artifact import AreaUsage, LineUsage, MetadataError
@@ -34,7 +33,21 @@ def line_of(kind: LineKind, line: wire.Line) -> Line:
 
 def wire_line(line: Line) -> wire.Line:
     """Return the line as the API writes it."""
-    return wire.Line(_wire_point(line.start), _wire_point(line.end), line.id, dict(line.metadata))
+    metadata: wire.Metadata = dict(metadata_of(line))
+    return wire.Line(_wire_point(line.start), _wire_point(line.end), line.id, metadata)
+
+
+def metadata_of(line: Line) -> dict[str, str]:
+    """Return the line's metadata, with its control points where they are now: the model moves them, not their text."""
+    metadata = dict(line.metadata)
+    if line.control is None:
+        return metadata
+    with contextlib.suppress(MetadataError):
+        written = wire.control_points(metadata)
+        if written is not None and tuple(map(_point, written)) == line.control:
+            return metadata  # as it came
+    first, second = line.control
+    return wire.with_control_points(metadata, (first.x, first.y), (second.x, second.y))
 
 
 def area_of(usage: AreaUsage, rectangle: wire.Strip, metadata: dict[str, str], id: int = 0) -> Area:
@@ -64,29 +77,10 @@ def wire_area(area: Area) -> wire.RectangleArea:
 
 
 def seen_from(origin: Pose, drawn: Drawings) -> Drawings:
-    """Return all drawings in the map's frame after its origin has moved to ``origin``."""
-
-    def point(p: Point) -> Point:
-        return Pose(p.x, p.y).relative_to(origin).point
-
-    def marks(all: Sequence[PointOfInterest]) -> tuple[PointOfInterest, ...]:
-        return tuple(replace(mark, pose=mark.pose.relative_to(origin)) for mark in all)
-
-    def moved(line: Line) -> Line:
-        line = replace(line, start=point(line.start), end=point(line.end))
-        if line.control is None:
-            return line
-        first, second = map(point, line.control)
-        metadata = wire.with_control_points(dict(line.metadata), (first.x, first.y), (second.x, second.y))
-        return replace(line, control=(first, second), metadata=metadata)
-
-    notes = drawn.annotations
-    lines = map(moved, notes.lines)
-    areas = [replace(area, start=point(area.start), end=point(area.end)) for area in notes.areas]
-    annotations = replace(
-        notes, lines=tuple(lines), areas=tuple(areas), docks=marks(notes.docks), landmarks=marks(notes.landmarks)
-    )
-    return Drawings(marks(drawn.places), annotations)
+    """Return all drawings, and what their metadata say, in the map's frame after its origin has moved."""
+    seen = drawn.seen_from(origin)
+    lines = tuple(replace(line, metadata=metadata_of(line)) for line in seen.annotations.lines)
+    return replace(seen, annotations=replace(seen.annotations, lines=lines))
 
 
 def _point(point: geometry.Point) -> Point:

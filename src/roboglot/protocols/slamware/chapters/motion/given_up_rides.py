@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from contextlib import ExitStack
 
 from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.floors import Floors
-from roboglot.model.components.mapping.map_memory import Drawings
+from roboglot.model.components.mapping.map_memory import Drawings, exchange
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.events import FloorReached
 from roboglot.model.geometry import Pose
@@ -42,7 +43,10 @@ class GivenUpRides:
             self._entering.cancel()
 
     def _reached(self, event: FloorReached) -> None:
+        waiting = ExitStack()
+        waiting.enter_context(exchange(self._context.robot))  # that names of places are looked up on this floor
         self._entering = asyncio.get_running_loop().create_task(self._enter(event), name="entering a floor")
+        self._entering.add_done_callback(lambda _: waiting.close())
 
     async def _enter(self, event: FloorReached) -> None:
         robot, maps = self._context.robot, self._context.maps

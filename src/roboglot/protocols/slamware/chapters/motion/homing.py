@@ -5,6 +5,7 @@ from __future__ import annotations
 from roboglot.model.actions import Action
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import settle
 from roboglot.model.components.motion.docking import BEFORE_DOCK, Docking
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import Blocked, DockNotFound, NotFound, Unreachable
@@ -70,9 +71,11 @@ def return_to_parking(context: Context, options: ReturnToParkingOptions) -> Acti
     how = options.move_options or MoveOptions()
     navigation_options(context.robot, how, None)
     named = options.target.poi_name if options.target else ""
-    places = [place for floor in context.maps.floors if floor.name == context.maps.current for place in floor.places]
 
     async def work(errand: Errand) -> None:
+        await settle(context.robot)
+        here = [floor for floor in context.maps.floors if floor.name == context.maps.current]
+        places = [place for floor in here for place in floor.places]
         await _park(errand, _parking(places, named), how)
 
     return run_errand(context.robot, "return to parking", work, named)

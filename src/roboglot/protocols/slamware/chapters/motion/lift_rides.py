@@ -10,6 +10,7 @@ from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import settle
 from roboglot.model.components.mapping.mapping import abort_with_map
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
@@ -55,6 +56,7 @@ def multi_floor_move(context: Context, options: MultiFloorMoveOptions) -> Action
         raise InvalidGoal("a target needs a poi_name, or a floor and a pose")
 
     async def work(errand: Errand) -> None:
+        await settle(context.robot)
         floor, pose = _place(context, target.poi_name) if target.poi_name else (None, None)
         if pose is None and target.pose is not None:
             floor, pose = _floor(context, target.building, target.floor), pose_of(target.pose)
@@ -74,6 +76,7 @@ def multi_floor_back_home(context: Context, options: GoHomeOptions) -> Action:
     navigation_options(context.robot, wanted.move_options or MoveOptions(), None)
 
     async def work(errand: Errand) -> None:
+        await settle(context.robot)
         if (found := home_floor(context)) is not None:
             await change_floor(context, errand, found)
         await head_home(errand, wanted)
@@ -112,6 +115,7 @@ def _floor(context: Context, building: str, floor: str) -> FloorMap | None:
 
 async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> None:
     """Take the lift to a floor, unless on it already, and switch to its map."""
+    await settle(context.robot)
     if floor.name == context.maps.current:
         return
     robot, maps = context.robot, context.maps
@@ -152,14 +156,15 @@ def _elevator(context: Context, id: str) -> Elevator:
 
 def enter_elevator(context: Context, options: EnterElevatorOptions) -> Action:
     """Drive into a car called by others, through its open door; 400 for an unknown one."""
-    elevator, how = _elevator(context, options.elevator_id), options.enter_elevator_options or EnterElevator()
-    yaw = elevator.inward
-    if how.elevator_stopping_yaw is StoppingYaw.FRONT:
-        yaw = wrap_angle(yaw + math.pi)
-
-    note = context.events.note
+    _elevator(context, options.elevator_id)
+    how, note = options.enter_elevator_options or EnterElevator(), context.events.note
 
     async def work(errand: Errand) -> None:
+        await settle(context.robot)
+        elevator = _elevator(context, options.elevator_id)  # on the map that is in use by now
+        yaw = elevator.inward
+        if how.elevator_stopping_yaw is StoppingYaw.FRONT:
+            yaw = wrap_angle(yaw + math.pi)
         await _cross(errand, elevator, how.elevator_door_flag)
         note(ElevatorEvent.WAIT_ELEVATOR)
         note(ElevatorEvent.ENTER_ELEVATOR)
@@ -194,13 +199,15 @@ async def _cross(errand: Errand, elevator: Elevator, door: Door) -> None:
 
 def leave_elevator(context: Context, options: LeaveElevatorOptions) -> Action:
     """Leave the car to the waiting place, and drive on to the target, if given; 400 for an unknown elevator."""
-    elevator, how = _elevator(context, options.elevator_id), options.leave_elevator_options or LeaveElevator()
+    _elevator(context, options.elevator_id)
+    how, note = options.leave_elevator_options or LeaveElevator(), context.events.note
     onward = how.move_options or MoveOptions()
     navigation_options(context.robot, onward, None)
-    waiting = elevator.waiting(rear=how.elevator_door_flag is Door.REAR)
-    note = context.events.note
 
     async def work(errand: Errand) -> None:
+        await settle(context.robot)
+        elevator = _elevator(context, options.elevator_id)  # on the map that is in use by now
+        waiting = elevator.waiting(rear=how.elevator_door_flag is Door.REAR)
         note(ElevatorEvent.LEAVE_ELEVATOR)
         with _noting(note, ElevatorEvent.LEAVE_ELEVATOR_OCCUPIED, ElevatorEvent.LEAVE_ELEVATOR_FAILED):
             out = navigate(errand.robot, [waiting.point], MoveOptions(), source=PART)
@@ -210,4 +217,5 @@ def leave_elevator(context: Context, options: LeaveElevatorOptions) -> Action:
             goal = Point(options.target.x, options.target.y)
             await errand.do(navigate(errand.robot, [goal], onward, source=PART))
 
-    return run_errand(context.robot, "leave elevator", work, options.elevator_id)
+    action = run_errand(context.robot, "leave elevator", work, options.elevator_id)
+    return abort_with_map(context.robot, action, ActionStatus.EXECUTING) if options.target is not None else action

@@ -14,7 +14,7 @@ from roboglot.model.components.mapping.annotations import Annotations, Area, Lin
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import OccupancyGrid, PointOfInterest
-from roboglot.protocols.slamware.chapters.artifact.drawing import AREA_USAGES, area_of, line_of
+from roboglot.protocols.slamware.chapters.artifact.drawing import AREA_USAGES, area_of, line_of, metadata_of
 from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 from roboglot.wire.slamware import geometry
@@ -92,7 +92,7 @@ def composite_of(floor: FloorMap) -> CompositeMap:
     layers = [stcm_layers.grid_layer(explore_map(floor.grid), label)] if floor.grid is not None else []
     for usage, kind in LINE_LAYERS.items():
         lines = [
-            LineEntry(str(e.id), e.start.x, e.start.y, e.end.x, e.end.y, tuple(e.metadata.items()))
+            LineEntry(str(e.id), e.start.x, e.start.y, e.end.x, e.end.y, tuple(metadata_of(e).items()))
             for e in notes.lines_of(kind)
         ]
         layers += [_labelled(stcm_layers.line_layer(usage, lines), label)] if lines else []

@@ -10,6 +10,7 @@ import msgspec
 from roboglot.model.clock import Timer
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.map_memory import is_settled
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.events import MapReplaced
 from roboglot.model.geometry import Pose
@@ -79,12 +80,12 @@ class PlaceMemory:
         if self._timer is not None and (self._keeping is None or self._keeping.done()):
             self._keeping = asyncio.get_running_loop().create_task(self._keep(), name="last place")
 
-    def _replaced(self, _: MapReplaced) -> None:
-        self.known = False
+    def _replaced(self, event: MapReplaced) -> None:
+        self.known = self.known and event.origin is not None
 
     def _here(self) -> LastPlace | None:
         localization, frame = self._robot[Localization], self._frame()
-        if not self.known or frame is None or localization.lost is not None:
+        if not self.known or frame is None or localization.lost is not None or not is_settled(self._robot):
             return None
         digest, floor, (x, y) = frame
         here = localization.pose

@@ -10,15 +10,13 @@ import asyncio
 import contextlib
 import hashlib
 import logging
-from collections.abc import Callable, Coroutine, Iterable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import replace
-
-import msgspec
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.mapping.map_memory import Drawings, MapMemory, Replacement
+from roboglot.model.components.mapping.map_memory import MOVED, Drawings, MapMemory, Replacement, exchange, moved
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
@@ -32,24 +30,32 @@ from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
 from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, before, home_dock, known_docks, settle_home
-from roboglot.protocols.slamware.chapters.slam.clearing import Clearing
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
-from roboglot.protocols.slamware.chapters.slam.last_place import PlaceMemory, is_docked, last_place
+from roboglot.protocols.slamware.chapters.slam.last_place import PlaceMemory, is_docked
 from roboglot.protocols.slamware.chapters.slam.loaded_floors import LoadedFloors
+from roboglot.protocols.slamware.chapters.slam.map_frames import (
+    BASIS,
+    DRAWN,
+    FLOOR,
+    NO_FLOOR,
+    NOT_MOVED,
+    bases,
+    encoded,
+    frame_on_disk,
+    other_drawings,
+    put_aside,
+    put_drawings,
+    replacement,
+    resumed,
+    with_docks,
+)
 from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 from roboglot.wire.slamware.chapters.slam.stcm import Layer, decode_stcm, encode_stcm
 
 log = logging.getLogger(__name__)
 FILE = "slamware/map.stcm"
-DRAWN = "slamware/drawn.json"  # the file of drawings on that map's other floors
-NOT_MOVED = (0.0, 0.0)
 NO_GRID = "the map has no grid"
-FLOOR = "slamware.floor"  # the setting that holds the id of the floor of the drawings in memory
-NO_FLOOR = ""  # its value for no floor
-# The setting that holds the files on which the drawings in memory are based: by digest, the m (x, y) by which the
-# origin has moved since.
-BASIS = "slamware.map_origins"
 
 
 class MapKeeper:
@@ -63,8 +69,7 @@ class MapKeeper:
         self.status = MapLoadStatus.NOT_LOADED
         self._loaded = LoadedFloors()
         self.current = FloorName()
-        self.place = PlaceMemory(robot, lambda: _frame_on_disk(robot))
-        self.clearing = Clearing(robot, self._on_map_cleared)
+        self.place = PlaceMemory(robot, lambda: frame_on_disk(robot))
 
     @property
     def floors(self) -> tuple[FloorMap, ...]:
@@ -83,7 +88,12 @@ class MapKeeper:
         """
         if Mapping not in self._robot or FileStore not in self._robot:
             return
-        await self.clearing.finish()  # the restart of the robot cleared the map
+        if MapMemory in self._robot:
+            memory = self._robot[MapMemory]
+            await memory.settle()  # the restart of the robot cleared the map
+            memory.mover = self._on_origin_moved
+            if (since := moved(self._robot)) != ORIGIN:  # while this door was closed
+                await self._on_map_cleared(ORIGIN, since)
         try:
             await self.reload(restarting=True)
         except NotFound:
@@ -91,8 +101,13 @@ class MapKeeper:
                 settle_home(self._robot)
         except RobotError as error:
             log.warning("cannot load the saved map of robot %s: %s", self._robot.id, error)
-        self.clearing.start()
         self.place.start()
+
+    async def close(self) -> None:
+        """Leave the drawings to the robot, and store its place a last time."""
+        if MapMemory in self._robot:
+            await self._robot[MapMemory].close()
+        await self.place.close()
 
     @property
     def ready(self) -> bool:
@@ -116,7 +131,7 @@ class MapKeeper:
         """Use the map of a file's start floor from now on, in memory only."""
         floor = _start_of(self._robot, await self._parse(data))
         async with self._turn:
-            draw = _put_drawings(self._robot, floor, {})  # the present drawings belong to no file
+            draw = put_drawings(self._robot, floor, {})  # the present drawings belong to no file
             await self._use(floor, pose, draw)
 
     async def upload(self, data: bytes) -> None:
@@ -134,24 +149,19 @@ class MapKeeper:
     async def save(self) -> None:
         """Save the map in memory to disk. Refused if the file has several floors, as the others would be lost."""
         async with self._turn:
-            if (floors := await self._count_saved_floors()) > 1:
-                raise Refused(f"the saved map has {floors} floors, but only one is in memory")
+            with contextlib.suppress(NotFound, InvalidGoal):  # no map, or one that no start could load
+                if (floors := len(await self._parse(await self._robot[FileStore].read(FILE)))) > 1:
+                    raise Refused(f"the saved map has {floors} floors, but only one is in memory")
             data = self.export()
             digest, floor = _digest(data), self.current.map_id
             settings = {BASIS: {digest: NOT_MOVED}, FLOOR: floor} | self._shifts.settings(digest, floor)
 
             def edit(now: Drawings) -> Replacement:
                 docks = known_docks(self._robot)  # as in the file, including the robot's own
-                return Replacement(_with_docks(now, docks), settings, {FILE: data, DRAWN: None})
+                return Replacement(with_docks(now, docks), settings, {FILE: data, DRAWN: None})
 
             await self._robot[MapMemory].replace(edit)
             self.place.known = True
-
-    async def _count_saved_floors(self) -> int:
-        try:
-            return len(await self._parse(await self._robot[FileStore].read(FILE)))
-        except (NotFound, InvalidGoal):
-            return 0
 
     async def sync(self) -> None:
         """Save and reload; the grid in memory stays, as it is the same."""
@@ -174,11 +184,9 @@ class MapKeeper:
                 floors, digest = await self._parse(data), _digest(data)
                 floor = _start_of(self._robot, floors)
                 if restarting:
-                    floor, pose = _resumed(self._robot, floors, digest) or (floor, None)
-                keep = restarting and digest in _basis(self._robot)
-                draw = (
-                    self._turn_over(floor, digest) if keep else _put_drawings(self._robot, floor, {digest: NOT_MOVED})
-                )
+                    floor, pose = resumed(self._robot, floors, digest) or (floor, None)
+                keep = restarting and digest in bases(self._robot)
+                draw = self._turn_over(floor, digest) if keep else put_drawings(self._robot, floor, {digest: NOT_MOVED})
                 await self._use(floor, pose, draw)
             except NotFound:
                 self.status = before
@@ -218,12 +226,12 @@ class MapKeeper:
     async def leave_floors(self, stop: str, drawn: Drawings) -> None:
         """Put the floor's drawings aside: the robot is at the lift's ``stop``, whose map has no more than ``drawn``."""
         async with self._turn:
-            others, basis = await self._others(), _basis(self._robot)
+            others, basis = await other_drawings(self._robot), bases(self._robot)
 
             def edit(now: Drawings) -> Replacement:
                 for shift in basis.values():
-                    self._put_aside(now, shift, others)
-                return Replacement(drawn, {FLOOR: NO_FLOOR}, {DRAWN: _encoded(others)})
+                    put_aside(self._robot, now, shift, others, self.current.map_id)
+                return Replacement(drawn, {FLOOR: NO_FLOOR}, {DRAWN: encoded(others)})
 
             await self._robot[MapMemory].replace(edit)
             self._layers, self.current = (), FloorName(self.current.building, stop, default=False)
@@ -242,8 +250,9 @@ class MapKeeper:
         try:
             if floor.grid is None:
                 raise InvalidGoal(NO_GRID)
-            self._robot[Mapping].load(floor.grid, pose or ORIGIN)
-            await draw
+            with exchange(self._robot):
+                self._robot[Mapping].load(floor.grid, pose or ORIGIN)
+                await draw
         finally:
             draw.close()
             self._loading = False
@@ -257,65 +266,69 @@ class MapKeeper:
 
     async def clear(self) -> None:
         """Clear the map and begin a new one where the robot is; return once the drawings are on it."""
-        origin = self._robot[Localization].pose
-        with self.clearing.by_this_door():
-            self._robot[Mapping].clear()
-        await self._on_map_cleared(origin)
+        origin, memory = self._robot[Localization].pose, self._robot[MapMemory]
+        with memory.exchange():
+            with memory.left_to_caller():
+                self._robot[Mapping].clear()
+            await self._on_map_cleared(origin)
 
-    async def _on_map_cleared(self, origin: Pose) -> None:
+    async def _on_origin_moved(self, origin: Pose) -> None:
+        """Handle a change of the map by another door."""
+        if self._robot[Mapping].grid.width and origin.yaw == 0.0:
+            await self._shift(origin)
+        else:
+            await self._on_map_cleared(origin)
+
+    async def _on_map_cleared(self, origin: Pose, since: Pose = ORIGIN) -> None:
         """Handle the clearing of memory's grid: its origin is now at ``origin``, from which drawings are given.
 
         The manual clears the map only, and has operations of its own for each kind of drawing. Further drawings
         belong to no floor of the file: a restart restores the file's grid with the drawings that it has now.
+        ``since``: to which the origin, and all drawings, have been moved already.
         """
         async with self._turn:
-            others, basis = await self._others(), _basis(self._robot)
+            others, basis = await other_drawings(self._robot), bases(self._robot)
 
             def edit(now: Drawings) -> Replacement:
                 for shift in basis.values():
-                    self._put_aside(now, shift, others)
-                return Replacement(seen_from(origin, now), {FLOOR: NO_FLOOR}, {DRAWN: _encoded(others)})
+                    put_aside(self._robot, seen_from(since.inverse(), now), shift, others, self.current.map_id)
+                settings = {FLOOR: NO_FLOOR, MOVED: ()}
+                return Replacement(seen_from(origin, now), settings, {DRAWN: encoded(others)})
 
             await self._robot[MapMemory].replace(edit)
             self._layers = ()
-            self._loaded.move(self.current, origin, _basis(self._robot))
+            self._loaded.move(self.current, origin, bases(self._robot))
 
     async def move_origin(self, point: Point) -> None:
         """Move the origin of the map in memory to ``point``, by whole cells; drawings keep their places."""
-        with self.clearing.by_this_door():
-            origin = self._robot[Mapping].move_origin(point)
+        memory = self._robot[MapMemory]
+        with memory.exchange():
+            with memory.left_to_caller():
+                origin = self._robot[Mapping].move_origin(point)
+            await self._shift(Pose(origin.x, origin.y))
+
+    async def _shift(self, origin: Pose) -> None:
+        """Handle a move of the origin of memory's grid to ``origin``."""
         async with self._turn:
-            basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in _basis(self._robot).items()}
+            basis = {digest: (x + origin.x, y + origin.y) for digest, (x, y) in bases(self._robot).items()}
             await self._robot[MapMemory].replace(
-                lambda now: Replacement(seen_from(Pose(origin.x, origin.y), now), settings={BASIS: basis})
+                lambda now: Replacement(seen_from(origin, now), settings={BASIS: basis})
             )
-            self._layers, self.place.known = (), True
-            self._loaded.move(self.current, Pose(origin.x, origin.y), basis)
+            self._layers = ()
+            self._loaded.move(self.current, origin, basis)
 
     async def _turn_over(self, floor: FloorMap, digest: str) -> None:
         """Switch from the floor in memory to ``floor`` of the map with ``digest``, each with its drawings."""
-        if digest not in _basis(self._robot):  # memory holds another map
-            await _put_drawings(self._robot, floor, {digest: NOT_MOVED})
+        if digest not in bases(self._robot):  # memory holds another map
+            await put_drawings(self._robot, floor, {digest: NOT_MOVED})
             return
-        others, shift = await self._others(), _basis(self._robot)[digest]
+        others, shift = await other_drawings(self._robot), bases(self._robot)[digest]
 
         def turn(now: Drawings) -> Replacement:
-            self._put_aside(now, shift, others)
-            return _replacement(floor, {digest: NOT_MOVED}, others)
+            put_aside(self._robot, now, shift, others, self.current.map_id)
+            return replacement(floor, {digest: NOT_MOVED}, others)
 
         await self._robot[MapMemory].replace(turn)
-
-    def _put_aside(self, now: Drawings, shift: Sequence[float], others: dict[str, Drawings]) -> None:
-        """Add memory's drawings to the ``others``, in the frame of the file's grid before its origin was moved."""
-        if (last := self._robot[Settings].get(FLOOR, self.current.map_id)) != NO_FLOOR:
-            others[last] = seen_from(Pose(-shift[0], -shift[1]), now)
-
-    async def _others(self) -> dict[str, Drawings]:
-        """Return the drawings, by id, of other floors that the robot has visited since the map was loaded."""
-        try:
-            return msgspec.json.decode(await self._robot[FileStore].read(DRAWN), type=dict[str, Drawings])
-        except NotFound:
-            return {}
 
 
 def _start_of(robot: Robot, floors: Sequence[FloorMap]) -> FloorMap:
@@ -337,51 +350,6 @@ def _require_grids(floors: Sequence[FloorMap]) -> None:
     for floor in floors:
         if floor.grid is None:
             raise InvalidGoal(f"floor {floor.name.floor} of the map has no grid" if floor.name.floor else NO_GRID)
-
-
-async def _put_drawings(robot: Robot, floor: FloorMap, basis: dict[str, Sequence[float]]) -> None:
-    """Replace memory's drawings by those of the file: all or nothing."""
-    await robot[MapMemory].replace(lambda _: _replacement(floor, basis, {}))
-
-
-def _basis(robot: Robot) -> dict[str, Sequence[float]]:
-    return dict(robot[Settings].get(BASIS, {}))
-
-
-def _frame_on_disk(robot: Robot) -> tuple[str, str, Sequence[float]] | None:
-    """Return the digest, the floor and the origin's shift of the map in memory; None if it is not the one on disk."""
-    floor, basis = robot[Settings].get(FLOOR, NO_FLOOR), _basis(robot)
-    if floor == NO_FLOOR or not basis:
-        return None
-    digest = next(iter(basis))
-    return digest, floor, basis[digest]
-
-
-def _resumed(robot: Robot, floors: Sequence[FloorMap], digest: str) -> tuple[FloorMap, Pose | None] | None:
-    """Return the last floor and pose, or None for the pose of its dock; None if they are unknown.
-
-    A robot that has come onto its dock while it was off, or has left it, was moved.
-    """
-    last = last_place(robot)
-    floor = next((floor for floor in floors if last and (digest, floor.name.map_id) == (last.digest, last.floor)), None)
-    if last is None or floor is None or last.docked < is_docked(robot):
-        return None
-    return floor, last.pose if last.docked == is_docked(robot) else None
-
-
-def _replacement(floor: FloorMap, basis: dict[str, Sequence[float]], drawn: dict[str, Drawings]) -> Replacement:
-    """Return the ``drawn`` lines and areas of ``floor``, else those of the file; other floors keep theirs."""
-    left = dict(drawn)
-    here = left.pop(floor.name.map_id, Drawings(floor.places, floor.annotations))
-    return Replacement(here, {BASIS: basis, FLOOR: floor.name.map_id}, {DRAWN: _encoded(left)})
-
-
-def _with_docks(drawn: Drawings, docks: Iterable[PointOfInterest]) -> Drawings:
-    return replace(drawn, annotations=replace(drawn.annotations, docks=tuple(docks)))
-
-
-def _encoded(drawn: dict[str, Drawings]) -> bytes | None:
-    return msgspec.json.encode(drawn) if drawn else None
 
 
 def _parsed(data: bytes) -> list[FloorMap]:

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import AsyncIterator
 from typing import Any
 
 import httpx
 import pytest
 
-from roboglot.fleet import Fleet
-from roboglot.model.clock import LockstepClock
 from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.autonomy.delivery_robot import delivery_robot
-from tests.protocols.slamware.maps.test_elevators import ACTIONS, MULTI, drive_to, on_map, start, two_floors
+from tests.protocols.slamware.lift.two_floors import ACTIONS, MAPS, MULTI, drive_to, on_map, start, two_floors
 from tests.protocols.witness import Witness
-
-MAPS = ("ground", "first")  # loaded; the third floor has none
-
-
-@pytest.fixture
-async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
-    async with delivery_robot(clock) as fleet:
-        yield fleet
 
 
 class RideWalk:
