@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 OPENING_MAX = 8192  # bytes of a request
+PATH_SHOWN_MAX = 80  # characters of a path in a refusal
 MESSAGE_MAX = 8 * 1024 * 1024  # bytes of a message, whole or fragmented
 OPENING_SECONDS_MAX = 10.0
 HEAD_END = b"\r\n\r\n"
@@ -107,7 +108,7 @@ class Opening:
         entrance, path = self._entrance, request.path.partition("?")[0]
         channel = entrance.channels.get(path)
         if channel is None:
-            self._refuse(protocol, HTTPStatus.NOT_FOUND, f"there are {' and '.join(entrance.channels)}")
+            self._refuse(protocol, HTTPStatus.NOT_FOUND, _elsewhere(path, list(entrance.channels)))
             return
         protocol.available_subprotocols = [Subprotocol(name) for name in channel.subprotocols] or None
         response = protocol.accept(request)
@@ -171,3 +172,10 @@ class Opening:
         response.headers.update(headers or {})
         protocol.send_response(response)
         self._writer.flush(protocol)
+
+
+def _elsewhere(path: str, known: list[str]) -> str:
+    """Return where this port has its WebSockets; a path of a stranger is repeated in part only."""
+    *others, last = known
+    places = f"{', '.join(others)} and {last}" if others else last
+    return f"there is nothing at {path[:PATH_SHOWN_MAX]!r}: this port has WebSockets at {places}"

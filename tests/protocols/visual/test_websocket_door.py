@@ -192,6 +192,8 @@ async def test_plain_http_is_refused(address: str) -> None:
     with pytest.raises(BadAnswer, match="404"):
         await TextLink.open(address, "/else")
     assert b" 426 " in await raw(address, "GET /programs HTTP/1.1\r\nHost: x\r\n\r\n")
+    missed = await raw(address, "GET /program HTTP/1.1\r\nHost: x\r\n\r\n")
+    assert b"'/program': this port has WebSockets at /programs, /log, /where, /runs and /debug" in missed
     assert b" 431 " in await raw(address, "GET /programs HTTP/1.1\r\nX: " + "x" * OPENING_MAX)
     assert await raw(address, "nonsense\r\nnonsense\r\n\r\n") == b""
 
