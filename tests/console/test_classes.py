@@ -132,6 +132,7 @@ async def test_all_are_stopped_without_their_pages_too(fleet: list[Shown]) -> No
         assert ends == [ActionStatus.CANCELED] * 2
         service = next(iter(second.runtime._programs.values())).service
         assert service.running() == []
+        assert [entry.text for entry in await service.log("t")] == ["ended by the teacher"]
 
 
 async def test_a_world_that_ends_leaves_the_class(tmp_path: Path) -> None:

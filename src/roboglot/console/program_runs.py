@@ -30,13 +30,17 @@ async def start(desk: Desk, name: str, source: str) -> dict[str, object]:
 
 
 async def end_all(desk: Desk, name: str) -> None:
-    """End every program and motion of a robot; the caller's right has been checked. Raises NotFound, RobotError."""
+    """End every program and motion of a pupil's robot; the teacher's right has been checked.
+
+    Raises NotFound, RobotError.
+    """
     robot = desk.robots.get(name)
     if robot is None:
         raise NotFound(f"there is no robot {name!r}")
     with robot.admission.noting(CLIENT, "stop"), robot.outside.noting(PROGRAM, END, {}):
         if (programs := desk.studio.programs.get(name)) is not None:
-            await programs.service.shutdown([figures.target_id for figures in programs.service.running()])
+            running = [figures.target_id for figures in programs.service.running()]
+            await programs.service.shutdown(running, why="ended by the teacher")
         await stop(robot)
 
 

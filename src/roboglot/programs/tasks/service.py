@@ -242,8 +242,11 @@ class ProgramService:
             else:
                 run.step(step, to_block=to_block)
 
-    async def shutdown(self, ids: Collection[str]) -> dict[str, ProgramError]:
-        """End programs and cancel their motions, all before waiting for any; return refusals by id."""
+    async def shutdown(self, ids: Collection[str], why: str = "") -> dict[str, ProgramError]:
+        """End programs and cancel their motions, all before waiting for any; return refusals by id.
+
+        ``why`` is the last line of their logs; by default the user ended them.
+        """
         refused: dict[str, ProgramError] = {}
         async with self._turns.take():
             states: dict[str, TaskState] = {}
@@ -256,12 +259,12 @@ class ProgramService:
                 if id in self._runs:
                     self._runs[id].call_off()
             for id, before in states.items():
-                self.reports.publish(done(TaskOperation.SHUTDOWN, id, await self._shut_down(id, before)))
+                self.reports.publish(done(TaskOperation.SHUTDOWN, id, await self._shut_down(id, before, why)))
         return refused
 
-    async def _shut_down(self, id: str, before: TaskState) -> TaskState:
+    async def _shut_down(self, id: str, before: TaskState, why: str) -> TaskState:
         if id in self._runs:
-            return await self._runner.end(id, why="ended by the user")
+            return await self._runner.end(id, why=why or "ended by the user")
         task = await self._store.get(id)
         state = state_after(before, TaskOperation.SHUTDOWN, task.mode if task else "")
         await self._store.set_state(id, state)
