@@ -357,14 +357,20 @@ async def test_a_lost_connection_is_said_and_bridged(served: Served, open_consol
 async def test_failing_drive_is_said_where_it_began(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
     await page.wait_for_selector("text=Scan fits map")
-    served.robot[EmergencyStop].engage()
+    stop = page.get_by_role("button", name="Emergency stop")
+    await stop.press("Enter")
     await page.wait_for_selector("text=Release")
+    await shows(page, "document.activeElement.innerText", "Emergency stop")  # the keyboard keeps its place
     box = await page.locator("canvas").bounding_box()
     await page.mouse.click(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2)
     await page.wait_for_selector(".notice >> text=On the way.")
     await served.clock.advance(1.0)
     await page.wait_for_selector(".notice.bad >> text=the emergency stop is engaged")
-    served.robot[EmergencyStop].release()
+    await stop.press("Enter")
+    await page.get_by_role("button", name="Release").press("Enter")
+    await becomes(page.locator(".banner").count, 0)
+    await shows(page, "document.activeElement.className", "stop")
+    assert not served.robot[EmergencyStop].engaged
 
 
 async def test_robot_shown_again_keeps_its_map(served: Served, open_console: OpenConsole) -> None:

@@ -81,6 +81,8 @@ async def test_phone_shows_and_can_touch_everything(served: Served, open_console
         stop = await page.locator(".stop").bounding_box()
         assert stop["x"] + stop["width"] <= 360
         assert await page.evaluate(SMALL_TARGETS) == [], view
+        if view in ("live", "world"):  # no tool has a name to see there
+            assert await page.locator(".hint").is_visible()
         if view == "robots":
             await page.evaluate("document.querySelector('.tile h2').firstChild.data = 'robot_of_a_class_'.repeat(5)")
             assert await page.evaluate(COVERED_OR_CUT) == []
@@ -159,6 +161,7 @@ async def test_fleet_page_filters_its_robots(browser: Any, tmp_path: Path) -> No
     await page.locator("input[type=search]").fill("FAILED")
     await becomes(tiles.count, 1)
     assert await page.evaluate(SMALL_TARGETS) == []
+    assert await page.locator("header .brand").is_visible()
     await page.locator("input[type=search]").fill("a2")
     await page.wait_for_selector(".tile:has(.thumbnail) >> text=All is well.")
     await fleet.close()  # the page says so where it is seen, and calls no robot well

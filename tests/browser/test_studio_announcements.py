@@ -52,7 +52,7 @@ async def test_runs_and_halts_are_announced(studio: Open) -> None:
     await page.keyboard.press("F5")
     await announced(page, "9")  # the printed line
     await page.keyboard.press("Shift+F5")
-    await announced(page, "Ready")
+    await announced(page, "Ended")
     await page.click("#tab-python")
     await loaded(page, WRONG)
     await page.keyboard.press("F5")
@@ -79,6 +79,8 @@ async def test_small_screens_show_names_and_panels_whole(studio: Open, language:
     page = await studio(language=language)
     await page.set_viewport_size({"width": width, "height": 740})
     await page.fill("header .name input", "Walk round and bark")
+    for verb in ("运行", "暂停", "程序") if language == "zh" else ("Run", "Pause", "Programs"):  # seen as icons
+        assert await page.get_by_role("button", name=verb, exact=True).first.get_attribute("title")
     await page.click(".switch button:nth-child(2)")
     await shows(page, CUT, {})
     await until(page, "(i => i.scrollWidth <= i.clientWidth)(document.querySelector('header .name input'))")

@@ -2,7 +2,7 @@
 import { render } from "preact";
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, Icon, html, lacks, language, loadWords, notice, robotWord, t, theme } from "./base.js";
+import { Button, Icon, html, lacks, language, loadWords, notice, place, robotWord, t, theme } from "./base.js";
 import { age, changeWorld, choose, command, connect, current, hello, me, pace, recording, signOut, state, status, want } from "./link.js";
 import { Live } from "./views/live.js";
 import { later } from "./views/later.js";
@@ -72,13 +72,16 @@ function Pace() {
   return html`<span class="chip" title=${t("clock.speed")}>${paused ? t("clock.stands") : `× ${speed}`}</span>`;
 }
 
+/** Do what a banner offers; it goes then, and the keyboard is to have a place. @param {() => unknown} act */
+function settle(act) { act(); /** @type {HTMLElement | null} */ (document.querySelector(".stop"))?.focus(); }
+
 function Banner() {
   if (status.value === "lost") return html`<div class="banner bad" role="alert">${t("link.gone")}</div>`;
   if (pace.value.paused) return html`<div class="banner warn" role="status">${t("clock.paused")}
-    <${Button} label=${t("clock.resume")} verb="resume_clock" onClick=${() => changeWorld("resume_clock")} /></div>`;
+    <${Button} label=${t("clock.resume")} verb="resume_clock" onClick=${() => settle(() => changeWorld("resume_clock"))} /></div>`;
   const safety = state.value?.safety;
   if (safety?.emergency_stop) return html`<div class="banner bad" role="alert"><${Icon} name="alert" />${t("estop.on")}
-    <${Button} label=${t("estop.release")} verb="emergency_stop" onClick=${() => command("emergency_stop", { engage: false })} /></div>`;
+    <${Button} label=${t("estop.release")} verb="emergency_stop" onClick=${() => settle(() => command("emergency_stop", { engage: false }))} /></div>`;
   if (safety?.power && safety.power !== "awake") return html`<div class="banner warn" role="status">${t("power.is", { mode: robotWord(safety.power) })}</div>`;
   return null;
 }
@@ -100,5 +103,5 @@ function App() {
 }
 
 await loadWords();
-render(html`<${App} />`, document.getElementById("app"));
+render(html`<${App} />`, place());
 connect();

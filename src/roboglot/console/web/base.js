@@ -189,6 +189,13 @@ export async function fetched(path, wish) {
 /** A number of so many digits, which is never -0. @param {number} n */
 export const fixed = (n, digits = 2) => (Number(n.toFixed(digits)) || 0).toFixed(digits);
 
+/** The place of the page, without the word that it loads. */
+export function place() {
+  const found = /** @type {HTMLElement} */ (document.getElementById("app"));
+  found.replaceChildren();
+  return found;
+}
+
 /** Seconds as people say them. @param {number} seconds */
 export function duration(seconds) {
   if (seconds >= 3600) return t("time.hours", { h: Math.floor(seconds / 3600), m: Math.floor((seconds % 3600) / 60) });

@@ -2,7 +2,7 @@
 import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { signal } from "@preact/signals";
-import { Button, Icon, html, language, loadWords, robotWord, t, theme } from "../base.js";
+import { Button, Icon, html, language, loadWords, place, robotWord, t, theme } from "../base.js";
 
 const LOOK = 1000; // ms between two looks
 const SEEN_MAX = 100; // robots that are asked for at once
@@ -89,6 +89,6 @@ function Page() {
 }
 
 loadWords("/words", "/fleet/words").then(() => {
-  render(html`<${Page} />`, /** @type {HTMLElement} */ (document.getElementById("app")));
+  render(html`<${Page} />`, place());
   look();
 });

@@ -87,7 +87,8 @@ function State() {
     </dl>
     <div class="buttons">
       <${Button} icon="dock" label=${safety.docked ? t("undock") : t("dock.go")} verb="dock" onClick=${() => command(safety.docked ? "undock" : "dock")} />
-      ${!safety.emergency_stop && html`<${Button} kind="danger" icon="alert" label=${t("estop")} verb="emergency_stop" onClick=${() => command("emergency_stop", { engage: true })} />`}
+      <${Button} kind="danger" icon="alert" label=${t("estop")} verb="emergency_stop" aria-disabled=${safety.emergency_stop ? "true" : undefined}
+        onClick=${() => { if (!safety.emergency_stop) command("emergency_stop", { engage: true }); }} />
     </div></div>
     <details class="card"><summary>${t("list")}</summary>
       <p>${pose && t("list.robot", { name: current.value, x: fixed(pose[0], 1), y: fixed(pose[1], 1), yaw: Math.round(pose[2] * 180 / Math.PI) })}</p>
