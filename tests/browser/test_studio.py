@@ -160,12 +160,16 @@ async def test_error_is_at_its_block_in_both_languages(studio: Open) -> None:
     await shows(page, "studio.runner.failureWords.value", "Something is divided by zero.")
     await page.click("text=中文")
     await shows(page, "studio.runner.failureWords.value", "出现了除以零。")
+    await page.click("#tab-output")  # once, with the line as the page counts
+    shown = "出现了除以零。 ZeroDivisionError: division by zero (第 1 行: print(3 / 0)) 显示积木"
+    await shows(page, "document.querySelector('#panel').innerText.split(/\\n+/).join(' ')", f"输出 {shown}")
     assert await page.evaluate("studio.editor.workspace.getAllBlocks(false).length") == 4  # nothing was lost
     assert page.errors == []
 
 
 async def test_program_is_built_run_and_debugged_by_keyboard(studio: Open) -> None:
     page = await studio()
+    assert "drag a block here" in await page.inner_text(".start")
     for _ in range(30):
         await page.keyboard.press("Tab")
         if await page.evaluate("document.activeElement.classList.contains('blocklyToolboxCategoryContainer')"):
@@ -178,7 +182,7 @@ async def test_program_is_built_run_and_debugged_by_keyboard(studio: Open) -> No
     await page.keyboard.press("Enter")
     await until(page, "studio.editor.workspace.isDragging()")
     await put_down(page)
-    await until(page, "studio.editor.code.value.includes('print(')")
+    await until(page, "studio.editor.code.value.includes('print(') && !document.querySelector('.start')")
     await page.keyboard.press("i")
     await until(page, "document.getElementById('blocklyAriaAnnounce').textContent.includes('print')")
     await page.keyboard.press("F9")
@@ -300,7 +304,7 @@ async def test_key_pressed_without_link_counts_after_reconnection(studio: Open, 
     await until(page, f"{held} === 'more'")
     broken.set()
     await links[-1].close()
-    await until(page, "document.querySelector('.banner.bad')")
+    await page.wait_for_selector(".banner.bad >> text=Your program may still be running;")
     await shows(page, "document.querySelector('.phase').textContent", "State unknown")
     await until(page, "!document.querySelector('.lit')")
     await page.keyboard.press("F8")

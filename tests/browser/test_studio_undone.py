@@ -24,6 +24,14 @@ TOO_FAST = {
         ],
     }
 }  # fmt: skip
+WALK = {
+    "blocks": {
+        "languageVersion": 0,
+        "blocks": [{"type": "cyberdog.motion.go_straight", "id": "walk", "x": 30, "y": 30, "inputs": {
+            "x_velocity": {"shadow": {"type": "math_number", "fields": {"NUM": 0.3}}},
+            "duration": {"shadow": {"type": "math_number", "fields": {"NUM": 9}}}}}],
+    }
+}  # fmt: skip
 STOPPED = {
     "shadow": {"type": "text", "fields": {"TEXT": "no number"}},
     "block": {"type": "math_arithmetic", "id": "wrong", "fields": {"OP": "DIVIDE"}, "inputs": {
@@ -62,9 +70,23 @@ async def test_refusal_is_gone_with_the_next_run(studio: Open) -> None:
     await page.evaluate("studio.editor.workspace.getBlockById('fast').dispose(true)")
     await until(page, "!studio.editor.code.value.includes('go_straight')")
     await page.keyboard.press("F5")
-    await shows(page, WORD, "Ready")
+    await shows(page, WORD, "Ended")
     await until(page, "!document.querySelector('.notice.bad') && !document.querySelector('.wrong')")
     await prints(page, "on")
+    assert page.errors == []
+
+
+async def test_walk_that_a_person_stops_is_no_refusal(studio: Open) -> None:
+    page = await loaded(await studio(), WALK)
+    await page.click("#tab-output")
+    await page.keyboard.press("F5")
+    await until(page, "document.querySelector('.lit')?.dataset.id === 'walk'")  # time stands still: it does not arrive
+    await page.keyboard.press("Shift+F5")
+    await shows(page, WORD, "Ended")
+    await page.reload()
+    await until(page, READY)
+    await shows(page, WORD, "Ended")
+    await shows(page, "document.querySelector('#panel').innerText.trim()", "Output\nended by the user")
     assert page.errors == []
 
 
@@ -77,7 +99,7 @@ async def test_error_leaves_what_was_refused_before_it(studio: Open) -> None:
     await shows(page, WORD, "Ended with an error")
     refused = f"The robot could not do this:motion.go_straight (line 1): {WHY}"
     await shows(page, "document.querySelector('.panel .failure[role=status]')?.textContent ?? ''", refused)
-    await page.wait_for_selector(".panel .failure[role=alert] >> text=ZeroDivisionError")
+    await page.wait_for_selector(".panel .failure[role=group] >> text=/ZeroDivisionError: .* .line 2: /")
     await shows(page, "[...document.querySelectorAll('.wrong')].map((one) => one.dataset.id)", ["fast", "say"])
     assert page.errors == []
 

@@ -14,6 +14,7 @@ import pytest_asyncio
 import typer
 
 from roboglot.cli.programs.lesson import command
+from roboglot.console.studio.blocks import table
 from roboglot.console.studio.checks import Check, Work, failure
 from roboglot.console.studio.lessons import Grade, Lesson, grade, load, read
 from roboglot.console.studio.mistakes import explain
@@ -172,3 +173,12 @@ async def test_the_command_plays_a_mission_back(tmp_path: Path, capsys: pytest.C
         await asyncio.to_thread(command, [file])
     assert left.value.exit_code == 1
     assert "mistake 1: not passed, but reach should have failed" in capsys.readouterr().out
+
+
+async def test_blocks_of_beginners_stand_first_and_do_something() -> None:
+    functions = {f["key"]: f["parameters"] for f in table()["functions"] if f["group"] == "motion"}
+    names = [key.rpartition(".")[2] for key in functions]
+    assert [*names[:2], names[-1]] == ["go_straight", "turn", "emergency_stop"]
+    started = [(p["minimum"], p["start"], p["maximum"]) for ps in functions.values() for p in ps if "start" in p]
+    assert len(started) == 4
+    assert all(low <= value <= high and value for low, value, high in started)

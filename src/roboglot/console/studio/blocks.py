@@ -44,13 +44,16 @@ def described() -> Described:
 
 
 def table() -> dict[str, Any]:
-    """Return groups, functions in the manual's order of groups, enumerations, and completions for a text editor."""
+    """Return groups, functions in the manual's order of groups, enumerations, and completions for a text editor.
+
+    Within a group come those first that beginners need, and those last that few programs need.
+    """
     labels = _labels()
     functions = [_function(operation, labels) for operation in ABILITIES]
     parameters = [parameter for function in functions for parameter in function["parameters"]]
     shown = {*ENUMS["StateCode"], *(name for parameter in parameters for name in parameter.get("choices", ()))}
-    order = list(labels["groups"])
-    functions.sort(key=lambda function: order.index(function["group"]))
+    order, first, last = list(labels["groups"]), labels["first"], labels["last"]
+    functions.sort(key=lambda function: (order.index(function["group"]), _rank(function["key"], first, last)))
     return {
         "groups": [{"id": id, **group} for id, group in labels["groups"].items()],
         "functions": functions,
@@ -60,6 +63,14 @@ def table() -> dict[str, Any]:
         "builtins": sorted(BUILTINS),
         "modules": sorted(MODULES),
     }
+
+
+def _rank(key: str, first: list[str], last: list[str]) -> int:
+    """Return a function's rank within its group: below 0 for the first, above for the last, else 0."""
+    path, name = key.removeprefix("cyberdog."), key.rpartition(".")[2]
+    if path in first:
+        return first.index(path) - len(first)
+    return 1 + last.index(name) if name in last else 0
 
 
 @cache
@@ -90,7 +101,7 @@ def _function(operation: Operation[str], labels: dict[str, Any]) -> dict[str, An
         },
         "attribute": key in ability_set().attributes,
         "answers": operation.answer != "None" and operation.answer is not None,
-        "parameters": [_parameter(name, parameter, labels) for parameter in parameters],
+        "parameters": [_parameter(key, parameter, labels) for parameter in parameters],
     }
 
 
@@ -117,15 +128,17 @@ def _group(key: str) -> str:
     return group if dot else root
 
 
-def _parameter(function: str, parameter: inspect.Parameter, labels: dict[str, Any]) -> dict[str, Any]:
+def _parameter(key: str, parameter: inspect.Parameter, labels: dict[str, Any]) -> dict[str, Any]:
     words = labels["parameters"][parameter.name]
-    kind = _kind(str(parameter.annotation))
+    kind, name = _kind(str(parameter.annotation)), key.rpartition(".")[2]
     described: dict[str, object] = {"name": parameter.name, "kind": kind, **words}
+    if (start := labels["start"].get(f"{key.removeprefix('cyberdog.')}.{parameter.name}")) is not None:
+        described["start"] = start
     default = None if parameter.default is inspect.Parameter.empty else parameter.default
-    if (choices := choices_of(function, parameter.name)) is not None:
+    if (choices := choices_of(name, parameter.name)) is not None:
         enum, members = choices
         return described | {"kind": "choice", "enum": enum, "choices": members, "default": _chosen(choices, default)}
-    if kind in ("float", "int") and (limit := limit_of(function, parameter.name)) is not None:
+    if kind in ("float", "int") and (limit := limit_of(name, parameter.name)) is not None:
         described |= {"minimum": limit.minimum, "maximum": limit.maximum}
         default = limit.start if default is None else default
     return described | {"default": default}

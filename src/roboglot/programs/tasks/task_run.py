@@ -105,7 +105,7 @@ class TaskRun:
         self._report = listeners.report
         self._pace = listeners.pace
         self._answering: asyncio.Task[None] | None = None
-        self._ended_itself = False
+        self._ended_itself = self._called_off = False
         self._journal = journal
         run.calls.answered = journal.answered
         self._replay = Replay(self._session, self.host, replaying)
@@ -227,6 +227,7 @@ class TaskRun:
 
     def call_off(self) -> None:
         """Cancel the program's actions and start ending the process; ``kill`` also waits for its end."""
+        self._called_off = True
         self._session.cancel("the program was ended")
         self._run.end_now()
         self.log.hurry()
@@ -297,7 +298,13 @@ class TaskRun:
         if request.name in MARKS:
             await self._pace.wait()
             self._halts |= self._block_stops.halts(self.block)
-        elif value is not None and ((why := refusal(value)[:SHORT_MAX]) or self._insights.listening):
+        elif (
+            value is not None
+            and not self._called_off
+            and (  # what is cut short is no fault of the robot's
+                (why := refusal(value)[:SHORT_MAX]) or self._insights.listening
+            )
+        ):
             place = self.line, self.module, self.block
             reading = Reading(self.task.id, *place, request.name, in_short(value), why)
             self.lasting.note(reading)

@@ -135,10 +135,10 @@ function codeOf(p) {
 /** The shadow that a new block has in a parameter's place. @param {any} p */
 function shadowOf(p) {
   switch (p.kind) {
-    case "choice": return { type: "robot_choice", extraState: { enum: p.enum, choices: p.choices }, fields: { MEMBER: p.default } };
+    case "choice": return { type: "robot_choice", extraState: { enum: p.enum, choices: p.choices }, fields: { MEMBER: p.start ?? p.default } };
     case "float": case "int": {
       const { minimum: min, maximum: max } = p;
-      return { type: "robot_number", extraState: { min, max, whole: p.kind === "int" }, fields: { NUM: p.default ?? 0 } };
+      return { type: "robot_number", extraState: { min, max, whole: p.kind === "int" }, fields: { NUM: p.start ?? p.default ?? 0 } };
     }
     case "str": return { type: "text", fields: { TEXT: p.default ?? "" } };
     case "bool": return { type: "logic_boolean", fields: { BOOL: p.default ? "TRUE" : "FALSE" } };

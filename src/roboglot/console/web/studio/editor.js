@@ -10,6 +10,7 @@ import { found, noteUse, readyToSearch, recentBlocks, sought, theme, toolbox, wa
 export const look = kept("studio.look", "plain");
 effect(() => { document.documentElement.dataset.look = look.value; });
 export const code = signal("");
+export const empty = signal(false); // no block stands here
 export const selected = signal("");
 export const breaks = signal(/** @type {string[]} */ ([]));
 export const changes = signal(0); // counts what a person changed
@@ -25,6 +26,7 @@ let lit = "", place = /** @type {HTMLElement | null} */ (null), unarranged = fal
 export function mount(element) {
   place = element;
   remake();
+  refresh();
   new ResizeObserver(() => { if (!workspace || !element.clientWidth) return; Blockly.svgResize(workspace); if (unarranged) arrange(); }).observe(element); // hidden, it keeps its view
 }
 
@@ -88,6 +90,7 @@ function soon() {
 export function refresh() {
   if (!workspace) return;
   code.value = pythonOf(workspace);
+  empty.value = isEmpty();
   breaks.value = workspace.getAllBlocks(false).filter((block) => block.data === BREAK).map((block) => block.id);
   for (const block of workspace.getAllBlocks(false)) block.getSvgRoot().classList.toggle("breaks", block.data === BREAK);
 }

@@ -2,7 +2,7 @@
 import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { computed, effect, signal, untracked } from "@preact/signals";
-import { Button, Icon, PATHS, html, kept, lacks, language, loadWords, notice, say, t, theme } from "../base.js";
+import { Button, Icon, PATHS, html, kept, lacks, language, loadWords, notice, place, say, t, theme } from "../base.js";
 import { choose, connect as connectRobot, current, hello, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
@@ -67,7 +67,7 @@ const undo = (/** @type {boolean} */ redo) => (program.value.kind === "text" ? t
 function Bar() {
   const others = runner.others.value.length;
   const phase = runner.phase.value, busy = phase === "running" || phase === "starting";
-  const word = runner.unknown.value ? t("studio.phase.unknown") : phase === "idle" ? t(`studio.phase.${runner.failure.value ? "failed" : runner.refused.value.length ? "undone" : "idle"}`) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}${runner.older.value ? ` · ${t("studio.phase.older")}` : ""}`;
+  const word = runner.unknown.value ? t("studio.phase.unknown") : phase === "idle" ? t(`studio.phase.${runner.failure.value ? "failed" : runner.refused.value.length && !runner.cut.value ? "undone" : runner.done.value ? "ended" : "idle"}`) : `${t(`studio.phase.${phase}`)}${runner.module.value ? ` · ${t("studio.phase.module", { name: runner.module.value })}` : ""}${runner.older.value ? ` · ${t("studio.phase.older")}` : ""}`;
   return html`<div class="controls" role="toolbar" aria-label=${t("studio.controls")}>
     <${Button} kind="main" verb="program" icon="play" label=${t(phase === "paused" ? "studio.go" : "studio.run")} title="F5" disabled=${busy || online.value !== "open"} onClick=${() => runner.run()} />
     <${Button} verb="program" icon="pause" label=${t("studio.pause")} title="F6" disabled=${phase !== "running"} onClick=${() => runner.pause()} />
@@ -75,7 +75,7 @@ function Bar() {
     <${Button} compact verb="program" icon="over" label=${t("studio.over")} title=${`${t("studio.over")} (F10)`} disabled=${phase !== "paused"} onClick=${() => runner.step("over")} /><${Button} compact verb="program" icon="out" label=${t("studio.out")} title=${`${t("studio.out")} (Shift+F8)`} disabled=${phase !== "paused"} onClick=${() => runner.step("out")} />
     <${Button} verb="program" icon="stop" label=${t("studio.stop")} title="Shift+F5" disabled=${phase === "idle"} onClick=${() => runner.stop()} />
     ${program.value.kind === "blocks" && html`<${Button} compact icon="dot" label=${t("studio.break.on")} title="F9" onClick=${() => editor.toggleBreak()} />`}
-    <span class=${`phase ${runner.unknown.value ? "unknown" : phase} ${runner.failure.value || (phase === "idle" && runner.refused.value.length) ? "failed" : ""}`} role="status" aria-live="polite" title=${`${word}${held()}${runner.older.value ? `. ${t("studio.older")}` : ""}`}>${word}${held()}</span>
+    <span class=${`phase ${runner.unknown.value ? "unknown" : phase} ${runner.failure.value || (phase === "idle" && runner.refused.value.length && !runner.cut.value) ? "failed" : ""}`} role="status" aria-live="polite" title=${`${word}${held()}${runner.older.value ? `. ${t("studio.older")}` : ""}`}>${word}${held()}</span>
     <span class="unseen" role="status" aria-live="polite">${others > 0 && t("studio.others", { n: others })}</span>
     <span class="grow"></span>
     ${program.value.kind === "blocks" && html`<label class="search"><span class="unseen">${t("studio.search")}</span><input type="search" placeholder=${t("studio.search")} value=${sought.value} onInput=${(e) => { sought.value = e.target.value; hits.value = editor.search(e.target.value); }} onKeyDown=${(e) => { if (/^(Enter|ArrowDown)$/.test(e.key) && sought.value && hits.value) { e.preventDefault(); e.stopPropagation(); editor.toToolbox(true); } }} /></label>
@@ -88,15 +88,20 @@ function Bar() {
 }
 
 function Banner() {
-  if (online.value === "lost" || status.value === "lost") return html`<div class="banner bad" role="alert">${t("link.gone")}</div>`;
+  if (online.value === "lost" || status.value === "lost") return html`<div class="banner bad" role="alert">${t(runner.phase.value === "idle" ? "studio.lost" : "studio.lost.running")}</div>`;
   if (unopened.value) return html`<div class="banner warn" role="status">${t("studio.unopened", { why: unopened.value })}</div>`;
   return null;
+}
+
+/** What to do where no block stands yet. */
+function Start() {
+  return html`<div class="start"><p>${t("studio.start")}</p>${!program.value.lesson && html`<${Button} icon="star" label=${t("studio.start.mission")} onClick=${() => { tab.value = "missions"; if (whole.value === "blocks") whole.value = "side"; }} />`}</div>`;
 }
 
 function Blocks() {
   const place = useRef(null);
   useEffect(() => { editor.mount(place.current); restore(); runner.check(); }, []);
-  return html`<div class="workspace" ref=${place} hidden=${program.value.kind !== "blocks"}></div>${program.value.kind === "text" && html`<${TextEditor} />`}
+  return html`<div class="workspace" ref=${place} hidden=${program.value.kind !== "blocks"}></div>${program.value.kind === "text" ? html`<${TextEditor} />` : editor.empty.value && html`<${Start} />`}
     ${program.value.kind === "blocks" && html`<${Inside} name=${runner.phase.value === "idle" ? "" : runner.module.value} block=${runner.module.value && runner.lit.value} />`}`;
 }
 
@@ -147,7 +152,7 @@ const AWAY_AFTER = 2000; // ms until files are kept for the time without a serve
 const AWAY_AT_LAST = 30_000; // ms; a program that runs comes first, too, until then
 await Promise.all([loadWords("/words", "/studio/words"), loadTable()]);
 want({ moving: false }); // until a map is shown
-render(html`<${App} />`, document.getElementById("app"));
+render(html`<${App} />`, place());
 connectRobot();
 connect();
 let timer = 0;

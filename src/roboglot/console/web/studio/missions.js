@@ -6,7 +6,7 @@ import { palette } from "../chart.js";
 import { stateOf, table } from "./blocks.js";
 import * as editor from "./editor.js";
 import { ask, listen, send } from "./link.js";
-import { changed, fresh, program, python, rename } from "./program.js";
+import { changed, fresh, lineShown, program, python, rename, withLineShown } from "./program.js";
 
 const PATH_MAX = 4000;
 export const missions = signal(/** @type {any[]} */ ([]));
@@ -47,10 +47,11 @@ function callOff() { calledOff = true; send({ type: "end_try" }); }
 export async function attempt(lesson) {
   if (trying.value) return;
   if (!python().trim()) { say(t("studio.empty")); return; }
+  const body = python();
   trying.value = true; calledOff = false; outcome.value = null; trace.value = [];
   try {
-    const found = await ask({ type: "try", body: python(), lesson });
-    outcome.value = found;
+    const found = await ask({ type: "try", body, lesson });
+    outcome.value = { ...found, body };
     if (found.grade && found.grade.stars > earned(lesson)) stars.value = JSON.stringify({ ...results(), [lesson]: found.grade.stars });
   } catch (error) {
     if (calledOff) say(t("studio.try.ended")); else say(t("refused", { why: error.message }), true);
@@ -109,21 +110,15 @@ function summary(found) {
   return refused?.length ? t("studio.try.refused") : t("studio.try.fine", { s: (seconds ?? 0).toFixed(0) });
 }
 
-/** Calls that the robot answered with a failure. */
-export function Refused({ calls }) {
-  return calls?.length ? html`<ul>${calls.map((c) => html`<li>${c.function.replace("cyberdog.", "")} (${c.module ? `${c.module}, ` : ""}${t("studio.line", { n: lineShown(c) })}): ${robotWord(c.words)}</li>`)}</ul>` : null;
-}
-
-/** Its number as the page counts lines: those of the marks of blocks are not shown. */
-function lineShown({ line, module }) {
-  if (module || program.value.kind !== "blocks") return line;
-  return line - editor.code.value.split("\n").slice(0, line).filter((row) => row.includes("cyberdog.task.block('")).length;
+/** Calls that the robot answered with a failure; `code` is the program that made them. */
+export function Refused({ calls, code }) {
+  return calls?.length ? html`<ul>${calls.map((c) => html`<li>${c.function.replace("cyberdog.", "")} (${c.module ? `${c.module}, ` : ""}${t("studio.line", { n: lineShown(c, code) })}): ${robotWord(c.words)}</li>`)}</ul>` : null;
 }
 
 function Verdict({ found }) {
   if (!found) return null;
-  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null || found.late || found.refused?.length ? "" : "fine"}`} role="status"><b>${summary(found)}</b><${Refused} calls=${found.refused} />${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${found.error}</small>`}</div>`;
-  const { stars: count, rows } = found.grade, undone = found.refused?.length > 0 && html`<b>${t("studio.undone")}</b><${Refused} calls=${found.refused} />`;
+  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null || found.late || found.refused?.length ? "" : "fine"}`} role="status"><b>${summary(found)}</b><${Refused} calls=${found.refused} code=${found.body} />${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${withLineShown(found.error, found.why, found.body)}</small>`}</div>`;
+  const { stars: count, rows } = found.grade, undone = found.refused?.length > 0 && html`<b>${t("studio.undone")}</b><${Refused} calls=${found.refused} code=${found.body} />`;
   return html`<div class=${`failure ${count ? "fine" : ""}`} role="status"><b>${count ? t("studio.passed") : t("studio.not.passed")} <${Stars} count=${count} /></b>
     <ul>${rows.filter((r) => !r.passed).map((r) => html`<li>${r.star ? "☆ " : "✗ "}${said(r)}</li>`)}</ul>${undone}</div>`;
 }

@@ -7,13 +7,12 @@ import { connections, current, state, want } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
 import { inWords } from "./bubbles.js";
 import * as editor from "./editor.js";
-import { body, continueAsText, program } from "./program.js";
-import { failure, line, lineOf, lit, phase, halt, printed, problems, readings, refused, textBreaks, variables } from "./runner.js";
+import { body, continueAsText, marks, program } from "./program.js";
+import { cut, done, failure, line, lineOf, lit, phase, halt, printed, problems, ran, readings, refused, textBreaks, textOf, variables } from "./runner.js";
 import { Refused, Simulate } from "./missions.js";
 import { makeText } from "./text.js";
 
 const WORD = /('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")|(#.*)|\b(def|while|for|in|if|elif|else|return|import|from|break|continue|pass|try|except|global|and|or|not|lambda|True|False|None)\b|\b(\d[\d.]*)\b/g;
-const marks = signal(false);
 
 /** A line of Python in colours. @param {string} text */
 function coloured(text) {
@@ -78,19 +77,20 @@ export function TextEditor() {
 
 export function Failure() {
   const found = failure.value;
-  return html`${found && html`<div class="failure" role="alert"><b>${found[language.value] || found.en || t("studio.failed")}</b><small>${found.text}</small>
+  return html`${found && html`<div class="failure" role="group"><b>${found[language.value] || found.en || t("studio.failed")}</b><small>${textOf(found)}</small>
       ${found.block && html`<${Button} label=${t("studio.failed.show")} onClick=${() => editor.focus(found.block)} />`}</div>`}
-    ${refused.value.length > 0 && html`<div class="failure" role="status"><b>${t("studio.undone")}</b><${Refused} calls=${refused.value} /></div>`}`;
+    ${refused.value.length > 0 && html`<div class="failure" role="status"><b>${t("studio.undone")}</b><${Refused} calls=${refused.value} code=${ran()} /></div>`}`;
 }
 
 export function Output() {
-  const end = useRef(null);
+  const end = useRef(null), lines = printed.value.filter((e) => e.key !== failure.value?.key); // that one stands above
+  const closed = done.value && !failure.value && !cut.value && phase.value === "idle"
   useEffect(() => {
     const box = end.current?.parentElement;
     if (box) box.scrollTop = box.scrollHeight;
   }, [printed.value.length]);
   return html`<${Failure} />
-    <ol class="printed" aria-label=${t("studio.tab.output")} aria-live="polite">${printed.value.length ? printed.value.map((e) => html`<li key=${e.key} class=${e.level}>${lineOf(e) || " "}</li>`) : html`<li class="muted">${t("studio.output.none")}</li>`}</ol><span ref=${end}></span>`;
+    <ol class="printed" aria-label=${t("studio.tab.output")} aria-live="polite">${lines.map((e) => html`<li key=${e.key} class=${e.level}>${lineOf(e) || " "}</li>`)}${closed ? html`<li class="note">${t("studio.output.end")}</li>` : !lines.length && !failure.value && html`<li class="muted">${t("studio.output.none")}</li>`}</ol><span ref=${end}></span>`;
 }
 
 export function Values() {

@@ -218,3 +218,12 @@ export function continueAsText() { const text = plain(editor.code.value); fresh(
 
 /** Python without the marks of blocks. @param {string} code */
 export const plain = (code) => code.replace(/^[ \t]*cyberdog\.task\.block\('[0-9A-Za-z]+'\)\n/gm, "");
+
+export const marks = signal(false); // whether the page shows the lines that mark blocks
+/** The number that the page shows at a line of the program. @param {{line: number, module: string}} at @param {string} code of the program */
+export function lineShown({ line, module }, code) {
+  if (module || marks.value || program.value.kind !== "blocks") return line;
+  return line - code.split("\n").slice(0, line).filter((row) => row.trim().startsWith("cyberdog.task.block('")).length;
+}
+/** An error's own words, with its line as the page counts. @param {string} text @param {{line: number, module: string}} at @param {string} code of the program */
+export const withLineShown = (text, at, code) => text.replace(/ \((module \w+, )?line \d+: /, (_, module = "") => ` (${module}${t("studio.line", { n: lineShown(at, code) })}: `);

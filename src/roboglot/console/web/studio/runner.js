@@ -7,7 +7,7 @@ import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
 import { ask, debug, frame, listen, online, opened } from "./link.js";
 import { learn, ownerOf } from "./modules.js";
-import { isStored, program, python, saveNow } from "./program.js";
+import { isStored, program, python, saveNow, withLineShown } from "./program.js";
 
 const LINES_MAX = 500, READINGS_MAX = 40, REFUSED_MAX = 20;
 export const phase = signal(/** @type {"idle" | "starting" | "running" | "paused"} */ ("idle"));
@@ -23,9 +23,13 @@ export const refused = signal(/** @type {{function: string, line: number, module
 export const unknown = computed(() => phase.value !== "idle" && (online.value !== "open" || !opened.value)); // of a run: what it does, now
 const under = signal(/** @type {string | null} */ (null)); // the text that runs, null where another page began it
 export const older = computed(() => phase.value !== "idle" && under.value !== null && under.value !== python()); // it was changed since
+/** A person, or the server, ended the last run: a note says so. */
+export const cut = computed(() => printed.value[printed.value.length - 1]?.level === "note");
+export const done = signal(false); // a run has ended since the program was opened
 export const textBreaks = signal(/** @type {number[]} */ ([]));
 export const others = signal(/** @type {string[]} */ ([])); // other programs that run on this robot
 export const lights = { count: 0, late: 0 }; // for the benchmark
+let ending = false; // a person has ended the run: what is cut short then is no fault
 let began = 0, runs = 0, next = 1, frameDue = false;
 const NOTE_AFTER = 300; // ms: a class that starts at once moves the page's banner once
 let noted = /** @type {Map<string, boolean>} */ (new Map());
@@ -74,7 +78,8 @@ async function runNow(step) {
   learn(python());
   began = performance.now();
   runs += 1;
-  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; refused.value = []; bubbles.clear();
+  ending = false;
+  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; refused.value = []; done.value = false; bubbles.clear();
   if (notice.value.bad) say(""); // it was of what is run anew
   try {
     const [known, early] = await Promise.all([isStored(), debug(stops(step)).catch(() => null)]);
@@ -106,7 +111,7 @@ async function go(step) {
 }
 
 export const pause = () => orLater(() => operate("suspend"));
-export const stop = () => orLater(() => operate("shutdown"));
+export const stop = () => orLater(async () => { ending = true; ending = await operate("shutdown"); });
 /** Stop the robot, and its program. */
 export function halt() { if (!lacks("program")) stop(); return command("stop"); }
 export const step = (/** @type {Step} */ how = "step") => run(how);
@@ -116,7 +121,8 @@ export async function operate(operation, id = program.value.id) {
   try {
     const { feedback } = await frame({ type: "task", operate: operation, target_id: [id] });
     if (feedback.state) say(t("refused", { why: feedback.describe }), true);
-  } catch (error) { say(t("refused", { why: error.message }), true); }
+    return !feedback.state;
+  } catch (error) { say(t("refused", { why: error.message }), true); return false; }
 }
 
 /** Breakpoints were changed while it runs. */
@@ -142,7 +148,7 @@ export function show() {
   const owners = blocksOfLines(editor.code.value), wrong = new Map();
   for (const found of problems.value) if (owners[found.line - 1]) wrong.set(owners[found.line - 1], words(found));
   for (const one of refused.value) if (one.block && !one.module) wrong.set(one.block, t("studio.undone.why", { why: one.words }));
-  if (failure.value?.block) wrong.set(failure.value.block, `${words(failure.value)}\n${failure.value.text}`);
+  if (failure.value?.block) wrong.set(failure.value.block, `${words(failure.value)}\n${textOf(failure.value)}`);
   editor.blame(wrong);
 }
 
@@ -163,8 +169,8 @@ async function rejoin() {
   if (!mine(id) || began !== runs) return; // another was opened or it was started meanwhile
   const lines = log.filter((/** @type {any} */ e) => last !== null && e.stamp >= last).slice(-LINES_MAX);
   if (last !== null) { printed.value = lines.map(entry); refused.value = calls.map((/** @type {any} */ one) => ({ ...one, words: one.refused })); }
-  if (!HELD[where.state]) { settle("idle"); if (last !== null) ended(lines, stored?.body ?? ""); return; }
   under.value = stored?.body ?? null;
+  if (!HELD[where.state]) { settle("idle"); if (last !== null) ended(); return; }
   failure.value = null;
   variables.value = where.variables;
   bubbles.held(where.variables);
@@ -173,19 +179,24 @@ async function rejoin() {
   show();
 }
 
-/** How the last run ended. @param {any[]} lines @param {string} text of the program then */
-function ended(lines, text) {
-  const found = lines.filter((e) => e.level === "error").pop();
-  if (!found) { failure.value = null; show(); return; }
-  const owner = found.line && !found.module && program.value.kind === "blocks" ? blocksOfLines(text)[found.line - 1] : "";
-  failure.value = { ...found, block: owner ?? "" };
+/** How the last run ended. */
+function ended() {
+  const found = printed.value.filter((e) => e.level === "error").pop();
+  failure.value = found ? { ...found, block: ownerAt(found) } : null;
+  done.value = true;
   show();
 }
+
+/** The text of the last run, or what stands here now. */
+export const ran = () => under.value ?? python();
+/** The block of an error. @param {any} found */
+const ownerAt = (found) => (found.line && !found.module && program.value.kind === "blocks" && blocksOfLines(ran())[found.line - 1]) || "";
+export const textOf = (/** @type {any} */ found) => withLineShown(translated(found.text), found, ran());
 
 /** Another program was opened: what was shown is the other's. */
 export function forget() {
   settle("idle");
-  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; refused.value = []; problems.value = []; textBreaks.value = []; bubbles.clear();
+  printed.value = []; readings.value = []; variables.value = {}; failure.value = null; refused.value = []; done.value = false; under.value = null; problems.value = []; textBreaks.value = []; bubbles.clear();
 }
 
 function settle(now) {
@@ -213,7 +224,7 @@ async function look() {
 
 const entry = (/** @type {any} */ e) => ({ ...e, key: next++ });
 /** A line of the log as it is shown: what the program did not print itself are the server's words. @param {any} e */
-export const lineOf = (e) => (e.en ? `${words(e)}\n${e.text}` : e.level === "print" ? e.text : translated(e.text));
+export const lineOf = (e) => (e.en ? `${words(e)}\n${textOf(e)}` : e.level === "print" ? e.text : translated(e.text));
 
 effect(() => { if (unknown.value) untracked(() => place("", 0, "")); }); // it may be anywhere by now
 const LOOK_EVERY = 100; // ms between two looks at the line of a text: no block says it
@@ -235,11 +246,13 @@ listen((message) => {
   switch (message.type) {
     case "opened": catchUp().catch(() => undefined).then(() => { const wish = postponed; postponed = null; wish?.(); }); break;
     case "frame": report(message.frame); break;
-    case "log":
+    case "log": {
       if (!mine(message.task)) break;
-      printed.value = [...printed.value, entry(message)].slice(-LINES_MAX);
-      if (message.level === "error") blameRun(message);
+      const line = entry(message);
+      printed.value = [...printed.value, line].slice(-LINES_MAX);
+      if (line.level === "error") blameRun(line);
       break;
+    }
     case "variables":
       if (!mine(message.task)) break;
       variables.value = message.variables;
@@ -255,15 +268,14 @@ listen((message) => {
 
 /** Said once for each place and reason. @param {typeof refused.value[0]} call */
 function noteRefused(call) {
-  if (refused.value.length >= REFUSED_MAX || refused.value.some(({ line, module, words }) => line === call.line && module === call.module && words === call.words)) return;
+  if (ending || refused.value.length >= REFUSED_MAX || refused.value.some(({ line, module, words }) => line === call.line && module === call.module && words === call.words)) return;
   refused.value = [...refused.value, call];
   say(t("studio.undone.why", { why: call.words }), true);
   show();
 }
 
 function blameRun(found) {
-  const owner = found.line && !found.module && program.value.kind === "blocks" ? blocksOfLines(editor.code.value)[found.line - 1] : "";
-  failure.value = { ...found, block: owner || (found.line ? lit.value : "") };
+  failure.value = { ...found, block: ownerAt(found) || (found.line ? lit.value : "") };
   say(words(found), true); // whatever panel is shown
   show();
 }
@@ -287,7 +299,9 @@ function report({ feedback, block }) {
     return;
   }
   if (/Task loop feedback/.test(feedback.describe)) {
-    if (/is suspend/.test(feedback.describe)) { if (phase.value === "idle") rejoin().catch(() => undefined); else { phase.value = "paused"; look(); } } else if (/is run$/.test(feedback.describe)) phase.value = "running"; else settle("idle");
-  } else if (feedback.operate === "start") { if (phase.value === "idle") { runs += 1; under.value = null; refused.value = []; } phase.value = feedback.state ? "idle" : "running"; }
-  else if (feedback.operate === "stop") settle("idle");
+    if (/is suspend/.test(feedback.describe)) { if (phase.value === "idle") rejoin().catch(() => undefined); else { phase.value = "paused"; look(); } } else if (/is run$/.test(feedback.describe)) phase.value = "running"; else over();
+  } else if (feedback.operate === "start") { if (phase.value === "idle") { runs += 1; under.value = null; refused.value = []; failure.value = null; done.value = false; } phase.value = feedback.state ? "idle" : "running"; }
+  else if (feedback.operate === "stop") over();
 }
+
+function over() { done.value ||= phase.value !== "idle"; settle("idle"); }
