@@ -19,7 +19,7 @@ from roboglot.model.action import ActionStatus
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.system.lease import Lease
-from roboglot.model.errors import Busy
+from roboglot.model.errors import Busy, RobotError
 from roboglot.model.geometry import Twist
 from roboglot.runtime import Runtime
 from roboglot.storage import residence as timing
@@ -27,7 +27,7 @@ from roboglot.storage.dead_programs import GAP_MAX, Silence
 from roboglot.storage.homes import Homes, Occupied
 from roboglot.storage.opening import open_database
 from roboglot.storage.residence import HOLD, LEASE, PERIOD, Residence, holder_of
-from roboglot.storage.transactions import Connection, DatabaseError, Transactions
+from roboglot.storage.transactions import Connection, DatabaseError, DiskFull, Transactions
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
 T = TypeVar("T")
@@ -104,16 +104,26 @@ async def test_robot_that_is_renewed_is_refused_to_others(
     assert not old.why_not("a")
 
 
+async def test_program_that_wants_fewer_robots_releases_the_others(database: Transactions) -> None:
+    """It was killed, and one of its robots was moved: its renewals must not hold that one for ever."""
+    homes = Homes(database)
+    await homes.take({"a": "", "b": ""}, "old", {})
+    assert await homes.take({"b": ""}, "old", {}) == {"b": 2}
+    await homes.renew("old")
+    assert await homes.take({"a": ""}, "new", {}) == {"a": 2}
+
+
+@pytest.mark.parametrize("failure", [DatabaseError("connection refused"), DiskFull("the disk is full")], ids=str)
 @pytest.mark.parametrize("keeper", ["program", "fleet"])
-async def test_unreachable_registry_is_logged_seldom(
-    keeper: str, watch: Watch, caplog: pytest.LogCaptureFixture
+async def test_failing_registry_is_logged_seldom_and_tried_again(
+    keeper: str, failure: RobotError, watch: Watch, caplog: pytest.LogCaptureFixture
 ) -> None:
     tries = 0
 
     async def fail(*_: object) -> None:
         nonlocal tries
         tries += 1
-        raise DatabaseError("connection refused")
+        raise failure.again()
 
     broken = cast("Homes", SimpleNamespace(renew=fail, signs=fail))
     if keeper == "program":
@@ -125,7 +135,7 @@ async def test_unreachable_registry_is_logged_seldom(
         assert not trying.done() or trying.result()
     trying.cancel()
     warnings = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
-    assert warnings == ["cannot reach the registry of robots: connection refused"]
+    assert warnings == [f"the registry of robots fails: {failure}"]
 
 
 async def test_a_program_gives_up_before_another_may_begin(database: Transactions, watch: Watch) -> None:

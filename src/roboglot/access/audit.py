@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from roboglot.access.trail import Entry
-from roboglot.storage.transactions import DatabaseError, DiskFull
+from roboglot.storage.transactions import FAILURES
 from roboglot.transport.limiter import Limiter
 
 log = logging.getLogger(__name__)
@@ -135,7 +135,7 @@ class Audit:
         while True:
             try:
                 self._trail.add(entries)
-            except (DatabaseError, DiskFull) as error:
+            except FAILURES as error:
                 if last:
                     log.error("%d rows of the audit are lost: %s", len(entries), error)
                     return

@@ -33,7 +33,7 @@ from roboglot.model.components.system.lease import Lease, moves
 from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.model.tap import DRIVER, Direction, Exchange
-from roboglot.storage.transactions import DatabaseError, Transactions
+from roboglot.storage.transactions import FAILURES, Transactions
 from roboglot.transport.limiter import Limiter
 from roboglot.transport.log_limiter import LogLimiter
 
@@ -205,7 +205,7 @@ class Guard:
                     newer = self._store.snapshot()
                     seen = newer.version
                     loop.call_soon_threadsafe(partial(self._adopt_safely, newer))
-            except DatabaseError as error:
+            except FAILURES as error:
                 limited_log.warning("list", "cannot read the list of identities, the last one stays: %s", error)
             for look in looks:
                 loop.call_soon_threadsafe(look.cancel)

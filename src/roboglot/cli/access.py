@@ -18,7 +18,7 @@ from roboglot.access.rights import ALL_ROBOTS, parse_rights, write_rights
 from roboglot.access.store import AccessStore, Grant, IdentityKind, open_store
 from roboglot.cli.suggestions import Group
 from roboglot.config import Config
-from roboglot.storage.transactions import DatabaseError
+from roboglot.storage.transactions import FAILURES
 
 app = typer.Typer(
     cls=Group,
@@ -185,5 +185,5 @@ def _store(data: Path | None, database: str) -> Iterator[AccessStore]:
             yield store
         finally:
             store.close()
-    except (ValueError, LookupError, OSError, sqlite3.Error, DatabaseError) as error:
+    except (ValueError, LookupError, OSError, sqlite3.Error, *FAILURES) as error:
         sys.exit(f"roboglot access: {error.args[-1] if error.args else error}")

@@ -15,7 +15,7 @@ from roboglot.access.trail import FILE, Entry, Trail, open_trail
 from roboglot.config import Config
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import in_line
-from roboglot.storage.transactions import DatabaseError
+from roboglot.storage.transactions import FAILURES
 
 LOOK_PERIOD = 0.5  # s
 
@@ -43,7 +43,7 @@ def command(
             while follow:
                 time.sleep(LOOK_PERIOD)
                 last = _print(trail, robot, last)
-    except (ValueError, OSError, sqlite3.Error, DatabaseError) as error:
+    except (ValueError, OSError, sqlite3.Error, *FAILURES) as error:
         sys.exit(f"roboglot audit: {in_words(error)}")
 
 

@@ -169,10 +169,10 @@ class _Reader:
 
     def read(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` in one transaction; call it in the thread."""
-        if self._connection is None:
-            self._connection = sqlite3.connect(self._path, isolation_level=None, timeout=WAIT)
-            self._connection.execute("PRAGMA query_only=ON")
         with database_errors():
+            if self._connection is None:
+                self._connection = sqlite3.connect(self._path, isolation_level=None, timeout=WAIT)
+                self._connection.execute("PRAGMA query_only=ON")
             self._connection.execute("BEGIN")
             try:
                 return work(self._connection)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 from roboglot.hosting.steady_time import uptime
 from roboglot.storage.homes import Homes
 from roboglot.storage.residence import LEASE, PERIOD
-from roboglot.storage.transactions import DatabaseError
+from roboglot.storage.transactions import FAILURES
 from roboglot.transport.log_limiter import LogLimiter
 from roboglot.values import dataclass
 
@@ -68,6 +68,6 @@ class Silence:
         while True:
             try:
                 await self.look()
-            except DatabaseError as error:
-                seldom.warning("registry", "cannot reach the registry of robots: %s", error)
+            except FAILURES as error:
+                seldom.warning("registry", "the registry of robots fails: %s", error)
             await asyncio.sleep(PERIOD)

@@ -6,7 +6,7 @@ import asyncio
 import logging
 
 from roboglot.storage.homes import Home, Homes
-from roboglot.storage.transactions import DatabaseError
+from roboglot.storage.transactions import FAILURES
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -34,7 +34,7 @@ class Whereabouts:
         """Return the robot's gateway; None if the robot does not run, or has no gateway. Raises OSError."""
         try:
             home = await self._homes.of(robot)
-        except DatabaseError as error:
+        except FAILURES as error:
             raise OSError(f"the registry: {error}") from None
         return _gateway(home) if home is not None and home.holder and home.gateway else None
 

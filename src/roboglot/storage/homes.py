@@ -46,7 +46,8 @@ class Homes:
         """Give all these robots to ``holder``; return their new epochs. Raises Occupied, and then gives none.
 
         A robot is free if it is new, was released, was this holder's before, or if its holder's count of renewals is
-        still the one in ``silent``.
+        still the one in ``silent``. Robots that ``holder`` had before and does not want any more are released: its
+        renewals would hold them for ever.
         """
 
         def work(connection: Connection) -> dict[str, int]:
@@ -60,6 +61,9 @@ class Homes:
                 homes = {robot: home for robot, home in _all(connection).items() if robot in left}
                 held = {home.holder for home in homes.values()}
                 raise Occupied(homes, {name: count for name, count in _signs(connection).items() if name in held})
+            kept = connection.execute("SELECT robot FROM robot_home WHERE holder=?", (holder,)).fetchall()
+            query = "UPDATE robot_home SET holder='' WHERE robot=?"
+            connection.executemany(query, sorted(row for row in kept if row[0] not in addresses))
             return taken
 
         return await self._database.run(work)

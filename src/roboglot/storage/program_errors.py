@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from roboglot.programs.errors import StoreError
-from roboglot.storage.transactions import DatabaseError, DiskFull
+from roboglot.storage.transactions import FAILURES
 
 
 @contextmanager
@@ -14,5 +14,5 @@ def store_errors() -> Iterator[None]:
     """Raise StoreError if the database fails or the robot's disk is full."""
     try:
         yield
-    except (DatabaseError, DiskFull) as error:
+    except FAILURES as error:
         raise StoreError(str(error)) from error

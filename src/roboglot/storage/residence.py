@@ -15,7 +15,7 @@ from pathlib import Path
 
 from roboglot.hosting.steady_time import uptime
 from roboglot.storage.homes import Homes, Occupied
-from roboglot.storage.transactions import DatabaseError
+from roboglot.storage.transactions import FAILURES
 from roboglot.transport.log_limiter import LogLimiter
 
 log = logging.getLogger(__name__)
@@ -72,7 +72,7 @@ class Residence:
                 began = await self._wait_for(others.signs)
         except Occupied as others:
             raise OSError(f"another program runs robot {others}") from None
-        except DatabaseError as error:
+        except FAILURES as error:
             raise OSError(f"the registry of robots: {error}") from None
         self._until = began + HOLD
 
@@ -96,7 +96,7 @@ class Residence:
         """Register the gateway for `roboglot connect` to these robots. Raises OSError."""
         try:
             await self._homes.announce(self._holder, gateway, certificate)
-        except DatabaseError as error:
+        except FAILURES as error:
             raise OSError(f"the registry of robots: {error}") from None
 
     def keep(self) -> None:
@@ -114,7 +114,7 @@ class Residence:
         self._until = -float("inf")
         try:
             await self._homes.release(self._holder, self._epochs)
-        except DatabaseError as error:
+        except FAILURES as error:
             log.warning("the registry keeps this program's robots for %g s: %s", LEASE, error)
 
     async def renew(self) -> None:
@@ -151,8 +151,8 @@ class Residence:
             await asyncio.sleep(PERIOD)
             try:
                 await self.renew()
-            except DatabaseError as error:
-                seldom.warning("registry", "cannot reach the registry of robots: %s", error)
+            except FAILURES as error:
+                seldom.warning("registry", "the registry of robots fails: %s", error)
 
     async def _watch(self) -> None:
         """Detect the end of the lease, even while a renewal waits for an answer."""

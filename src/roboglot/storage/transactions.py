@@ -23,6 +23,9 @@ class DiskFull(Refused):
     """No room is left on the robot's disk, or on the database's disk."""
 
 
+FAILURES = DatabaseError, DiskFull  # of a transaction, apart from errors of its work
+
+
 class Rows(Protocol):
     """Result of a statement."""
 

@@ -20,7 +20,7 @@ from roboglot.hosting.error_text import in_words
 from roboglot.operations import Right
 from roboglot.protocols import DOORS
 from roboglot.protocols.door import PortKind
-from roboglot.storage.transactions import DatabaseError
+from roboglot.storage.transactions import FAILURES
 
 UNUSED_DAYS = 30
 DAY = 86400.0  # s
@@ -192,7 +192,7 @@ def _used(config: Config, since: float) -> tuple[Mapping[str, set[Right]], float
                 if entry.outcome == "done" and entry.at >= since:
                     right = needed.get((entry.door, entry.operation))
                     used[entry.who] |= {right} if right else set(Right)  # nothing is claimed about unknown uses
-    except (sqlite3.Error, OSError, DatabaseError):
+    except (sqlite3.Error, OSError, *FAILURES):
         return used, None
     return used, oldest
 
