@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import pytest
 
@@ -11,8 +14,11 @@ from roboglot.cli import fleet
 from roboglot.shards import nursery_client
 from roboglot.shards.plan import PLAN, plan_fleet, save
 from roboglot.shards.requests import Answer, RobotRow, Row
-from roboglot.shards.states import Shard, State
+from roboglot.shards.states import Shards, State
 from roboglot.testing.addresses import free_addresses
+
+if TYPE_CHECKING:
+    from roboglot.shards.fleet_host import FleetHost
 
 TEMPLATE = 'world = "moon"\n'
 
@@ -22,13 +28,17 @@ class Hopeless:
 
     def __init__(self, folder: Path) -> None:
         self.plan, self.folder, self.closed = plan_fleet(2, 1, {}, folder, first=free_addresses(2)), folder, False
-        self.shards = {plan.name: Shard(1, plan, folder) for plan in self.plan.shards}
+
+    @cached_property
+    def shards(self) -> Shards:
+        return Shards(self.plan, self.folder)
 
     async def start(self) -> float:
         self.folder.mkdir(exist_ok=True)
         save(self.plan, self.folder)
         for shard in self.shards.values():
-            shard.state, shard.hopeless, shard.reason = State.FAILED, True, "no world is named 'moon'"
+            shard.hopeless, shard.reason = True, "no world is named 'moon'"
+            self.shards.turn_to(shard, State.FAILED)
         return 0.0
 
     async def close(self) -> None:
@@ -82,3 +92,60 @@ def test_an_answer_shows_what_was_asked_for(name: str, shown: list[str], capsys:
     ]
     fleet._print(Answer(rows, 1), name)
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == shown
+
+
+@pytest.mark.parametrize(
+    ("asked", "replan", "reason"),
+    [
+        (fleet._Asked(None, 2, None, ""), False, "options of a plan need --worlds"),
+        (fleet._Asked(None, None, None, ""), True, "options of a plan need --worlds"),
+        (fleet._Asked(2, None, None, ""), False, "has another plan"),
+    ],
+)
+def test_a_stored_plan_is_not_denied(asked: fleet._Asked, replan: bool, reason: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"there is no fleet in .* yet: give --worlds"):
+        fleet._plan(tmp_path, fleet._Asked(None, 2, None, ""), replan=replan)
+    save(plan_fleet(1, 1, {}, tmp_path), tmp_path)
+    with pytest.raises(ValueError, match=reason):
+        fleet._plan(tmp_path, asked, replan=replan)
+
+
+def test_options_that_a_cluster_ignores_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="--memory-max is for shards without --on"):
+        fleet.up(worlds=1, first_address=free_addresses(1), memory_max=9, on="local", data=tmp_path)
+
+
+def test_looking_for_a_robot_makes_no_registry(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match=r"^roboglot fleet: there is no file .*typo.db$"):
+        fleet.where("a", registry=str(tmp_path / "typo.db"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_log_is_named(tmp_path: Path) -> None:
+    save(plan_fleet(1, 1, {}, tmp_path), tmp_path)
+    with pytest.raises(SystemExit, match=r"^roboglot fleet: .*/shards/w1/log: No such file or directory$"):
+        fleet.logs("a1", data=tmp_path)
+
+
+def test_processor_time_begins_at_zero_after_a_restart(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    looks = [(1, 500.0), (2, 3.0)]  # processes, s
+
+    def look(*_: object) -> Answer:
+        pid, cpu = looks.pop(0)
+        return Answer([Row("w1", "ready", pid, [], 0.0, 1, 1.0, 0, cpu, "", "", "")], 1)
+
+    times = iter((100.0, 106.0))
+    monkeypatch.setattr(fleet, "_ask", look)
+    monkeypatch.setattr(fleet, "time", SimpleNamespace(sleep=lambda _: None, monotonic=lambda: next(times)))
+    fleet.top(once=True, period=6.0)
+    assert capsys.readouterr().out.splitlines()[1].split()[4] == "0.50"
+
+
+async def test_only_robots_that_are_up_are_counted(tmp_path: Path) -> None:
+    plan = plan_fleet(2, 3, {}, tmp_path)
+    shards = Shards(plan, tmp_path)
+    shards.turn_to(shards["w1"], State.READY)
+    host = cast("FleetHost", SimpleNamespace(plan=plan, shards=shards))
+    assert fleet._up(host, 1.0, 0.0, "").startswith("1 of 2 worlds with 3 robots are up")

@@ -23,7 +23,7 @@ KINDS = {"RobotError", "ProgramError", "BadParameters", "BadCondition", "Problem
 # Pages show their ValueError and RuntimeError, too.
 OUTSIDE = ("config.py", "console/", "model/", "rehearsal.py", "runtime.py", "simulation/", *CONFIGS)
 TAILS = "spelling.py"  # what it returns is added to sentences
-NAMED = {"why", "reason", "words", "wrong"}  # variables and arguments that hold such a sentence
+NAMED = {"cause", "why", "reason", "words", "wrong"}  # variables and arguments that hold such a sentence
 # Position of the argument, where not the first.
 LATER = {"set": 4, "_Watch": 4, "refuse": 1, "Problem": 1, "write": 1, "state": 1, "_answer": 1}
 HOLE = "{}"

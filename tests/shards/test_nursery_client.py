@@ -68,3 +68,20 @@ async def test_nursery_is_started_until_it_can(tmp_path: Path, monkeypatch: pyte
     assert (dead, starts.count) == ([3], 3)
     await client.close()
     starts.ends[1].close()
+
+
+async def test_failed_fork_leaves_no_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[socket.socket] = []
+
+    def noted() -> tuple[socket.socket, socket.socket]:
+        made.extend(pair())
+        return made[0], made[1]
+
+    client = NurseryClient(lambda *_: None, lambda *_: None)
+    ours, theirs = pair()
+    client._control = ours
+    monkeypatch.setattr(module, "pair", noted)
+    theirs.close()
+    with ours, pytest.raises(OSError, match="Broken pipe"):
+        client.fork(3, tmp_path, sys.stderr.fileno())
+    assert [end.fileno() for end in made] == [-1, -1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import subprocess
 import sys
 from contextlib import closing
@@ -12,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.shards import warm_up
-from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet, save
+from roboglot.shards.plan import FIRST_ADDRESS, PLAN, kept_after, load, plan_fleet, save
 from roboglot.shards.warm_up import ENVIRONMENT
 from roboglot.storage.database import connect
 from roboglot.storage.transfer import copy_robot, forget_robot
@@ -61,6 +63,10 @@ def test_shards_are_found_by_their_robots() -> None:
         (1, 1, {}, "10.0.0.1", "others could reach"),
         (1, 1, {}, "somewhere", "first address"),
         (2, 1, {}, "255.255.255.254", "no 2 addresses"),
+        (1, 1, {"data": "/var/robots"}, FIRST_ADDRESS, "must not have `data`"),
+        (1, 1, {"lockstep": True}, FIRST_ADDRESS, "no standard input"),
+        (2, 0, {"robots": [{"body": "slamware://10.0.0.1"}]}, FIRST_ADDRESS, "share the real robot slamware://10"),
+        (2, 1, {"record": {"to": "lesson.mcap"}}, FIRST_ADDRESS, "share the recording .*lesson.mcap: `to` must be a"),
     ],
 )
 def test_plans_that_cannot_be_are_refused(
@@ -87,6 +93,48 @@ def test_files_of_a_template_are_found_from_everywhere(tmp_path: Path, monkeypat
     assert [robot["body"] for robot in settings["robots"]] == there
     server = plan_fleet(1, 1, {"world": "yard", "registry": "postgresql://host/name"}, tmp_path).shards[0].settings
     assert (server["world"], server["registry"]) == ("yard", "postgresql://host/name")
+
+
+def test_each_world_records_to_its_own_folder() -> None:
+    plan = plan_fleet(2, 1, {"record": {"to": "/rec", "ring": True}}, Path("/nowhere"))
+    assert [shard.settings["record"] for shard in plan.shards] == [
+        {"to": "/rec/w1/", "ring": True},
+        {"to": "/rec/w2/", "ring": True},
+    ]
+
+
+def test_a_stored_plan_needs_no_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = plan_fleet(1, 1, {}, tmp_path)
+    save(plan, tmp_path)
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    save(plan, tmp_path)
+    with pytest.raises(OSError, match="No space left on device") as failed:
+        save(plan_fleet(2, 1, {}, tmp_path), tmp_path)
+    assert failed.value.filename == str(tmp_path / PLAN)
+    assert [path.name for path in tmp_path.iterdir()] == [PLAN]
+    assert load(tmp_path) == plan
+
+
+@pytest.mark.parametrize("before", [True, False])
+def test_a_failed_plan_gives_way_to_the_last(tmp_path: Path, before: bool) -> None:
+    old = plan_fleet(1, 1, {}, tmp_path) if before else None
+    if old:
+        save(old, tmp_path)
+    new = plan_fleet(2, 1, {"world": "moon"}, tmp_path)
+
+    def try_it(hopeless: type[Exception]) -> None:
+        with kept_after(hopeless, tmp_path):
+            save(new, tmp_path)
+            raise KeyError
+
+    for hopeless, stored in ((KeyError, old), (ValueError, new)):
+        with pytest.raises(KeyError):
+            try_it(hopeless)
+        assert load(tmp_path) == stored
 
 
 def test_a_plan_is_kept(tmp_path: Path) -> None:

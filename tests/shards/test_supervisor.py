@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 import socket
 from collections.abc import AsyncIterator, Callable
@@ -13,9 +14,10 @@ import pytest
 
 from roboglot.shards import supervisor as module
 from roboglot.shards.messages import Beat, News, Ready, Refusal, encode, pair
-from roboglot.shards.plan import plan_fleet
-from roboglot.shards.states import Shard, State
-from roboglot.shards.supervisor import STARTING_MAX, Supervisor
+from roboglot.shards.plan import PLAN, plan_fleet
+from roboglot.shards.shard import SETTINGS
+from roboglot.shards.states import FleetEnds, Shard, State
+from roboglot.shards.supervisor import REPORT_MAX, STARTING_MAX, Supervisor
 
 
 class FakeNursery:
@@ -26,6 +28,7 @@ class FakeNursery:
         self.links: dict[int, socket.socket] = {}
         self.forked: list[int] = []
         self.ended: list[tuple[int, int]] = []
+        self.killed = 0
 
     def open(self) -> None:
         pass
@@ -42,6 +45,9 @@ class FakeNursery:
 
     def end(self, number: int, kind: int) -> None:
         self.ended.append((number, kind))
+
+    def kill(self) -> None:
+        self.killed += 1
 
     async def close(self) -> None:
         for link in self.links.values():
@@ -94,6 +100,15 @@ async def test_dead_one_returns_at_growing_distances(
     nursery_of(supervisor).die(1, 1)
     assert first(supervisor).state is State.FAILED
     assert first(supervisor).again is not None, "it is tried again"
+    assert first(supervisor).reason == "it ended with status 1", "not that of an earlier end"
+
+
+async def test_reason_is_that_of_the_last_end(supervisor: Supervisor) -> None:
+    nursery_of(supervisor).say(1, Refusal("127.10.0.1:1448 is in use", lasting=False))
+    nursery_of(supervisor).die(1, 1)
+    assert first(supervisor).reason == "127.10.0.1:1448 is in use"
+    await supervisor.shards.until(lambda: nursery_of(supervisor).forked.count(1) == 2)
+    nursery_of(supervisor).die(1, -signal.SIGKILL)
     assert first(supervisor).reason == "killed by SIGKILL"
 
 
@@ -132,10 +147,48 @@ async def test_one_that_grows_too_large_is_restarted_orderly(supervisor: Supervi
     assert "200 MB of 100" in first(supervisor).reason
 
 
-async def test_one_that_is_silent_is_killed(supervisor: Supervisor) -> None:
+async def test_one_that_is_silent_is_killed(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:
     first(supervisor).heard = first(supervisor).since = -1e9
     supervisor._look_after()
-    assert (1, signal.SIGKILL) in nursery_of(supervisor).ended
+    supervisor._look_after()
+    assert nursery_of(supervisor).ended == [(1, signal.SIGKILL)] * 2
+    assert len(caplog.records) == 1
+
+
+@pytest.mark.parametrize("pid", [0, 2**22 + 1, os.getpid()], ids=["never reported", "gone", "cannot be killed"])
+async def test_nursery_that_reports_no_end_is_killed(supervisor: Supervisor, pid: int) -> None:
+    """A shard whose process is still there, as it waits for a disk, is not the nursery's fault."""
+    shard = first(supervisor)
+    shard.heard = shard.since = -1e9
+    supervisor._look_after()
+    shard.pid = pid
+    supervisor._look_after()
+    assert nursery_of(supervisor).killed == 0, "it has a moment to report the end"
+    shard.killed_at -= REPORT_MAX
+    supervisor._look_after()
+    assert nursery_of(supervisor).killed == (pid != os.getpid())
+
+
+async def test_one_that_has_ended_uses_nothing(supervisor: Supervisor) -> None:
+    nursery_of(supervisor).say(1, Beat(1.0, 67 << 20, 3.0))
+    nursery_of(supervisor).die(1, -signal.SIGKILL)
+    assert (first(supervisor).beat, first(supervisor).pid) == (Beat(0.0, 0, 0.0), 0)
+
+
+async def test_a_stop_ends_when_the_fleet_does(supervisor: Supervisor) -> None:
+    stopping = asyncio.create_task(supervisor.stop(first(supervisor)))
+    restarting = asyncio.create_task(supervisor.restart(supervisor.shards["w2"]))
+    await asyncio.sleep(0)
+    supervisor.shards.end()
+    async with asyncio.timeout(10.0):
+        ends = await asyncio.gather(stopping, restarting, return_exceptions=True)
+    assert [type(end) for end in ends] == [FleetEnds, FleetEnds]
+
+
+async def test_settings_are_their_owners_alone(supervisor: Supervisor) -> None:
+    """A database's URL may hold a password."""
+    for file in (supervisor.folder / PLAN, first(supervisor).folder / SETTINGS):
+        assert file.stat().st_mode & 0o777 == 0o600
 
 
 async def test_stopping_one_that_waits_needs_no_process(supervisor: Supervisor) -> None:

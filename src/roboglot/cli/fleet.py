@@ -81,7 +81,7 @@ def up(
     with launched(wanted=not on) as nursery:  # it loads while we import what a plan needs
         from roboglot.hosting.folder_lock import FolderInUse
         from roboglot.hosting.logs import set_up_logging
-        from roboglot.shards.plan import PLAN
+        from roboglot.shards.plan import kept_after
 
         set_up_logging(verbose=False)
         folder = _folder(data)
@@ -90,14 +90,11 @@ def up(
             plan = _plan(folder, asked, replan=replan)
             if detached and on in ("", "local"):
                 raise ValueError("--detached is for a cluster: --on ray://HOST")
+            if memory_max and on:
+                raise ValueError("--memory-max is for shards without --on: Ray places and limits its own")
             where = _Where(on, detached, memory_max << 20, nursery)
-            new = not (folder / PLAN).exists()
-            with _joined(plan, on):
+            with _joined(plan, on), kept_after(NoWorld, folder):
                 asyncio.run(_serve(lambda: _fleet_host(plan, folder, where), folder, began))
-        except NoWorld as error:
-            if new:  # so that the next start may have another plan
-                (folder / PLAN).unlink(missing_ok=True)
-            sys.exit(f"roboglot fleet: {error}")
         except (ValueError, OSError, FolderInUse, NotWarm, MissingExtra) as error:
             sys.exit(f"roboglot fleet: {in_words(error)}")
 
@@ -131,19 +128,19 @@ def top(
     """Show each shard's processor time and memory, and whether it keeps up with robot time."""
     terminal = sys.stdout.isatty()
     ends = not terminal if once is None else once
-    before = {row.name: (row.cpu, time.monotonic()) for row in _ask("look", data).shards}
+    before = {row.name: (row.pid, row.cpu, time.monotonic()) for row in _ask("look", data).shards}
     while True:
         time.sleep(period)
         answer, now = _ask("look", data), time.monotonic()
         lines = [HEAD]
         for row in answer.shards:
-            cpu, at = before.get(row.name, (row.cpu, now))
-            core = (row.cpu - cpu) / (now - at) if now > at else 0.0
+            pid, cpu, at = before.get(row.name, (0, 0.0, now))
+            core = (row.cpu - (cpu if row.pid == pid else 0.0)) / (now - at) if now > at else 0.0
             lines.append(
                 f"{row.name:6} {row.state:9} {row.pid:8} {len(row.robots):6} {core:6.2f}"
                 f" {row.memory / MEGABYTE:6.0f} {row.factor:7.2f} {row.restarts:8}"
             )
-            before[row.name] = row.cpu, now
+            before[row.name] = row.pid, row.cpu, now
         memory = sum(row.memory for row in answer.shards) / MEGABYTE
         robots = sum(len(row.robots) for row in answer.shards)
         lines.append(f"{len(answer.shards)} shards, {robots} robots, {memory:.0f} MB; nursery {answer.nursery}")
@@ -195,16 +192,16 @@ def where(
 ) -> None:
     """Show the program that runs a robot, on any machine, with its address and epoch."""
     from roboglot.storage.homes import Homes
-    from roboglot.storage.opening import open_registry
-    from roboglot.storage.transactions import DatabaseError
+    from roboglot.storage.opening import read_registry
+    from roboglot.storage.transactions import FAILURES
 
     if not registry:
         sys.exit("roboglot fleet: give the registry's URL or file: --registry, or ROBOGLOT_REGISTRY")
     try:
-        database = open_registry(registry)
+        database = read_registry(registry)
         homes = asyncio.run(Homes(database).all())
         database.close()
-    except (ValueError, OSError, DatabaseError, sqlite3.Error) as error:
+    except (ValueError, OSError, sqlite3.Error, *FAILURES) as error:
         sys.exit(f"roboglot fleet: {in_words(error)}")
     if robot and robot not in homes:
         sys.exit(f"roboglot fleet: the registry knows no robot {robot!r}")
@@ -230,7 +227,7 @@ def logs(
         with (folder / "shards" / plan.find(shard).name / LOG_FILE).open(encoding="utf-8", errors="replace") as file:
             print(visible("".join(deque(file, lines))), end="")
     except (LookupError, ValueError, OSError) as error:
-        sys.exit(f"roboglot fleet: {error.args[0] if isinstance(error, LookupError) else error}")
+        sys.exit(f"roboglot fleet: {error.args[0] if isinstance(error, LookupError) else in_words(error)}")
 
 
 def _folder(data: Path | None) -> Path:
@@ -248,14 +245,16 @@ class _Asked(NamedTuple):
 
 def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     """Return the stored plan, or a new one. Raises ValueError if the stored one has other options."""
-    from roboglot.shards.plan import FIRST_ADDRESS, load, plan_fleet
+    from roboglot.shards.plan import FIRST_ADDRESS, PLAN, load, plan_fleet
     from roboglot.text_files import parse_toml, text_of
 
     kept = None if replan else load(folder)
     if kept is not None and not any(asked):
         return kept
     if not asked.worlds:
-        raise ValueError(f"there is no fleet in {folder} yet: give --worlds")
+        there = (folder / PLAN).exists()
+        why = "options of a plan need --worlds" if there else f"there is no fleet in {folder} yet: give --worlds"
+        raise ValueError(why)
     try:
         template = parse_toml(text_of(asked.template)) if asked.template else {}
     except OSError as error:
@@ -328,7 +327,7 @@ async def _serve(fleet_host: Callable[[], FleetHost], folder: Path, began: float
         starting.cancel()
         ending.cancel()
         await page.close()
-        await commands.close()
+        await commands.close()  # first, as a move must be over before the folder is released
         await host.close()
         await classes.close()
 
@@ -348,11 +347,12 @@ def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
     from roboglot.shards.states import State
 
     shards = list(fleet_host.shards.values())
-    ready, robots = sum(shard.state is State.READY for shard in shards), sum(len(s.plan.robots) for s in shards)
+    ready = [shard for shard in shards if shard.state is State.READY]
+    robots = sum(len(shard.plan.robots) for shard in ready)
     where = f"; all on one page: {page}" if page else ""
     loading = f" ({warm:.1f} s of it to load)" if warm else ""
     return (
-        f"{ready} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s{loading};"
+        f"{len(ready)} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s{loading};"
         f" robots on {_first_address(fleet_host)} and up{where}."
         " `roboglot fleet list` shows them."
     )

@@ -65,7 +65,7 @@ class ShardActor:
         import ray
 
         from roboglot.hosting.logs import set_up_logging
-        from roboglot.shards.shard import SETTINGS
+        from roboglot.shards.shard import write_settings
 
         self._node = ray.get_runtime_context().get_node_id()[:NODE_DIGITS]
         self._run = secrets.randbits(RUN_BITS) or 1
@@ -78,8 +78,7 @@ class ShardActor:
         if of_node:
             place /= self._node
             settings = settings | {"data": str(Path(str(settings["data"])) / self._node)}
-        place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        (place / SETTINGS).write_bytes(msgspec.json.encode(settings))
+        write_settings(place, settings)
         set_up_logging(verbose=False)
         own = logging.getLogger("roboglot")
         own.setLevel(logging.INFO)

@@ -70,7 +70,8 @@ class FleetClasses:
                 assert task is not None
                 self._worlds.add(task)
                 task.add_done_callback(self._worlds.discard)
-                await _Link(room, writer).serve(reader)
+                with contextlib.suppress(asyncio.CancelledError):  # of `close`; asyncio's streams would log it
+                    await _Link(room, writer).serve(reader)
 
             self._server = await asyncio.start_unix_server(serve, sock=listening, limit=LINE_MAX)
         except OSError as error:

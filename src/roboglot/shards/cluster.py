@@ -158,6 +158,7 @@ class ClusterFleet:
 
     async def close(self) -> None:
         """Stop all shards, unless ``lasting``, and release the folder."""
+        self.shards.end()
         tasks = [task for task in (self._watch, self._silence) if task is not None]
         for task in tasks:
             task.cancel()
@@ -175,7 +176,7 @@ class ClusterFleet:
             self.shards.turn_to(shard, State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
-        """Restart a shard, or start it; return when it is ready or has failed. Raises OSError in one sentence."""
+        """Restart a shard, or start it; return when it is ready or has failed. Raises FleetEnds, OSError."""
         try:
             await self.stop(shard)
             shard.hopeless, shard.reason = False, ""

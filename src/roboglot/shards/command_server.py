@@ -11,10 +11,13 @@ import msgspec
 
 from roboglot.hosting.local_socket import LocalServer
 from roboglot.shards.fleet_host import FleetHost
-from roboglot.shards.moving import move_robot
+from roboglot.shards.moving import NotForgotten, move_robot
 from roboglot.shards.requests import SOCKET, Answer, Request, RobotRow, Row
-from roboglot.shards.states import Shard
+from roboglot.shards.states import FleetEnds, Shard, State
 from roboglot.validation import why_invalid
+
+REFUSALS = LookupError, ValueError, FleetEnds
+FAILURES = OSError, sqlite3.Error, NotForgotten
 
 
 class CommandServer(LocalServer):
@@ -24,6 +27,14 @@ class CommandServer(LocalServer):
         self._host = host
         super().__init__(folder / SOCKET, "roboglot fleet", self._answer)
         self._turn = asyncio.Lock()
+        self._closing = False
+
+    async def close(self) -> None:
+        """Refuse further commands, wait for one in progress, which fails instead of waiting for a shard, and close."""
+        self._closing = True
+        self._host.shards.end()
+        async with self._turn:
+            await super().close()
 
     async def _answer(self, line: bytes) -> bytes:
         error = ""
@@ -31,36 +42,69 @@ class CommandServer(LocalServer):
             request = msgspec.json.decode(line, type=Request)
             if request.do != "look":
                 async with self._turn:
-                    await self._grant(request)
+                    error = await self._carry_out(request)
         except msgspec.DecodeError as refused:
             error = why_invalid(refused, "the request", wanted=Request)
-        except (LookupError, ValueError, OSError, sqlite3.Error) as refused:
+        except REFUSALS as refused:
             error = _why(refused)
         rows = [_row(shard) for shard in self._host.shards.values()]
         return msgspec.json.encode(Answer(rows, self._host.nursery, error))
 
-    async def _grant(self, request: Request) -> None:
-        host = self._host
-        if request.do in ("move", "reset") and not host.stores_here:
+    async def _carry_out(self, request: Request) -> str:
+        """Carry out a command; return what failed, empty: nothing. Raises one of REFUSALS if it does nothing."""
+        if self._closing:
+            raise FleetEnds("the fleet ends")
+        if request.do in ("move", "reset") and not self._host.stores_here:
             raise ValueError(f"{request.do} is for fleets of one machine: robots of a cluster store in the database")
+        shards, failed = self._shards_of(request), ""
+        try:
+            await self._act(request, shards)
+        except FAILURES as error:
+            failed = _why(error)
+        down = [f"{s.plan.name} is down: {s.reason}" for s in shards if s.state is State.FAILED]
+        if failed:
+            return "; ".join([failed, *down])
+        return _done(request) + "; ".join(down) if down else ""
+
+    async def _act(self, request: Request, shards: list[Shard]) -> None:
+        host = self._host
         match request.do:
             case "move":
                 await move_robot(host, request.robot, request.to)
             case "reset":
-                await _reset(host, self._shard(request.shard))
+                await _reset(host, shards[0])
             case verb:
-                shards = [self._shard(request.shard)] if request.shard else list(host.shards.values())
-                act = host.stop if verb == "stop" else host.restart
-                await asyncio.gather(*map(act, shards))
+                ends = await asyncio.gather(
+                    *map(host.stop if verb == "stop" else host.restart, shards), return_exceptions=True
+                )
+                for error in filter(None, ends):
+                    raise error
 
-    def _shard(self, name: str) -> Shard:
-        return self._host.shards[self._host.plan.find(name).name]
+    def _shards_of(self, request: Request) -> list[Shard]:
+        """Return the shards that a command stops or starts. Raises LookupError."""
+        plan = self._host.plan
+        if request.do == "move":
+            plans = [plan.home_of(request.robot), plan.shard(request.to)]
+        else:
+            plans = [plan.find(request.shard)] if request.shard or request.do == "reset" else plan.shards
+        return [self._host.shards[one.name] for one in plans]
+
+
+def _done(request: Request) -> str:
+    """Return what a command has done, before the report of shards that are down."""
+    match request.do:
+        case "move":
+            return f"{request.robot} is in {request.to} now, but "
+        case "reset":
+            return "its data is deleted, but "
+        case _:
+            return ""
 
 
 async def _reset(host: FleetHost, shard: Shard) -> None:
     """Delete a shard's stored data (programs, maps, places, certificates) and restart it.
 
-    Raises ValueError if the data is in a database, OSError if the folder cannot be deleted.
+    Raises ValueError if the data is in a database, OSError if the folder cannot be deleted, FleetEnds.
     """
     if shard.plan.settings.get("database"):
         raise ValueError("reset deletes the folders of shards, but these robots store in the database")

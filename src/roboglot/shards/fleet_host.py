@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
 from roboglot.shards.plan import FleetPlan
-from roboglot.shards.states import Shard
+from roboglot.shards.states import Shard, Shards
 
 
 class FleetHost(Protocol):
@@ -17,7 +16,7 @@ class FleetHost(Protocol):
     folder: Path
 
     @property
-    def shards(self) -> Mapping[str, Shard]:
+    def shards(self) -> Shards:
         """All shards by name."""
 
     @property
@@ -35,7 +34,7 @@ class FleetHost(Protocol):
         """Stop all shards that do not outlive this program."""
 
     async def stop(self, shard: Shard) -> None:
-        """Stop a shard and leave it stopped."""
+        """Stop a shard and leave it stopped. Raises FleetEnds."""
 
     async def restart(self, shard: Shard) -> None:
-        """Restart a shard, or start it; return when it is ready or has failed."""
+        """Restart a shard, or start it; return when it is ready or has failed. Raises FleetEnds."""

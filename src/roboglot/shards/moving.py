@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sqlite3
 from pathlib import Path
 
 from roboglot.config import ROBOTS_MAX, serial_of
@@ -14,11 +15,16 @@ from roboglot.storage.transfer import copy_robot, forget_robot
 DATABASE = "roboglot.db"  # in a shard's data folder
 
 
+class NotForgotten(Exception):
+    """A robot has moved, and its old shard still has a copy of its data, which a move back would replace."""
+
+
 async def move_robot(supervisor: FleetHost, robot: str, to: str) -> None:
     """Move a robot to shard ``to``; both shards are down meanwhile. Raises LookupError, ValueError if it cannot move.
 
     Its rows are copied, then the plan is changed, then the old rows are removed: a crash at any moment leaves the robot
-    in one shard, with all its rows. So does a full disk, which raises OSError or sqlite3.Error.
+    in one shard, with all its rows. So does a full disk, which raises OSError or sqlite3.Error. Raises NotForgotten if
+    the robot has moved and its old rows are still there, and FleetEnds.
     """
     plan = supervisor.plan
     old, new = plan.home_of(robot), plan.shard(to)
@@ -45,7 +51,10 @@ async def move_robot(supervisor: FleetHost, robot: str, to: str) -> None:
             new.settings["robots"].remove(moved)
             old.settings["robots"].insert(at, settings)
             raise
-        await asyncio.to_thread(forget_robot, robot, _database(old))
+        try:
+            await asyncio.to_thread(forget_robot, robot, _database(old))
+        except (OSError, sqlite3.Error) as error:
+            raise NotForgotten(f"{robot} is in {new.name}, but {old.name} keeps a copy of its data: {error}") from None
     finally:
         await asyncio.gather(*map(supervisor.restart, running))
 

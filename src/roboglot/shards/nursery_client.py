@@ -106,9 +106,14 @@ class NurseryClient:
         if self._control is None:
             raise OSError("there is no nursery")
         ours, theirs = pair()
-        with theirs:
+        try:
             packet = encode(Fork(number, str(folder)))
             socket.send_fds(self._control, [packet], [theirs.fileno(), log_file])
+        except BaseException:
+            ours.close()
+            raise
+        finally:
+            theirs.close()
         ours.setblocking(False)
         self._living.add(number)
         return ours
@@ -118,6 +123,11 @@ class NurseryClient:
         if self._control is not None and number in self._living:
             with contextlib.suppress(OSError):
                 self._control.send(encode(End(number, kind)))
+
+    def kill(self) -> None:
+        """Kill the nursery, which is then started again."""
+        if self._process is not None:
+            self._process.kill()
 
     async def close(self) -> None:
         """End the nursery, and with it every shard."""

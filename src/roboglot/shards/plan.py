@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from ipaddress import IPv4Address, ip_address
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from roboglot.spelling import instead, meant
 WORLDS_MAX = 500
 FIRST_ADDRESS = "127.10.0.1"
 PLAN = "fleet.json"
+RECORDED = ".mcap"
 FILES = {"registry", "people", "certificate", "key", "to", "cloud", "uart", "ca"}  # settings, of sections, too
 NAMES_OR_FILES, SUFFIX = {"world", "body"}, re.compile(r"\.(toml|ya?ml)(\+|$)")
 NAMES = "abcdefghijklmnopqrstuvwxyz"
@@ -84,7 +86,7 @@ def plan_fleet(
         raise ValueError(f"between 1 and {WORLDS_MAX} worlds, not {worlds}")
     if not 0 <= robots_each <= ROBOTS_MAX:
         raise ValueError(f"between 1 and {ROBOTS_MAX} robots in each world, not {robots_each}")
-    settings_of(template, origin="the template")
+    _refuse_unshareable(settings_of(template, origin="the template"), worlds)
     request = {"worlds": worlds, "first_address": first, "template": template}
     template = _anchored(template)
     robots = template.get("robots") or _robots(robots_each or 1)
@@ -95,6 +97,8 @@ def plan_fleet(
             "robots of a template must not have addresses or serial numbers: each world needs its own; see"
             " --first-address"
         )
+    if "data" in template:
+        raise ValueError("a template must not have `data`: each world has a folder of its own in that of --data")
     addresses = _addresses(first, worlds * len(robots))
     shards: list[ShardPlan] = []
     for number in range(1, worlds + 1):
@@ -103,6 +107,8 @@ def plan_fleet(
         settings["robots"] = [
             {**robot, "name": f"{robot.get('name', 'a')}{number}", "address": next(addresses)} for robot in robots
         ]
+        if to := template.get("record", {}).get("to"):
+            settings["record"] = {**template["record"], "to": f"{to}/w{number}/"}
         if "access" in template:  # one list of people for all worlds
             settings["access"] = {"people": str(data), **template["access"]}
         settings["console"] = _console(template, settings["robots"][0]["address"], number)
@@ -114,19 +120,56 @@ def plan_fleet(
     return plan
 
 
+def _refuse_unshareable(config: Config, worlds: int) -> None:
+    """Raise ValueError if several worlds cannot have these settings."""
+    if config.lockstep:
+        raise ValueError("a template must not have `lockstep`: worlds of a fleet have no standard input")
+    if worlds > 1 and (real := next((robot.body for robot in config.robots if robot.is_real), "")):
+        raise ValueError(f"{worlds} worlds cannot share the real robot {real}")
+    if (to := Path(config.record.to)).suffix == RECORDED:
+        raise ValueError(f"worlds cannot share the recording {to}: `to` must be a folder, in which each has its own")
+
+
 def checked(shard: ShardPlan) -> Config:
     """Return the shard's configuration. Raises ValueError."""
     return settings_of(shard.settings)
 
 
 def save(plan: FleetPlan, folder: Path) -> None:
-    """Write the plan; a crash leaves the old or the new one."""
-    fresh = folder / f"{PLAN}.new"
-    with fresh.open("wb") as file:
-        file.write(msgspec.json.format(msgspec.json.encode(plan), indent=1))
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(folder / PLAN)
+    """Write the plan; one that is stored already is left alone, as the disk may be full. Raises OSError."""
+    _store(msgspec.json.format(msgspec.json.encode(plan), indent=1), folder)
+
+
+def _store(text: bytes, folder: Path) -> None:
+    """Write a plan, which may hold a database's password, for its owner only; a crash leaves the old or the new one."""
+    stored, fresh = folder / PLAN, folder / f"{PLAN}.new"
+    if stored.is_file() and stored.read_bytes() == text:
+        return
+    try:
+        with fresh.open("wb") as file:
+            os.fchmod(file.fileno(), 0o600)
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.replace(stored)
+    except OSError as error:
+        fresh.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(stored)) from None
+
+
+@contextmanager
+def kept_after(failure: type[Exception], folder: Path) -> Iterator[None]:
+    """Context that ends with the plan it began with, or none, after ``failure``: another was stored and tried."""
+    stored = folder / PLAN
+    before = stored.read_bytes() if stored.is_file() else None
+    try:
+        yield
+    except failure:
+        if before is None:
+            stored.unlink(missing_ok=True)
+        else:
+            _store(before, folder)
+        raise
 
 
 def load(folder: Path) -> FleetPlan | None:

@@ -22,6 +22,7 @@ from roboglot.hosting.error_text import in_words
 from roboglot.hosting.folder_lock import FolderInUse
 from roboglot.hosting.logs import set_up_logging
 from roboglot.hosting.process import end_in_any_case, prepare
+from roboglot.model.errors import RobotError
 from roboglot.protocols import sections
 from roboglot.shards.messages import Beat, News, Ready, Refusal, encode
 
@@ -37,6 +38,14 @@ WEIGHED = 10  # heartbeats between two measurements of memory, which take 3 ms
 def settings_of(values: dict[str, object], origin: str = "configuration") -> Config:
     """Return the configuration of a shard from its plan's values. Raises ValueError that names ``origin``."""
     return config_of(values, doors=sections(), origin=origin)
+
+
+def write_settings(folder: Path, settings: dict[str, object]) -> None:
+    """Write a shard's settings, which may hold a database's password, for their owner only. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    with (folder / SETTINGS).open("wb") as file:
+        os.fchmod(file.fileno(), 0o600)
+        file.write(msgspec.json.encode(settings))
 
 
 def run(folder: str, link: socket.socket) -> int:
@@ -104,9 +113,9 @@ async def _serve(config: Config, reporter: Reporter, class_home: ClassHome | Non
     reporter.watch(stop)
     try:
         runtime = Runtime(config, class_home=class_home)
-    except (FolderInUse, ValueError, OSError, sqlite3.Error) as error:
+    except (FolderInUse, ValueError, OSError, sqlite3.Error, RobotError) as error:
         # A killed predecessor may hold folder and addresses for a moment; wrong settings stay wrong.
-        reporter.send(Refusal(in_words(error), lasting=isinstance(error, ValueError)))
+        reporter.send(Refusal(_why(error), lasting=isinstance(error, ValueError)))
         return 1
     try:
         await runtime.start()
@@ -120,12 +129,17 @@ async def _serve(config: Config, reporter: Reporter, class_home: ClassHome | Non
         await stop.wait()
         end_in_any_case()
         beating.cancel()
-    except OSError as error:
-        reporter.send(Refusal(error.strerror or str(error), lasting=False))
+    except (OSError, RobotError) as error:  # a taken address; nothing can be recorded; the database fails
+        reporter.send(Refusal(_why(error), lasting=False))
         return 1
     finally:
         await runtime.close()
     return 0
+
+
+def _why(error: Exception) -> str:
+    """Return why a shard cannot start, in one sentence."""
+    return open_files.in_words() if open_files.ran_out(error) else in_words(error)
 
 
 async def _beat(runtime: Runtime, reporter: Reporter) -> None:

@@ -26,6 +26,10 @@ class State(StrEnum):
     FAILED = "failed"  # retried, unless its settings are wrong
 
 
+class FleetEnds(Exception):
+    """The fleet ends, so no shard reaches the state that a command waits for."""
+
+
 class Shard:
     """One shard: its state and its last report."""
 
@@ -36,9 +40,11 @@ class Shard:
         self.slow_for = 0  # checks in a row
         self.since = 0.0  # s by the loop's clock: start of the state
         self.heard = 0.0  # s by the loop's clock
+        self.killed_at = 0.0  # s by the loop's clock; 0: not in this state
         self.beat = Beat(0.0, 0, 0.0)
         self.ready: Ready | None = None
-        self.reason = ""
+        self.reason = ""  # of its last end
+        self.cause = ""  # of its next end, if that is known before
         self.hopeless = False
         self.link: socket.socket | None = None
         self.again: asyncio.TimerHandle | None = None
@@ -58,18 +64,26 @@ class Shards(dict[str, Shard]):
             for number, shard in enumerate(plan.shards, start=1)
         )
         self._changed = asyncio.Event()  # set with every change of a state
+        self._ends = False
         self._loop = asyncio.get_running_loop()
 
     def turn_to(self, shard: Shard, state: State) -> None:
         """Change a shard's state; one that was stopped by request has no reason."""
-        shard.state, shard.since = state, self._loop.time()
+        shard.state, shard.since, shard.killed_at = state, self._loop.time(), 0.0
         if state is State.STOPPED:
             shard.reason = ""
         self._changed.set()
 
+    def end(self) -> None:
+        """Let every wait fail that has not come to its end, and all further ones."""
+        self._ends = True
+        self._changed.set()
+
     async def until(self, condition: Callable[[], bool]) -> None:
-        """Wait until a condition on shards holds."""
+        """Wait until a condition on shards holds. Raises FleetEnds."""
         while not condition():
+            if self._ends:
+                raise FleetEnds("the fleet ends")
             self._changed.clear()
             await self._changed.wait()
 

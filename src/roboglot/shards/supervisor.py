@@ -15,7 +15,7 @@ from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
 from roboglot.shards.nursery_client import NotWarm, NurseryClient, StartedNursery
 from roboglot.shards.plan import FleetPlan, save
-from roboglot.shards.shard import SETTINGS
+from roboglot.shards.shard import write_settings
 from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
 
 log = logging.getLogger(__name__)
@@ -23,6 +23,7 @@ STARTING_MAX = 2 * max(2, os.cpu_count() or 2)  # at the same time; a shard wait
 SILENCE_MAX = 10.0  # s without a heartbeat after which a shard counts as hung
 START_MAX = 60.0  # s for a shard to become ready
 STOP_MAX = 12.0  # s for it to close
+REPORT_MAX = 5.0  # s for the nursery to report the end of a shard that was killed
 SLOW, SLOW_FOR, SETTLING = 0.9, 10, 10.0  # x real time; checks in a row; s after the start that are not judged
 STEADY = 60.0  # s of running after which earlier crashes are forgotten
 PAUSES = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)  # s before the next attempt, by the number of crashes in a row
@@ -75,6 +76,7 @@ class Supervisor:
     async def close(self) -> None:
         """Stop all shards, the nursery, and release the folder."""
         self._closing = True
+        self.shards.end()
         for handle in (self._watch, self._turn, *(shard.again for shard in self.shards.values())):
             if handle is not None:
                 handle.cancel()
@@ -84,7 +86,7 @@ class Supervisor:
         os.close(self._lock)
 
     async def stop(self, shard: Shard) -> None:
-        """Stop a shard and leave it stopped."""
+        """Stop a shard and leave it stopped. Raises FleetEnds."""
         if shard.again is not None:
             shard.again.cancel()
         if shard.state in (State.WAITING, State.FAILED):
@@ -95,7 +97,7 @@ class Supervisor:
             await self.shards.until(lambda: shard.state is State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
-        """Restart a shard, or start it; return when it is ready or has failed."""
+        """Restart a shard, or start it; return when it is ready or has failed. Raises FleetEnds."""
         await self.stop(shard)
         shard.deaths, shard.hopeless, shard.reason = 0, False, ""
         self._enqueue(shard)
@@ -127,8 +129,7 @@ class Supervisor:
 
     def _fork(self, shard: Shard) -> None:
         try:
-            shard.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            (shard.folder / SETTINGS).write_bytes(msgspec.json.encode(shard.plan.settings))
+            write_settings(shard.folder, shard.plan.settings)
             output = _open_log(shard.folder / LOG_FILE)
             try:
                 shard.link = self._nursery.fork(shard.number, shard.folder, output)
@@ -139,7 +140,7 @@ class Supervisor:
             self._failed(shard)
             return
         self._loop.add_reader(shard.link, self._receive, shard)
-        shard.heard, shard.ready, shard.beat = self._loop.time(), None, Beat(0.0, 0, 0.0)
+        shard.heard, shard.ready, shard.beat, shard.cause = self._loop.time(), None, Beat(0.0, 0, 0.0), ""
         self._turn_to(shard, State.STARTING)
 
     def _receive(self, shard: Shard) -> bool:
@@ -164,7 +165,7 @@ class Supervisor:
             case Beat() as beat:
                 shard.beat = beat
             case Refusal(reason=reason, lasting=lasting):
-                shard.reason, shard.hopeless = reason, lasting
+                shard.cause, shard.hopeless = reason, lasting
         return True
 
     def _born(self, number: int, pid: int) -> None:
@@ -175,13 +176,13 @@ class Supervisor:
         while self._receive(shard):  # its last message
             pass
         self._unlink(shard)
-        shard.pid = 0
+        shard.pid, shard.beat = 0, Beat(0.0, 0, 0.0)
         if shard.state is State.STOPPING or self._closing:
             self._turn_to(shard, State.STOPPED)
             return
         if shard.state is State.READY and self._loop.time() - shard.since > STEADY:
             shard.deaths = 0
-        shard.reason = shard.reason or (
+        shard.reason = shard.cause or (
             f"killed by {signal.Signals(-status).name}" if status < 0 else f"it ended with status {status}"
         )
         self._failed(shard)
@@ -205,18 +206,28 @@ class Supervisor:
         shard.again = self._loop.call_later(pause, self._enqueue, shard)
 
     def _look_after(self) -> None:
-        """Kill hung shards; their death triggers the restart."""
+        """Kill hung shards, whose death triggers the restart, and a nursery that does not report it."""
         now = self._loop.time()
         for shard in self.shards.values():
             limit = {State.STARTING: START_MAX, State.READY: SILENCE_MAX, State.STOPPING: STOP_MAX}.get(shard.state)
             silent = now - (shard.since if shard.state is State.STOPPING else max(shard.heard, shard.since))
             if limit is not None and silent > limit:
-                log.error("shard %s has been silent for %.0f s while %s: killed", shard.plan.name, silent, shard.state)
-                shard.reason = shard.reason or f"it hung while {shard.state}"
-                self._nursery.end(shard.number, signal.SIGKILL)
+                self._kill(shard, silent)
             elif shard.state is State.READY:
                 self._judge(shard)
         self._watch = self._loop.call_later(1.0, self._look_after)
+
+    def _kill(self, shard: Shard, silent: float) -> None:
+        """Kill a hung shard; if the nursery has not reported its end after ``REPORT_MAX`` s, kill that."""
+        if not shard.killed_at:
+            log.error("shard %s has been silent for %.0f s while %s: killed", shard.plan.name, silent, shard.state)
+            shard.cause = shard.cause or f"it hung while {shard.state}"
+            shard.killed_at = self._loop.time()
+        elif self._loop.time() - shard.killed_at > REPORT_MAX and _has_ended(shard.pid):
+            log.error("the nursery hangs: it does not report the end of shard %s: killed", shard.plan.name)
+            self._nursery.kill()
+            return
+        self._nursery.end(shard.number, signal.SIGKILL)
 
     def _judge(self, shard: Shard) -> None:
         """Log that a shard is too slow, once per slowdown; restart a shard that uses too much memory."""
@@ -225,7 +236,7 @@ class Supervisor:
         if shard.slow_for == SLOW_FOR:
             log.warning("shard %s falls behind: %.2f x real time", shard.plan.name, shard.beat.factor)
         if self._memory_max and shard.beat.memory > self._memory_max:
-            shard.reason = f"it had grown to {shard.beat.memory >> 20} MB of {self._memory_max >> 20}"
+            shard.cause = f"it had grown to {shard.beat.memory >> 20} MB of {self._memory_max >> 20}"
             shard.beat = Beat(0.0, 0, 0.0)  # each heartbeat is judged once
             self._nursery.end(shard.number, signal.SIGTERM)
 
@@ -238,6 +249,14 @@ class Supervisor:
             self._loop.remove_reader(shard.link)
             shard.link.close()
             shard.link = None
+
+
+def _has_ended(pid: int) -> bool:
+    """Return True for the process of a shard that has ended, also if its parent does not know yet; and for 0."""
+    try:
+        return not pid or Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except FileNotFoundError:
+        return True
 
 
 def _open_log(path: Path) -> int:

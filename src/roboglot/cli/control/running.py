@@ -9,6 +9,7 @@ from typing import Protocol, TypeVar
 
 import msgspec
 
+from roboglot.hosting.error_text import in_words
 from roboglot.hosting.local_socket import ask
 
 
@@ -37,8 +38,10 @@ def request(
         answer = asyncio.run(exchange(path, request, kind, patience))
     except (FileNotFoundError, ConnectionRefusedError):
         sys.exit(f"roboglot {command}: {absent} in {path.parent}")
+    except TimeoutError:
+        sys.exit(f"roboglot {command}: no answer from {path.parent} in {patience:g} s; it may still be carried out")
     except OSError as error:
-        sys.exit(f"roboglot {command}: {absent} in {path.parent}: {error.strerror or 'it takes too long'}")
+        sys.exit(f"roboglot {command}: no answer from {path.parent}: {in_words(error)}")
     except msgspec.DecodeError:
         sys.exit(f"roboglot {command}: the program in {path.parent} is of another version")
     if answer.error:
