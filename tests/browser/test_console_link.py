@@ -60,7 +60,7 @@ async def test_silent_server_counts_as_lost(
     with monkeypatch.context() as patch:
         patch.setattr(ServerPage, "_reply", lambda *_: None)
         await page.evaluate(QUICKLY)
-        await page.wait_for_selector("text=The connection to roboglot is lost.")
+        await page.wait_for_selector("text=Driving by hand has stopped, other actions may go on;")
         await page.evaluate("delete performance.now")
     await page.wait_for_selector(".link.good >> text=ms")
 

@@ -132,6 +132,8 @@ async def test_program_halts_at_breakpoint_steps_and_runs_on(studio: Open) -> No
     await page.click("text=Go on")
     await phase(page, "idle")
     await prints(page, "6", "9", "12")
+    await page.keyboard.press("Control+s")
+    await shows(page, "document.querySelector('.notice').innerText", "Kept on the robot")
     assert page.errors == []
 
 

@@ -112,4 +112,6 @@ async def test_verdict_of_a_mission_shows_refusals(studio: Open) -> None:
     graded = {"grade": {"stars": 0, "rows": []}, "refused": [call]}
     await page.evaluate("found => import('/studio/missions.js').then(m => { m.outcome.value = found; })", graded)
     await page.wait_for_selector(".panel .failure >> text=motion.turn (m, line 3): too fast")
+    await page.keyboard.press("F5")  # has the robot walk, not the mission's
+    await page.wait_for_selector(".notice >> text=press Try it under Missions")
     assert page.errors == []

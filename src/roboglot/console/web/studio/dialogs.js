@@ -131,7 +131,7 @@ export function Help() {
 }
 effect(() => { if (asked.value) shown.value = "help"; });
 
-const KEYS = [["F5", "run"], ["F8", "step"], ["F10", "over"], ["Shift+F8", "out"], ["F6", "pause"], ["Shift+F5", "stop"], ["F9", "break"], ["T", "toolbox"], ["Enter", "edit"], ["M", "move"], ["I", "speak"], ["Ctrl+Z", "undo"], ["Ctrl+Enter", "menu"], ["Esc", "halt"]];
+const KEYS = [["F5", "run"], ["F8", "step"], ["F10", "over"], ["Shift+F8", "out"], ["F6", "pause"], ["Shift+F5", "stop"], ["F9", "break"], ["T", "toolbox"], ["Enter", "edit"], ["M", "move"], ["I", "speak"], ["Ctrl+S", "save"], ["Ctrl+Z", "undo"], ["Ctrl+Enter", "menu"], ["Esc", "halt"]];
 export function Keys() {
   return html`<${Dialog} title=${t("studio.keys")}><dl class="values">${KEYS.map(([key, name]) => html`<div><dt><kbd>${key}</kbd></dt><dd>${t(`studio.key.${name}`)}</dd></div>`)}</dl><//>`;
 }

@@ -12,7 +12,7 @@ import { connect, online, open, opened, unopened } from "./link.js";
 import { Inside } from "./modules.js";
 import { Missions, allowHere, forget, loadMissions, missions } from "./missions.js";
 import { Output, Python, RobotPanel, TextEditor, Values } from "./panels.js";
-import { body, changed, handOver, list, program, rename, restore, stored } from "./program.js";
+import { body, changed, handOver, keepNow, list, program, rename, restore, stored } from "./program.js";
 import * as runner from "./runner.js";
 import * as text from "./text.js";
 
@@ -131,6 +131,7 @@ function App() {
       F9: () => { if (program.value.kind === "blocks") editor.toggleBreak(); } };
     const key = (event) => {
       if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && runner.phase.value !== "idle") { runner.halt(); return; }
+      if (/^s$/i.test(event.key) && (event.ctrlKey || event.metaKey)) { event.preventDefault(); keepNow(); return; }
       if (event.key === "F5" && event.shiftKey) { event.preventDefault(); runner.stop(); return; }
       if (/^[zy]$/i.test(event.key) && (event.ctrlKey || event.metaKey) && !event.defaultPrevented && program.value.kind === "blocks" && !shown.value
           && !event.target.closest?.("input, textarea, [contenteditable], .blocklyWidgetDiv")) { event.preventDefault(); editor.undo(event.shiftKey || event.key.toLowerCase() === "y"); return; }

@@ -122,6 +122,15 @@ async function saveToRobot(of = whole()) {
   } catch { /* the browser has it */ }
 }
 
+/** Keep it now, as a person is used to ask for, and say where. */
+export async function keepNow() {
+  keep();
+  note(program.value.id, true);
+  clearTimeout(timer);
+  await saveToRobot();
+  if (stored.value) say(t(`studio.stored.${stored.value}`));
+}
+
 /** Hand over what was written while the robot was away, or while the program ran. */
 export async function handOver() {
   for (const id of unsent()) {

@@ -94,6 +94,7 @@ async function runNow(step) {
     if (held.error) throw new Error(held.error);
     const { feedback } = await frame({ type: "task", operate: "run", target_id: [program.value.id], mode: "single", condition: "now" });
     if (feedback.state) throw new Error(feedback.describe);
+    if (program.value.lesson) say(t("studio.run.lesson"));
   } catch (error) {
     if (phase.value === "starting") phase.value = "idle";
     say(t("refused", { why: error.message }), true);
