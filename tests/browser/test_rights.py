@@ -211,6 +211,7 @@ async def test_signing_out_ends_the_session(guarded: Guarded, open_page: Open) -
     [cookie] = [c for c in await page.context.cookies() if c["path"] == "/"]
     await page.click("header button:has-text('anna')")
     await page.wait_for_selector("input[name=password]")
+    assert await page.locator("text=Your session has ended").count() == 0  # it was wished
     await page.context.add_cookies([cookie])  # a copied cookie is worthless
     assert await page.evaluate("fetch('/api/robots').then((r) => r.status)") == 401
 
@@ -242,7 +243,7 @@ async def test_token_signs_in_and_its_rotation_signs_out(guarded: Guarded, open_
     await page.wait_for_selector("text=Only those who may see all robots see the world")
     guarded.store.rotate("cell7")
     known(guarded.runtime.guard).reload()
-    await page.wait_for_selector(".sign")
+    await page.wait_for_selector(".sign >> text=Your session has ended")
 
 
 def post(url: str, password: str, cookie: str, token: str = "") -> tuple[int, list[str]]:

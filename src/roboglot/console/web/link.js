@@ -4,7 +4,7 @@ import { lacks, notice, person, rights, say, t, kept } from "./base.js";
 import { pulse } from "./pulse.js";
 
 export const status = signal(/** @type {"opening" | "open" | "lost" | "out"} */ ("opening")); // out: a name is needed
-export const me = signal({ name: "", asks: false }); // who signed in here; whether names are asked for
+export const me = signal({ name: "", asks: false, ended: false }); // who signed in here; whether names are asked for; whether the server ended that
 export const age = signal(/** @type {number | null} */ (null)); // ms there and back; of an open question, since it was asked
 export const connections = signal(0); // sockets opened so far: what a page fetched before may have ended
 export const hello = signal(/** @type {any} */ (null));
@@ -49,14 +49,14 @@ async function admitted() {
   const reply = await fetch("/api/me");
   if (reply.status === 401) return false;
   if (!reply.ok) throw new Error();
-  me.value = await reply.json();
+  me.value = { ...await reply.json(), ended: false };
   return true;
 }
 
 /** Open the socket, and again whenever it is lost. */
 export async function connect() {
   try {
-    if (!await admitted()) { batch(() => { status.value = "out"; hello.value = null; me.value = { name: "", asks: true }; }); return; }
+    if (!await admitted()) { batch(() => { status.value = "out"; hello.value = null; me.value = { name: "", asks: true, ended: Boolean(me.value.name) }; }); return; }
   } catch { status.value = "lost"; setTimeout(connect, RETRY); return; }
   const opened = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
   socket = opened;
@@ -82,6 +82,7 @@ export async function connect() {
 /** Forget who signed in here; the page asks for a name again. */
 export async function signOut() {
   await fetch("/api/sign_out", { method: "POST" });
+  me.value = { ...me.value, name: "" }; // it was wished
   socket?.close();
 }
 

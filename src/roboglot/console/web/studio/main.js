@@ -3,7 +3,7 @@ import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { computed, effect, signal, untracked } from "@preact/signals";
 import { Button, Icon, PATHS, html, kept, lacks, language, loadWords, notice, place, say, t, theme } from "../base.js";
-import { choose, connect as connectRobot, current, hello, status, want } from "../link.js";
+import { choose, connect as connectRobot, current, hello, me, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
 import { Help, Keys, Library, Schedule, shown } from "./dialogs.js";
@@ -171,7 +171,7 @@ effect(() => { // what was changed meanwhile; at an end that is not its own the 
   if (ran && !runs) setTimeout(() => handOver().catch(() => undefined), ENDED_AFTER);
   ran = runs;
 });
-effect(() => { if (status.value === "out") location.assign("/?to=studio"); }); // a name is needed (again)
+effect(() => { if (status.value === "out") location.assign(`/?to=studio${me.value.ended ? "&ended" : ""}`); }); // a name is needed (again)
 let shownId = program.peek().id;
 effect(() => {
   const { id } = program.value;

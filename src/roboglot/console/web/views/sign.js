@@ -31,7 +31,7 @@ const KINDS = { name: ["text", "username"], password: ["password", "current-pass
 export function SignIn() {
   useEffect(() => { if (asked.get("class") && shown.name) signIn(shown); }, []); // sent by the log-in page of another world
   const submit = (event) => { event.preventDefault(); signIn(/** @type {any} */ (Object.fromEntries(new FormData(event.target)))); };
-  return html`<form class="card sign" onSubmit=${submit}><h1>${t("sign.title")}</h1><p class="muted">${t("sign.hint")}</p>
+  return html`<form class="card sign" onSubmit=${submit}><h1>${t("sign.title")}</h1>${(me.value.ended || asked.has("ended")) && html`<p class="warned" role="status">${t("sign.ended")}</p>`}<p class="muted">${t("sign.hint")}</p>
     <div class="buttons" role="group" aria-label=${t("sign.way")}>${Object.keys(WAYS).map((name) => html`
       <${Button} label=${t(`sign.by.${name}`)} on=${way.value === name} onClick=${() => { way.value = /** @type {keyof typeof WAYS} */ (name); wrong.value = ""; }} />`)}</div>
     ${WAYS[way.value].map((name) => html`<label class="field" key=${`${way.value}-${name}`}><span>${t(`sign.${name}`)}</span>
