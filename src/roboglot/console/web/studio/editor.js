@@ -48,7 +48,7 @@ function build() {
   workspace?.dispose();
   Blockly.setLocale(Blockly.messages[language.value] ?? Blockly.messages.en);
   Blockly.Msg.PROCEDURES_HUE = "#a33b5e";
-  for (const key of keysUnder("blockly.")) Blockly.Msg[key] = t(`blockly.${key}`); // which Blockly has in English only
+  for (const key of keysUnder("blockly.")) Blockly.Msg[key] = t(`blockly.${key}`); // which Blockly has in English only, or in no good Chinese
   workspace = inject(place, {
     toolbox: toolbox(modules.value.flatMap(defineModule), allowed), renderer: "zelos", theme: theme(look.value), media: "/studio/vendor/media/", sounds: false,
     trashcan: true, comments: true, maxTrashcanContents: 20, move: { scrollbars: true, drag: true, wheel: true },
