@@ -41,72 +41,88 @@ LINE_MAX = 64  # bytes per line of standard input in lockstep
 FILE_MAX = 1 << 20  # bytes of a file in its place
 STEP_MAX = 86_400.0  # s that one line may advance
 
+World = Annotated[
+    str | None,
+    typer.Option(envvar="ROBOGLOT_WORLD", help="A shipped world, a .toml of yours, or a ROS map (.yaml)."),
+]
+Robots = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="NAME=BODY, NAME=BODY:X,Y,YAW,FLOOR or NAME=URL of a real robot, optionally with @ADDRESS; repeat for"
+        " more. Robot a always exists."
+    ),
+]
+Address = Annotated[str | None, typer.Option(help="Address of robot a; the others follow it.")]
+Speed = Annotated[float | None, typer.Option(envvar="ROBOGLOT_SPEED", help="Robot seconds per real second.")]
+Lockstep = Annotated[
+    bool | None,
+    typer.Option("--lockstep", help="Advance time only by the seconds in each line of standard input."),
+]
+Seed = Annotated[int | None, typer.Option(envvar="ROBOGLOT_SEED", help="Seed of all random numbers in the world.")]
+Data = Annotated[
+    Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for maps, places, programs and certificates.")
+]
+Registry = Annotated[
+    str | None,
+    typer.Option(
+        metavar="URL|FILE",
+        envvar="ROBOGLOT_REGISTRY",
+        help="Registry of which program runs which robot; the database by default.",
+    ),
+]
+Database = Annotated[
+    str | None,
+    typer.Option(
+        metavar="URL",
+        envvar="ROBOGLOT_DATABASE",
+        help="Store the robots' data in PostgreSQL (postgresql://...) instead of in the data folder.",
+    ),
+]
+Access = Annotated[
+    bool,
+    typer.Option(
+        "--access", envvar="ROBOGLOT_ACCESS", help="Require clients to identify themselves: see `roboglot access`."
+    ),
+]
+Insecure = Annotated[
+    bool,
+    typer.Option(
+        "--insecure",
+        envvar="ROBOGLOT_INSECURE",
+        help="Let anyone drive robots, also from outside loopback; overrides \\[access].",
+    ),
+]
+WithConsole = Annotated[bool, typer.Option(help="Serve pages to see and drive the robots in a browser.")]
+OpenConsole = Annotated[bool, typer.Option("--open", help="Open the console in this machine's browser.")]
+Record = Annotated[
+    str,
+    typer.Option(metavar="FILE|DIR", envvar="ROBOGLOT_RECORD", help="Record everything: see `roboglot record`."),
+]
+RecordRing = Annotated[
+    bool, typer.Option("--record-ring", help="Keep the last five minutes, and write them at a fault.")
+]
+ConfigFile = Annotated[Path | None, typer.Option(help="TOML file with settings: see docs/settings.md.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")]
+
 
 def command(
-    world: Annotated[
-        str | None,
-        typer.Option(envvar="ROBOGLOT_WORLD", help="A shipped world, a .toml of yours, or a ROS map (.yaml)."),
-    ] = None,
-    robot: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="NAME=BODY, NAME=BODY:X,Y,YAW,FLOOR or NAME=URL of a real robot, optionally with @ADDRESS; repeat for"
-            " more. Robot a always exists."
-        ),
-    ] = None,
-    address: Annotated[str | None, typer.Option(help="Address of robot a; the others follow it.")] = None,
-    speed: Annotated[float | None, typer.Option(envvar="ROBOGLOT_SPEED", help="Robot seconds per real second.")] = None,
-    lockstep: Annotated[
-        bool | None,
-        typer.Option("--lockstep", help="Advance time only by the seconds in each line of standard input."),
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(envvar="ROBOGLOT_SEED", help="Seed of all random numbers in the world.")
-    ] = None,
-    data: Annotated[
-        Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="Folder for maps, places, programs and certificates.")
-    ] = None,
-    registry: Annotated[
-        str | None,
-        typer.Option(
-            metavar="URL|FILE",
-            envvar="ROBOGLOT_REGISTRY",
-            help="Registry of which program runs which robot; the database by default.",
-        ),
-    ] = None,
-    database: Annotated[
-        str | None,
-        typer.Option(
-            metavar="URL",
-            envvar="ROBOGLOT_DATABASE",
-            help="Store the robots' data in PostgreSQL (postgresql://...) instead of in the data folder.",
-        ),
-    ] = None,
-    access: Annotated[
-        bool,
-        typer.Option(
-            "--access", envvar="ROBOGLOT_ACCESS", help="Require clients to identify themselves: see `roboglot access`."
-        ),
-    ] = False,
-    insecure: Annotated[
-        bool,
-        typer.Option(
-            "--insecure",
-            envvar="ROBOGLOT_INSECURE",
-            help="Let anyone drive robots, also from outside loopback; overrides \\[access].",
-        ),
-    ] = False,
-    console: Annotated[bool, typer.Option(help="Serve pages to see and drive the robots in a browser.")] = True,
-    open_console: Annotated[bool, typer.Option("--open", help="Open the console in this machine's browser.")] = False,
-    record: Annotated[
-        str,
-        typer.Option(metavar="FILE|DIR", envvar="ROBOGLOT_RECORD", help="Record everything: see `roboglot record`."),
-    ] = "",
-    record_ring: Annotated[
-        bool, typer.Option("--record-ring", help="Keep the last five minutes, and write them at a fault.")
-    ] = False,
-    config: Annotated[Path | None, typer.Option(help="TOML file with settings: see docs/settings.md.")] = None,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log every request.")] = False,
+    world: World = None,
+    robot: Robots = None,
+    address: Address = None,
+    speed: Speed = None,
+    lockstep: Lockstep = None,
+    seed: Seed = None,
+    data: Data = None,
+    registry: Registry = None,
+    database: Database = None,
+    access: Access = False,
+    insecure: Insecure = False,
+    console: WithConsole = True,
+    open_console: OpenConsole = False,
+    record: Record = "",
+    record_ring: RecordRing = False,
+    config: ConfigFile = None,
+    verbose: Verbose = False,
     **doors: object,
 ) -> None:
     """Start the robots with all their doors; Ctrl-C stops them."""
