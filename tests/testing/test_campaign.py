@@ -186,6 +186,25 @@ def test_rows_survive_what_a_kill_leaves_behind(
     table.close()
 
 
+def test_a_full_disk_loses_no_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "table.csv"
+    table = Table(path)
+    table.add(trial(1), Result(Outcome.PASSED))
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left on device") as failed:
+        table.add(trial(2), Result(Outcome.PASSED))
+    assert failed.value.filename == str(path)
+    table.close()
+    monkeypatch.undo()
+    table = Table(path)
+    assert table.done(trial(1))
+    table.close()
+
+
 def test_another_program_is_another_scenario(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("name: a\nwhen: [{program: b.py}]\nthen: [{refused: 0}]\n")
     (tmp_path / "b.py").write_text("pass\n")

@@ -106,9 +106,13 @@ class Table:
             os.fsync(file.fileno())
 
     def _write(self, values: Sequence[object]) -> None:
-        self._file.write(_line(values))
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        """Write a row to disk. Raises OSError with the file's name."""
+        try:
+            self._file.write(_line(values))
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
 
     def _read(self) -> Sequence[Row]:
         """Read the table; a partial line left by a kill is cut off."""
