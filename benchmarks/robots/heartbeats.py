@@ -146,7 +146,7 @@ def look_by_ray(claims: Claims, plan: FleetPlan, seconds: float) -> None:
             return b""
 
     class Asking(ClusterFleet):
-        def _begin(self, shard: object) -> None:
+        async def _begin(self, shard: object) -> None:
             self._actors[shard.plan.name] = actor  # type: ignore[attr-defined]
             self.shards.turn_to(shard, State.STARTING)  # type: ignore[arg-type]
 

@@ -15,10 +15,11 @@ import uvloop
 
 from roboglot.config import RobotConfig
 from roboglot.fleet import build_fleet
-from roboglot.hosting.logs import LINES_MAX, PERIOD, BoundsLines, HidesQueries, NamesRobot
+from roboglot.hosting.logs import LINES_MAX, PERIOD, BoundsLines, HidesQueries, NamesRobot, in_shape
 from roboglot.hosting.open_files import OpenFiles, ran_out
 from roboglot.model.client_context import concerned, concerning
 from roboglot.model.clock import LockstepClock
+from roboglot.shards.actor import _Lines
 from roboglot.simulation.bodies.schedule import Job, Schedule
 from roboglot.simulation.world.world import TICK
 from roboglot.storage.database import Database
@@ -44,6 +45,16 @@ def test_a_line_about_a_robot_names_it() -> None:
         assert line("%d: %s", 1004, "100 %") == "robot b: 1004: 100 %"
         assert line("robot %s said: %s", "b", "hi") == "robot b said: hi"
     assert line("plain") == "plain"
+
+
+def test_lines_of_a_cluster_have_the_same_form() -> None:
+    lines = _Lines()
+    in_shape(lines)
+    with concerning("b"):
+        lines.handle(logging.LogRecord("roboglot.x", logging.WARNING, "x.py", 1, "%s", ("hi\x1b[2J",), None))
+    (shown,) = lines.kept
+    assert "WARNING robot b: hi" in shown
+    assert "\x1b" not in shown
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import time
 import warnings
@@ -10,7 +11,9 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from functools import partialmethod
 from pathlib import Path
+from types import SimpleNamespace
 
+import msgspec
 import pytest
 
 pytest.importorskip("ray", reason="Ray, which roboglot's extra `fleet` brings, is not installed")
@@ -21,7 +24,10 @@ os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 import ray
 from ray.cluster_utils import Cluster
 
+from roboglot.shards import cluster as cluster_module
+from roboglot.shards.actor import Condition
 from roboglot.shards.cluster import ClusterFleet, _answer, join, joined, own_token, refuse_unfenced
+from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.states import State
 from roboglot.storage.homes import Home, Homes
@@ -160,3 +166,87 @@ def test_a_cluster_without_a_registry_is_refused(tmp_path: Path) -> None:
     plan = plan_fleet(1, 1, {}, tmp_path, first=FIRST)
     with pytest.raises(ValueError, match="needs `database` or `registry`"):
         refuse_unfenced(plan, "ray://head")
+
+
+class FakeRay(SimpleNamespace):
+    """Stand-in for Ray: named actors, which are up at once."""
+
+    def __init__(self, *names: str) -> None:
+        super().__init__(names=list(names), util=SimpleNamespace(list_named_actors=lambda: list(self.names)))
+        self.failure: Exception | None = None
+
+    def remote(self, _: type) -> FakeRay:
+        return self
+
+    def options(self, *, name: str, **_: object) -> SimpleNamespace:
+        return SimpleNamespace(remote=lambda *_, **__: self.get_actor(name))
+
+    def get_actor(self, name: str) -> SimpleNamespace:
+        if name not in self.names:
+            self.names.append(name)
+        call = SimpleNamespace(remote=self._answer)
+        return SimpleNamespace(name=name, look=call, stop=call)
+
+    def kill(self, actor: SimpleNamespace, *, no_restart: bool) -> None:
+        assert no_restart
+        self.names.remove(actor.name)
+
+    def _answer(self, *_: int) -> SimpleNamespace:
+        if self.failure is not None:
+            raise self.failure
+        answer = Future[bytes]()
+        condition = Condition(1, "node", 7, True, True, Ready({}), Beat(1.0, 1, 1.0), None, ["a line"])
+        answer.set_result(msgspec.json.encode(condition))
+        return SimpleNamespace(future=lambda: answer)
+
+
+async def test_shards_of_an_earlier_plan_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Detached ones would go on with their old settings under the new plan's names."""
+    fake = FakeRay("another:w1:1234")
+    monkeypatch.setattr(cluster_module, "ray", fake)
+
+    async def up(worlds: int, first: str, folder: Path = tmp_path) -> list[str]:
+        fleet = ClusterFleet(plan_fleet(worlds, 1, {}, folder, first=first), folder, "ray://head", lasting=True)
+        await fleet.start()
+        await fleet.close()
+        return sorted(fake.names)
+
+    old = await up(3, "127.16.5.1")
+    assert len(old) == 4
+    assert await up(3, "127.16.5.1") == old, "the same ones"
+    new = await up(2, "127.16.5.1")
+    assert len(new) == 3
+    assert {*new} < {*old}, "those with the same settings"
+    assert {*await up(2, "127.16.6.1")} & {*new} == {"another:w1:1234"}
+    assert len(await up(2, "127.16.6.1", tmp_path / "of another fleet")) == 5
+
+
+@pytest.mark.parametrize(
+    "failure", [Exception("Ray Client is not connected"), OSError(errno.ENOSPC, "No space left on device", "log")]
+)
+async def test_a_failed_look_is_not_the_last(
+    failure: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    fake = FakeRay()
+    monkeypatch.setattr(cluster_module, "ray", fake)
+    monkeypatch.setattr(cluster_module, "PERIOD", 0.001)
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+    await fleet.start()
+    shard, failures = fleet.shards["w1"], 0
+
+    def fail(*_: object) -> None:
+        nonlocal failures
+        failures += 1
+        raise failure
+
+    monkeypatch.setattr(cluster_module, "_keep", fail)
+    fake.failure = None if isinstance(failure, OSError) else failure
+    async with asyncio.timeout(10.0):
+        while "looking at shard w1: " not in caplog.text:  # noqa: ASYNC110 - there is no event of it
+            await asyncio.sleep(0.001)
+        fake.failure = None
+        fleet.shards.turn_to(shard, State.STARTING)
+        await fleet.shards.until(lambda: shard.state is State.READY)
+    assert len([record for record in caplog.records if record.levelname == "WARNING"]) == 1
+    await fleet.close()
+    assert fake.names == []

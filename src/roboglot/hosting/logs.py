@@ -79,14 +79,19 @@ class NamesRobot(logging.Filter):
         return True
 
 
-def set_up_logging(verbose: bool) -> None:
-    """Set up logging: one readable line per event, on standard error."""
-    handler = logging.StreamHandler()
+def in_shape(handler: logging.Handler, *, verbose: bool = False) -> logging.Handler:
+    """Return a handler that writes lines in our form: escaped, with robots' names, without secrets, limited in rate."""
     handler.setFormatter(VisibleFormatter("%(asctime)s %(levelname)-7s %(message)s  (%(name)s)", "%H:%M:%S"))
     if not verbose:
         handler.addFilter(BoundsLines())
     handler.addFilter(HidesQueries())
     handler.addFilter(NamesRobot())
+    return handler
+
+
+def set_up_logging(verbose: bool) -> None:
+    """Set up logging: one readable line per event, on standard error."""
+    handler = in_shape(logging.StreamHandler(), verbose=verbose)
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler])
     for name in NOISY:
         logging.getLogger(name).setLevel(logging.INFO if verbose else logging.WARNING)

@@ -64,7 +64,7 @@ class ShardActor:
     def __init__(self, settings: dict[str, object], folder: str, *, of_node: bool) -> None:
         import ray
 
-        from roboglot.hosting.logs import set_up_logging
+        from roboglot.hosting.logs import in_shape, set_up_logging
         from roboglot.shards.shard import write_settings
 
         self._node = ray.get_runtime_context().get_node_id()[:NODE_DIGITS]
@@ -82,8 +82,7 @@ class ShardActor:
         set_up_logging(verbose=False)
         own = logging.getLogger("roboglot")
         own.setLevel(logging.INFO)
-        self._lines.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(message)s", "%H:%M:%S"))
-        own.addHandler(self._lines)
+        own.addHandler(in_shape(self._lines))
         self._link, theirs = pair()
         self._link.setblocking(False)
         self._turn = threading.Lock()

@@ -20,6 +20,7 @@ from typing import Protocol
 import msgspec
 
 from roboglot.extras import explaining
+from roboglot.hosting.error_text import in_words
 from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.actor import Condition, ShardActor
 from roboglot.shards.messages import Beat
@@ -28,7 +29,8 @@ from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
 from roboglot.storage.dead_programs import Silence
 from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry
-from roboglot.storage.residence import LEASE
+from roboglot.storage.residence import LEASE, holder_of
+from roboglot.transport.log_limiter import LogLimiter
 
 TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
 
@@ -124,7 +126,7 @@ class ClusterFleet:
         self.plan, self.folder, self._lasting, self._local = plan, folder, lasting, where == LOCAL
         self._lock = lock_folder(folder)
         self.shards = Shards(plan, folder)
-        self._mark = hashlib.sha256(str(folder).encode()).hexdigest()[:8]
+        self._mark = holder_of(folder)[:8]  # a folder of this name may be there on other machines
         self._actors: dict[str, Actor] = {}
         self._nodes: dict[str, str] = {}
         self._runs: dict[str, int] = {}
@@ -143,10 +145,14 @@ class ClusterFleet:
         return self._local
 
     async def start(self) -> float:
-        """Start all shards, or find running ones; return 0 (s, nothing is loaded here) when each is ready or failed."""
+        """Start all shards, or find running ones; return 0 (s, nothing is loaded here) when each is ready or failed.
+
+        Raises OSError in one sentence.
+        """
         save(self.plan, self.folder)
+        await self._end_strangers()
         for shard in self.shards.values():
-            await asyncio.to_thread(self._begin, shard)
+            await self._begin(shard)
         self._silence = self._loop.create_task(_free_the_silent(self.plan), name="watch over silent homes")
         self._watch = self._loop.create_task(self._look_always(), name="looks at shards")
         try:
@@ -164,7 +170,10 @@ class ClusterFleet:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         if not self._lasting:
-            await asyncio.gather(*(self._end(shard) for shard in self.shards.values()))
+            ends = await asyncio.gather(*map(self._end, self.shards.values()), return_exceptions=True)
+            for error in ends:
+                if isinstance(error, Exception):
+                    log.warning("ending a shard: %s", _first_line(error))
         os.close(self._lock)
 
     async def stop(self, shard: Shard) -> None:
@@ -172,7 +181,7 @@ class ClusterFleet:
         if shard.state is not State.STOPPED:
             self.shards.turn_to(shard, State.STOPPING)
             await self._end(shard)
-            shard.pid = 0
+            shard.pid, shard.beat = 0, Beat(0.0, 0, 0.0)
             self.shards.turn_to(shard, State.STOPPED)
 
     async def restart(self, shard: Shard) -> None:
@@ -180,19 +189,24 @@ class ClusterFleet:
         try:
             await self.stop(shard)
             shard.hopeless, shard.reason = False, ""
-            await asyncio.to_thread(self._begin, shard)
+            await self._begin(shard)
             await asyncio.wait_for(self.shards.until(lambda: shard.is_settled), START_MAX)
         except TimeoutError:
             raise TimeoutError(f"shard {shard.plan.name} is not up yet; perhaps the cluster has no room") from None
-        except RayError as error:
-            raise OSError(str(error).strip().splitlines()[0]) from None
 
-    def _begin(self, shard: Shard) -> None:
-        """Create the shard's actor, or find a running one."""
+    async def _begin(self, shard: Shard) -> None:
+        """Create the shard's actor, or find a running one. Raises OSError in one sentence."""
+        with _in_a_sentence():
+            self._actors[shard.plan.name] = await asyncio.to_thread(self._actor, shard)
+        self._runs.pop(shard.plan.name, None)
+        shard.ready, shard.beat = None, Beat(0.0, 0, 0.0)
+        self.shards.turn_to(shard, State.STARTING)
+
+    def _actor(self, shard: Shard) -> Actor:
         plan = shard.plan
         cores = min(CORES_MAX, CORE_EACH * len(plan.robots))
-        actor = ray.remote(ShardActor).options(
-            name=f"{self._mark}:{plan.name}",
+        options = ray.remote(ShardActor).options(
+            name=self._name(plan),
             namespace=NAMESPACE,
             get_if_exists=True,
             lifetime="detached" if self._lasting else None,
@@ -202,24 +216,47 @@ class ClusterFleet:
             memory=MEMORY,
             scheduling_strategy="SPREAD",
         )
-        self._actors[plan.name] = actor.remote(plan.settings, str(shard.folder), of_node=not self._local)
-        self._runs.pop(plan.name, None)
-        shard.ready, shard.beat = None, Beat(0.0, 0, 0.0)
-        self.shards.turn_to(shard, State.STARTING)
+        actor: Actor = options.remote(plan.settings, str(shard.folder), of_node=not self._local)
+        return actor
+
+    def _name(self, plan: ShardPlan) -> str:
+        """Return the name of a shard's actor, which differs with its settings: one that runs has those of its name."""
+        settings = msgspec.json.encode(plan.settings, order="deterministic")
+        return f"{self._mark}:{plan.name}:{hashlib.sha256(settings).hexdigest()[:8]}"
+
+    async def _end_strangers(self) -> None:
+        """End the shards of an earlier plan, which were detached. Raises OSError in one sentence."""
+        known = {self._name(shard.plan) for shard in self.shards.values()}
+        with _in_a_sentence():
+            running = await asyncio.to_thread(ray.util.list_named_actors)
+            strangers = [name for name in running if name.startswith(f"{self._mark}:") and name not in known]
+            await asyncio.gather(*map(self._end_stranger, strangers))
+
+    async def _end_stranger(self, actor: str) -> None:
+        shard = actor.split(":")[1]
+        log.warning("ending shard %s of an earlier plan", shard)
+        await self._end_actor(shard, await asyncio.to_thread(ray.get_actor, actor))
 
     async def _end(self, shard: Shard) -> None:
-        actor = self._actors.pop(shard.plan.name, None)
-        if actor is None:
-            return
+        """End a shard's actor, if it has one. Raises OSError in one sentence."""
+        if (actor := self._actors.pop(shard.plan.name, None)) is not None:
+            with _in_a_sentence():
+                await self._end_actor(shard.plan.name, actor)
+
+    async def _end_actor(self, name: str, actor: Actor) -> None:
         try:
             await asyncio.wait_for(_answer(actor.stop.remote()), STOP_MAX)
         except (RayError, TimeoutError) as error:
-            log.warning("killing shard %s: %s", shard.plan.name, type(error).__name__)
+            log.warning("killing shard %s: %s", name, type(error).__name__)
         await asyncio.to_thread(ray.kill, actor, no_restart=True)
 
     async def _look_always(self) -> None:
+        seldom = LogLimiter(log)
         while True:
-            await asyncio.gather(*(self._look(shard) for shard in self.shards.values()))
+            ends = await asyncio.gather(*map(self._look, self.shards.values()), return_exceptions=True)
+            for shard, error in zip(self.shards.values(), ends, strict=True):
+                if isinstance(error, Exception):  # of Ray, whose client raises bare ones, too; of a full disk
+                    seldom.warning(shard.plan.name, "looking at shard %s: %s", shard.plan.name, _first_line(error))
             await asyncio.sleep(PERIOD)
 
     async def _look(self, shard: Shard) -> None:
@@ -233,10 +270,9 @@ class ClusterFleet:
             self._missed(shard)
             return
         except RayError as error:
-            log.warning("cannot query shard %s: %s", shard.plan.name, error)
-            shard.reason = str(error).strip().splitlines()[0]
+            shard.reason = _first_line(error)
             self.shards.turn_to(shard, State.FAILED)
-            return
+            raise
         if actor is self._actors.get(shard.plan.name):
             self._seen(shard, msgspec.json.decode(answer, type=Condition))
 
@@ -244,11 +280,10 @@ class ClusterFleet:
         if shard.state is State.READY:
             log.warning("shard %s does not answer on %s", shard.plan.name, self._nodes.get(shard.plan.name))
             shard.reason = "it does not answer; Ray starts it again if its process or node is gone"
-            shard.ready = None
+            shard.ready, shard.beat = None, Beat(0.0, 0, 0.0)
             self.shards.turn_to(shard, State.STARTING)
 
     def _seen(self, shard: Shard, condition: Condition) -> None:
-        _keep(shard.folder / LOG_FILE, condition.lines)
         name = shard.plan.name
         if self._runs.get(name, condition.run) != condition.run:
             shard.restarts, shard.ready = shard.restarts + 1, None
@@ -267,6 +302,20 @@ class ClusterFleet:
             shard.reason = ""
         if state is not shard.state:
             self.shards.turn_to(shard, state)
+        _keep(shard.folder / LOG_FILE, condition.lines)  # last, as the disk may be full
+
+
+@contextmanager
+def _in_a_sentence() -> Iterator[None]:
+    """Raise Ray's errors as OSError with their first line."""
+    try:
+        yield
+    except RayError as error:
+        raise OSError(_first_line(error)) from None
+
+
+def _first_line(error: Exception) -> str:
+    return (in_words(error).strip().splitlines() or [type(error).__name__])[0]
 
 
 async def _answer(reference: Reference) -> bytes:
