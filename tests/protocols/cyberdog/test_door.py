@@ -51,6 +51,8 @@ async def test_the_log_names_the_wrong_type(client, caplog) -> None:
     assert "motion_id must be a whole number, not text" in caplog.text
     assert await client.ask(1004, {}) == {"error_code": 323}
     assert "missing" in caplog.text
+    assert await client.raw(1021, {"account": 7}) == await client.raw(1021, {})
+    assert "1021: taken as missing: account must be text, not a whole number" in caplog.text
 
 
 async def test_only_certificates_of_our_ca_get_in(door, pems, messages, tmp_path) -> None:

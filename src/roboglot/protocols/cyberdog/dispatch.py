@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import logging
+from collections.abc import Mapping
+
+from msgspec import Struct
 
 from roboglot.model.errors import ComponentMissing, RobotError
 from roboglot.model.lateness import lateness
@@ -114,10 +117,7 @@ async def _answered(call: Call) -> object | None:
             call.why = "no robot of this program does that"
             return _not_there(call.code)
         if values and operation.names:
-            taken = fitting(values, operation.parameters)
-            if len(taken) < len(values):
-                wrong = mismatches(values, operation.parameters)
-            values = taken
+            values, wrong = _taken(call, values, operation.parameters)
         return _logged(call, await operation.call(call, values))
     except BadParameters as bad:
         call.why = "; ".join(wrong) or str(bad)
@@ -135,6 +135,14 @@ async def _answered(call: Call) -> object | None:
         call.why = f"internal error: {broken}"
         log.exception("%d broke", call.code)
         return error(InBandError.UNAVAILABLE)
+
+
+def _taken(call: Call, values: Mapping[str, object], fields: type[Struct]) -> tuple[Mapping[str, object], list[str]]:
+    """Return the values that count, and what is wrong with the others, which is logged."""
+    taken, wrong = fitting(values, fields), []
+    if len(taken) < len(values) and (wrong := mismatches(values, fields)):
+        log.info("%d: taken as missing: %s", call.code, "; ".join(wrong))
+    return taken, wrong
 
 
 def _logged(call: Call, last: object) -> object:

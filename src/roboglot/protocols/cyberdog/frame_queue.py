@@ -1,6 +1,8 @@
 """Queue of program frames to the app: lossless, answers first; programs wait for a slow app.
 
-Knows neither gRPC nor the frames' contents. Unlike an outbox, this queue drops nothing that an app waits for.
+One frame is under way at a time, as on real robots: each is a call of its own, and the threads of an app that gets
+several at once read them in any order. Knows neither gRPC nor the frames' contents. Unlike an outbox, this queue drops
+nothing that an app waits for.
 """
 
 from __future__ import annotations
@@ -17,9 +19,6 @@ from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 
-NEWS_IN_FLIGHT_MAX = 8  # program events sent before the first is acknowledged
-IN_FLIGHT_MAX = 12  # including answers
-ALONE = 32 * 1024  # bytes: a longer frame could be overtaken on the way, so it is sent alone
 ROOM = 32  # queued events before programs must wait
 NEWS_MAX = 4096  # events queued for an app that acknowledges nothing; beyond this the oldest are dropped
 ANSWERS_MAX = 8 * 1024 * 1024  # bytes of queued answers before further requests must wait
@@ -64,7 +63,7 @@ class FrameQueue:
         self._send = send
         self._clock = clock
         self._waiting: list[_Frame] = []
-        self._sending: dict[asyncio.Task[None], _Frame] = {}
+        self._sending: asyncio.Task[None] | None = None
         self._numbers = 0
         self._news = self._answers = 0  # of events, of answers; bytes of answers
         self._there = self._silent = self._holding = False
@@ -106,8 +105,8 @@ class FrameQueue:
     def close(self) -> None:
         """Stop sending."""
         self._there = False
-        for task in self._sending:
-            task.cancel()
+        if self._sending:
+            self._sending.cancel()
         self._waiting.clear()
         self._news = self._answers = 0
         self._update_room()
@@ -145,22 +144,13 @@ class FrameQueue:
             self._waiting = sorted(frame for frame in self._waiting if not unwanted(frame))  # a sorted list is a heap
 
     def _go_on(self) -> None:
-        """Send as much as may be in flight, and wake the waiting sender."""
-        while self._waiting and self._may_send(self._waiting[0]):
+        """Send the next frame unless one is under way, and wake the waiting sender."""
+        if self._waiting and self._there and not self._holding and self._sending is None:
             frame = heappop(self._waiting)
             self._count(frame, -1)
-            task = asyncio.get_running_loop().create_task(self._carry(frame), name="program frame")
-            self._sending[task] = frame
-            task.add_done_callback(self._carried)
+            self._sending = asyncio.get_running_loop().create_task(self._carry(frame), name="program frame")
+            self._sending.add_done_callback(self._carried)
         self._update_room()
-
-    def _may_send(self, frame: _Frame) -> bool:
-        if not self._there or self._holding:
-            return False
-        under_way = self._sending.values()
-        if frame.size > ALONE or any(other.size > ALONE for other in under_way):
-            return not under_way
-        return len(under_way) < (IN_FLIGHT_MAX if frame.rank is _Rank.ANSWER else NEWS_IN_FLIGHT_MAX)
 
     async def _carry(self, frame: _Frame) -> None:
         match await self._send(frame.text):
@@ -174,7 +164,7 @@ class FrameQueue:
                 self._keep(frame)
 
     def _carried(self, task: asyncio.Task[None]) -> None:
-        del self._sending[task]
+        self._sending = None
         if not task.cancelled() and (error := task.exception()) is not None:
             log.error("cannot send a program frame: %s", error, exc_info=error)
         self._go_on()
