@@ -198,6 +198,25 @@ async def test_suspended_it_has_no_torque(sim, gimbal):
     assert gimbal.angles.yaw == pytest.approx(before - 0.5, abs=0.03)
 
 
+@pytest.mark.parametrize("mode", FollowMode)
+async def test_held_it_turns_with_the_body(sim, gimbal, mode):
+    gimbal.set_mode(FollowMode.FREE)
+    gimbal.move_to(pitch=-0.2, yaw=1.0)
+    await sim.clock.advance(1.5)
+    gimbal.set_mode(mode)
+    sim.robot.actuators.hold("the test", "no power")
+    before = gimbal.angles
+    sim.robot[Base].set_velocity(Twist(yaw=1.0))  # as of free wheels that someone turns
+    await sim.clock.advance(1.0)
+    assert gimbal.angles == before
+    assert gimbal.attitude.yaw == pytest.approx(before.yaw + 1.0, abs=0.15)
+    sim.robot[Base].set_velocity(STILL)
+    await sim.clock.advance(0.5)
+    sim.robot.actuators.release("the test")
+    await sim.clock.advance(2.0)
+    assert gimbal.angles.yaw == pytest.approx(1.0 if mode is FollowMode.FREE else 0.0, abs=0.02)
+
+
 async def test_it_keeps_its_pitch_to_horizon_on_slope(simulate):
     sim = simulate("obstacle_course", start=Pose(3.7, 4.0), body="robomaster_ep")
     sim.world.start()

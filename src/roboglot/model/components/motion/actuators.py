@@ -5,6 +5,8 @@ An emergency stop, sleep, an empty battery or a restart holds them all still. Wh
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from roboglot.model.actions import Action, Actions
 from roboglot.model.components.logistics.cargo import BOX
 from roboglot.model.components.logistics.jack import JACK
@@ -23,18 +25,28 @@ class Actuators:
     def __init__(self, actions: Actions) -> None:
         self._actions = actions
         self._holds: dict[str, Refused] = {}
+        self.on_held: list[Callable[[], None]] = []  # called when the first hold begins and when the last one ends
         actions.guard(self._admit)
 
     def hold(self, who: str, reason: str | Refused) -> None:
         """Cancel all that moves an actuator, and refuse it until ``who`` releases; ``reason``: a text, or the error."""
+        before = self.held
         self._holds[who] = reason if isinstance(reason, Refused) else Refused(reason)
         for action in self._actions.running():
             if moves_actuator(action):
                 action.cancel(str(reason))
+        self._report(before)
 
     def release(self, who: str) -> None:
-        """Remove the hold of ``who``, if there is one. Nothing goes on by itself."""
+        """Remove the hold of ``who``, if there is one. No action goes on by itself."""
+        before = self.held
         self._holds.pop(who, None)
+        self._report(before)
+
+    def _report(self, before: bool) -> None:
+        if self.held != before:
+            for listener in self.on_held:
+                listener()
 
     @property
     def held(self) -> bool:

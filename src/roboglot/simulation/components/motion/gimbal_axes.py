@@ -88,6 +88,7 @@ class GimbalAxes:
         self._aims: tuple[Aim | None, Aim | None] = UNAIMED  # of pitch and yaw
         self.mode = FollowMode.CHASSIS_LEAD
         self.suspended = False
+        robot.actuators.on_held.append(self._power)
         self._resting = False
         self.displaced()
         self.lean = 0.0
@@ -116,14 +117,26 @@ class GimbalAxes:
     def suspend(self) -> None:
         """Cut the motors: the axes keep their angles to the body."""
         self.suspended = True
-        self.halt()
-        self.pitch.rate = self._row[GIMBAL_RATE] = 0.0
-        self._base.steer(None)
+        self._power()
 
     def resume(self) -> None:
         """Switch the motors on again."""
         self.suspended = False
-        self._disturb()
+        self._power()
+
+    @property
+    def _limp(self) -> bool:
+        """True without power: suspended, or the robot holds all its actuators."""
+        return self.suspended or self._robot.actuators.held
+
+    def _power(self) -> None:
+        """Note that the motors may have lost or regained their power."""
+        if self._limp:
+            self.halt()
+            self.pitch.rate = self._row[GIMBAL_RATE] = 0.0
+            self._base.steer(None)
+        else:
+            self._disturb()
 
     def aim(self, pitch: Aim | None, yaw: Aim | None) -> None:
         """Set the axes' aims; None: keep the direction in the world."""
@@ -185,7 +198,8 @@ class GimbalAxes:
         hull, self._row[USE] = self._hull, ALONE
         lean = 0.0 if hull.tilt is LEVEL else _lean(hull.tilt, yaw.position)
         leaning, self.lean = lean - self.lean, lean
-        if self.suspended:
+        if self._limp:
+            self._resting = True
             return False
         if turn or self._aims[1] is not None or yaw.position or yaw.rate:
             self._advance(1, yaw, -turn, seconds)
@@ -200,7 +214,7 @@ class GimbalAxes:
     def _plain(self) -> bool:
         """True if the gimbal only follows the chassis."""
         unaimed = self._aims == UNAIMED and not self.pitch.rate
-        return unaimed and self.mode is FollowMode.CHASSIS_LEAD and not self.suspended
+        return unaimed and self.mode is FollowMode.CHASSIS_LEAD and not self._limp
 
     def _follow_body(self, yaw: Axis, turn: float, seconds: float) -> None:
         """Compensate a turn of the body (rad) and return to its front; so does the kernel from now on."""
