@@ -215,7 +215,8 @@ class _Play:
                 self.played.calls.append((event.name, tuple(event.args)))
                 await self._answer(event, run, session)
             case Failed() if not self._over:
-                self.played.error, self.played.line = f"{event.type}: {event.message}", event.line
+                self.played.error = f"{event.type}: {event.message}"
+                self.played.line = 0 if event.unit else event.line
             case Finished() | Failed():
                 self._over = True
 

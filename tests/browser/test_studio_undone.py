@@ -109,9 +109,10 @@ async def test_verdict_of_a_mission_shows_refusals(studio: Open) -> None:
     await page.click("#tab-missions")
     await page.click(".missions li:first-child button")
     call = {"function": "cyberdog.motion.turn", "line": 3, "module": "m", "block": "", "words": "too fast"}
-    graded = {"grade": {"stars": 0, "rows": []}, "refused": [call]}
+    graded = {"grade": {"stars": 0, "rows": []}, "refused": [call], "line": 2, "body": "cyberdog.task.block('a')\nx\n"}
     await page.evaluate("found => import('/studio/missions.js').then(m => { m.outcome.value = found; })", graded)
     await page.wait_for_selector(".panel .failure >> text=motion.turn (m, line 3): too fast")
+    await page.wait_for_selector(".panel .failure small >> text=line 1")  # of the error
     await page.keyboard.press("F5")  # has the robot walk, not the mission's
     await page.wait_for_selector(".notice >> text=press Try it under Missions")
     assert page.errors == []

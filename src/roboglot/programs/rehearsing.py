@@ -59,7 +59,8 @@ class Refusal:
 class Played:
     """Record of a program.
 
-    ``error`` is empty if the program finished; ``late``: it was ended because it took too long.
+    ``error`` is empty if the program finished, else ``line`` is where in its own text (0: in a module). ``late``:
+    it was ended because it took too long.
     ``outlines``: walls and furniture on the robot's floor. ``colours``: zone and red, green, blue of every state of
     the lights. ``said``: texts and names of sounds. ``refused``: the first calls that were answered with a failure.
     """

@@ -3,10 +3,10 @@ import { signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { Button, Icon, html, kept, language, robotWord, say, t } from "../base.js";
 import { palette } from "../chart.js";
-import { stateOf, table } from "./blocks.js";
+import { blocksOfLines, stateOf, table } from "./blocks.js";
 import * as editor from "./editor.js";
 import { ask, listen, send } from "./link.js";
-import { changed, fresh, lineShown, program, python, rename, withLineShown } from "./program.js";
+import { changed, fresh, lineShown, program, python, rename } from "./program.js";
 
 const PATH_MAX = 4000;
 export const missions = signal(/** @type {any[]} */ ([]));
@@ -115,12 +115,18 @@ export function Refused({ calls, code }) {
   return calls?.length ? html`<ul>${calls.map((c) => html`<li>${c.function.replace("cyberdog.", "")} (${c.module ? `${c.module}, ` : ""}${t("studio.line", { n: lineShown(c, code) })}): ${robotWord(c.words)}</li>`)}</ul>` : null;
 }
 
+/** Where an error was, as the page counts lines. @param {{line: number, body: string}} props */
+function Place({ line, body }) {
+  const block = program.value.kind === "blocks" && blocksOfLines(body)[line - 1];
+  return html`<small>${t("studio.line", { n: lineShown({ line, module: "" }, body) })}</small>${block && html`<${Button} label=${t("studio.failed.show")} onClick=${() => editor.focus(block)} />`}`;
+}
+
 function Verdict({ found }) {
   if (!found) return null;
-  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null || found.late || found.refused?.length ? "" : "fine"}`} role="status"><b>${summary(found)}</b><${Refused} calls=${found.refused} code=${found.body} />${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${withLineShown(found.error, found.why, found.body)}</small>`}</div>`;
+  if (!found.grade) return html`<div class=${`failure ${found.error || found.touched !== null || found.late || found.refused?.length ? "" : "fine"}`} role="status"><b>${summary(found)}</b><${Refused} calls=${found.refused} code=${found.body} />${found.why && html`<small>${said(found.why)}</small>`}${found.error && found.printed !== undefined && html`<small>${found.error}</small>`}${found.line > 0 && html`<${Place} line=${found.line} body=${found.body} />`}</div>`;
   const { stars: count, rows } = found.grade, undone = found.refused?.length > 0 && html`<b>${t("studio.undone")}</b><${Refused} calls=${found.refused} code=${found.body} />`;
   return html`<div class=${`failure ${count ? "fine" : ""}`} role="status"><b>${count ? t("studio.passed") : t("studio.not.passed")} <${Stars} count=${count} /></b>
-    <ul>${rows.filter((r) => !r.passed).map((r) => html`<li>${r.star ? "☆ " : "✗ "}${said(r)}</li>`)}</ul>${undone}</div>`;
+    <ul>${rows.filter((r) => !r.passed).map((r) => html`<li>${r.star ? "☆ " : "✗ "}${said(r)}</li>`)}</ul>${found.line > 0 && html`<${Place} line=${found.line} body=${found.body} />`}${undone}</div>`;
 }
 
 export function Missions() {
