@@ -29,6 +29,12 @@ CUT = """() => Object.fromEntries(
   .map(([each, box]) => [each, [Math.round(box.left), Math.round(box.right)]])
   .filter(([, [left, right]]) => !(0 <= left && left < right && right <= innerWidth)))"""
 
+ROOM = """(() => {
+  const looks = document.querySelector(".looks select"), pen = document.createElement("canvas").getContext("2d");
+  pen.font = getComputedStyle(looks).font;
+  return looks.clientWidth - 40 - Math.max(...[...looks.options].map(({ text }) => pen.measureText(text).width));
+})()"""  # px beside the longest name
+
 
 async def announced(page: Any, words: str) -> None:
     """Wait until a live region said this; what was said before is forgotten."""
@@ -83,6 +89,7 @@ async def test_small_screens_show_names_and_panels_whole(studio: Open, language:
         assert await page.get_by_role("button", name=verb, exact=True).first.get_attribute("title")
     await page.click(".switch button:nth-child(2)")
     await shows(page, CUT, {})
+    assert await page.evaluate(ROOM) >= 0
     await until(page, "(i => i.scrollWidth <= i.clientWidth)(document.querySelector('header .name input'))")
     await until(page, f"document.documentElement.scrollWidth <= {width}")
 
