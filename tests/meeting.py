@@ -40,6 +40,7 @@ LOOK = 0.05  # s between two samples of all robots
 TOUCHES = 0.002  # m between two hulls that counts as a touch
 START_ROOM, GOAL_ROOM = 0.6, 1.1  # m around a place: a robot passes beside one that stands at its goal
 STAYS = 0.5  # m: a robot that stays within has not moved
+MISSES = 0.25  # m between a robot and the goal of a drive that succeeded, in the world's truth
 WIDEST = 0.27  # m: the largest radius of these bodies
 APART = 1.6  # m between two goals, and between two starts
 STANDING, WALKING = (Pose(4.6, 3.4),), ("person 0 0", "person 0 1")  # of the office's people
@@ -77,6 +78,7 @@ class Drive:
     seconds: float = math.inf  # until it reached its last goal
     failure: str = ""
     stood: float = 0.0  # s: its longest stay at one place
+    false_successes: list[str] = field(default_factory=list)
     _place: Pose = field(default_factory=lambda: Pose(math.inf))
     _since: float = 0.0
 
@@ -85,6 +87,12 @@ class Drive:
         if pose.distance_to(self._place) > STAYS:
             self._place, self._since = pose, now
         self.stood = max(self.stood, now - self._since)
+
+    def arrive(self, pose: Pose) -> None:
+        """Count the next goal as reached; ``pose``: where the robot is in the world."""
+        if (beside := pose.distance_to(self.goals[self.reached])) > MISSES:
+            self.false_successes.append(f"{self.name} succeeded {beside:.2f} m beside goal {self.reached}")
+        self.reached += 1
 
 
 @dataclass
@@ -95,6 +103,7 @@ class Outcome:
     touches: list[Touch] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)  # robots that reached all their goals
     failures: list[str] = field(default_factory=list)
+    false_successes: list[str] = field(default_factory=list)  # drives that succeeded beside their goals
     stood: dict[str, float] = field(default_factory=dict)  # the longest stay at one place before the last goal, s
 
 
@@ -182,6 +191,7 @@ async def meet(scene: Scenario, grid: OccupancyGrid | None, alone: int | None = 
             touching = now
     for drive in drives:
         outcome.stood[drive.name] = drive.stood
+        outcome.false_successes += drive.false_successes
         if drive.reached == len(drive.goals):
             outcome.seconds[drive.name] = drive.seconds
         else:
@@ -213,7 +223,7 @@ def _drive_on(fleet: Fleet, drive: Drive, frames: dict[str, Pose], begun: float)
             drive.failure = drive.action.reason
             return False
         if drive.reached < len(drive.goals):
-            drive.reached += 1
+            drive.arrive(fleet.world.truth.pose_of(drive.name))
         if drive.reached == len(drive.goals):
             drive.seconds = min(drive.seconds, robot.clock.time() - begun)
     if drive.reached == len(drive.goals):

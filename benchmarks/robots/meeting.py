@@ -23,7 +23,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from _claim import Claims
@@ -46,6 +46,7 @@ class Result:
     seconds: dict[str, float]
     alone: dict[str, float]
     stood: dict[str, float]
+    false_successes: list[str] = field(default_factory=list)  # results that were kept earlier lack it
 
     @property
     def ratios(self) -> list[float]:
@@ -69,7 +70,7 @@ async def play(seed: int, *, compare: bool) -> Result:
     outcome = await meet(scene, maps[scene.world])
     single = await alone(scene, maps[scene.world]) if compare else {}
     touches = [f"{touch.names} after {touch.time:.1f} s: {touch.account}" for touch in outcome.touches]
-    return Result(seed, touches, outcome.failures, outcome.seconds, single, outcome.stood)
+    return Result(seed, touches, outcome.failures, outcome.seconds, single, outcome.stood, outcome.false_successes)
 
 
 def work(seed: int, compare: bool) -> Result:
@@ -96,6 +97,8 @@ def report(results: Sequence[Result], claims: Claims, name: str) -> None:
     print(f"\n{name}: {len(results)} scenarios, {robots} robots")
     claims.at_most("touches", sum(len(result.touches) for result in results), 0.5, "")
     claims.at_most("not at all goals", sum(len(result.failures) for result in results), 0.5, f"of {robots}")
+    false = sum(len(result.false_successes) for result in results)
+    claims.at_most("drives that succeeded elsewhere", false, 0.5, "")
     stood = max((seconds for result in results for seconds in result.stood.values()), default=0.0)
     claims.at_most("longest stay at a place", stood, STOOD_MAX, "s")
     pairs = [(r.seconds[name], r.alone[name]) for r in results for name in r.seconds if name in r.alone]
@@ -141,8 +144,8 @@ def main(options: argparse.Namespace) -> None:
             results[result.seed] = result
             print(json.dumps({"sources": now, **asdict(result)}), file=file, flush=True)
             times = f", {statistics.mean(result.ratios):.2f} x alone" if result.ratios else ""
-            troubles = "; ".join(result.touches + result.failures) or "no touch, all at both goals"
-            print(f"seed {result.seed}: {troubles}{times}", flush=True)
+            troubles = "; ".join(result.touches + result.failures + result.false_successes)
+            print(f"seed {result.seed}: {troubles or 'no touch, all at both goals'}{times}", flush=True)
     claims = Claims()
     for number, world in enumerate(WORLDS):
         there = [result for seed, result in sorted(results.items()) if seed % len(WORLDS) == number]
