@@ -13,16 +13,17 @@ class Claims:
 
     def at_most(self, name: str, value: float, limit: float, unit: str) -> None:
         """A figure that should be small."""
-        self._print(name, value, limit, unit, limit / value if value > 0 else float("inf"), "<=")
+        self._print(name, value, limit, unit, float("inf") if value <= 0 else limit / value, "<=")
 
     def at_least(self, name: str, value: float, limit: float, unit: str) -> None:
         """A figure that should be large."""
         self._print(name, value, limit, unit, value / limit if limit > 0 else float("inf"), ">=")
 
     def _print(self, name: str, value: float, limit: float, unit: str, ratio: float, sign: str) -> None:
-        verdict = "holds" if ratio >= 1 else "MISSED"
+        holds = ratio >= 1  # not so if a figure is no number
+        verdict = "holds" if holds else "MISSED"
         print(f"{name:36} {value:9.2f} {unit:12} claim {sign} {limit:<8g} ratio {ratio:5.2f}  {verdict}", flush=True)
-        if ratio < 1:
+        if not holds:
             self._missed.append(name)
 
     def finish(self) -> None:

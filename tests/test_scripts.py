@@ -2,6 +2,7 @@
 
 import errno
 import hashlib
+import math
 import os
 import re
 import shutil
@@ -20,6 +21,7 @@ import bootstrap
 import locks
 import pytest
 import setuptools_scm
+from _claim import Claims
 
 ROOT = Path(__file__).resolve().parent.parent
 NOBODY = 65534
@@ -339,3 +341,12 @@ def test_libraries_just_written_leave_the_cache(tmp_path: Path, monkeypatch: pyt
     )
     bootstrap.forget_libraries()
     assert {Path(name).name for name in forgotten} == {"a.cpython-311-x86_64-linux-gnu.so", "libmujoco.so.4.0.1"}
+
+
+@pytest.mark.parametrize(("figure", "missed"), [(4.9, False), (5.1, True), (0.0, False), (math.nan, True)])
+def test_figure_beyond_its_limit_or_none_is_missed(figure: float, missed: bool) -> None:
+    claims = Claims()
+    claims.at_most("the figure", figure, 5.0, "s")
+    with pytest.raises(SystemExit) as ended:
+        claims.finish()
+    assert bool(ended.value.code) is missed
