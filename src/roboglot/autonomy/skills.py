@@ -96,6 +96,7 @@ class Autonomy:
         self._landmarks: LandmarkKeeper | None = None
         self._restricted: RestrictedAreas | None = None
         self._carried: CarriedLegs | None = None
+        self._floors: LiftFloors | None = None
         self._loading: asyncio.Task[None] | None = None
         self._slam: Slam | None = None
         self._memory: OdometryMemory | None = None
@@ -131,7 +132,8 @@ class Autonomy:
         robot.add(TagDocking, MarkDocking(robot, navigation, driving))
         robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
         if LiftClient in robot:
-            robot.add(Floors, LiftFloors(robot, self._course, navigation))
+            self._floors = LiftFloors(robot, self._course, navigation)
+            robot.add(Floors, self._floors)
         if Jack in robot:
             self._carried = CarriedLegs(robot, belief, self._course.load)
         if MapAnnotations in robot:
@@ -186,6 +188,7 @@ class Autonomy:
         if self._slam is not None:
             self._slam.close()
         for part in (
+            self._floors,
             self._delivery,
             self._docking,
             self._area_watch,

@@ -239,6 +239,20 @@ async def test_given_up_ride_mixes_no_floors(
     assert tour.robot[MapAnnotations].current.areas == ()
 
 
+async def test_no_stay_outlives_the_robot(tour: Tour, aboard: LiftFloors) -> None:
+    """Cut off in the car by the end of the program, or by a door that closes before it."""
+    for _ in range(2):
+        action = aboard.ride(1)
+        await tour.until(tour.robot.actions.running)
+        await tour.clock.advance(1.0)
+        action.cancel("the door closes")
+        await tour.end_of(action)
+        aboard.close()
+        await asyncio.sleep(0)
+        assert not [task for task in asyncio.all_tasks() if "in the lift" in task.get_name()]
+    assert tour.robot[MapMemory].settled
+
+
 async def test_drawings_are_awaited_after_given_up_ride(
     tour: Tour, aboard: LiftFloors, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,7 +24,7 @@ from roboglot.model.components.logistics.lift_client import LiftClient, LiftDoor
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.floors import Floors, RideStage
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.mapping.map_memory import exchange
+from roboglot.model.components.mapping.map_memory import exchange, settle
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.navigation import NavigationOptions
@@ -61,6 +61,7 @@ class LiftFloors(Floors):
         self._places: tuple[Pose, Pose] | None = None  # the waiting place, and the place inside the car
         self._stay: asyncio.Task[None] | None = None  # in the car, after a ride that was given up there …
         self._maps_outside = False  # … and that the robot mapped before
+        self._closed = False
         robot.events.listen(MapReplaced, self._replaced)
 
     @property
@@ -159,13 +160,14 @@ class LiftFloors(Floors):
             await self._comes(floor)
             if floor != self._current:
                 await self._change_to(floor, redraw)
+            await settle(self.robot)  # a store of the building's maps may have a better one
             action.report(RideStage.LEAVING)
             await self._through(backwards=True)
         except BaseException as error:
             closing = isinstance(error, asyncio.CancelledError) and action.status is not ActionStatus.CANCELING
             if not closing and (self._is_aboard or self._current != start):
                 self._maps_outside, mapped = mapped, False
-                self._begin_stay(start, redraw)
+                self._begin_stay(redraw)
             raise
         finally:
             belief.mapping = mapped
@@ -173,34 +175,32 @@ class LiftFloors(Floors):
             lift.close_door()
         action.report(RideStage.ARRIVED)
 
-    def _begin_stay(self, start: int, redraw: bool) -> None:
+    def close(self) -> None:
+        """End a stay in the car, and begin no more: the program ends."""
+        self._closed = True
+        self._end_stay()
+
+    def _begin_stay(self, redraw: bool) -> None:
+        if self._closed:
+            return
         arrival = ExitStack()
         arrival.enter_context(exchange(self.robot))  # at once, before another action begins
-        stay = self._stay_aboard(start, redraw, arrival)
+        stay = self._stay_aboard(redraw, arrival)
         self._stay = asyncio.get_running_loop().create_task(stay, name=f"{self.robot.id} is in the lift")
         self._stay.add_done_callback(lambda _: arrival.close())
 
-    async def _stay_aboard(self, known: int, redraw: bool, arrival: ExitStack) -> None:
-        """Change floors with a car in which a ride from ``known`` was given up, until the robot is outside.
+    async def _stay_aboard(self, redraw: bool, arrival: ExitStack) -> None:
+        """Change floors with a car in which a ride was given up, until the robot is outside.
 
-        ``arrival`` has others wait until those that draw the new floor have heard of it.
+        Others wait for the map until the car was looked at once, which ends ``arrival``.
         """
         while True:
-            with arrival:
-                await self._follow_car(redraw)
-                if self._current != known:
-                    known = self._current
-                    self._publish_floor()
+            await self._follow_car(redraw)
+            arrival.close()
             if not self._is_aboard:
                 break
             await self.robot.clock.sleep(STAY_PERIOD)
-            arrival.enter_context(exchange(self.robot))
         self.belief.mapping = self._end_stay()
-
-    def _publish_floor(self) -> None:
-        assert self._places is not None
-        now, place = self.robot.clock.time(), self.belief.pose.relative_to(self._places[1])
-        self.robot.events.publish(FloorReached(stamp=now, floor=self._current, place=place))
 
     async def _follow_car(self, redraw: bool) -> None:
         """Change to the floor at which the car stands, if the robot is in it."""
@@ -247,7 +247,7 @@ class LiftFloors(Floors):
             if left < closest - THERE:
                 closest, closest_at = left, now
             if now - closest_at > PATIENCE:
-                raise Blocked("a person stands in the lift's door" if self._sees(way) else "the lidar is silent")
+                raise Blocked("a person stands in the lift's door" if _sees(self.robot, way) else "the lidar is silent")
             if now > held_until - DOOR_HELD / 2:
                 self._hold_door(needed=not backwards or self._is_aboard)
                 held_until = now + DOOR_HELD
@@ -272,15 +272,12 @@ class LiftFloors(Floors):
     def _room(self, way: float) -> float:
         """Return the free distance ahead of the hull (``way`` 1) or behind (-1) by the lidar, m; 0 if it is blind."""
         scan, radius = self.robot[Lidar].scan, self.robot.description.radius
-        if scan is None or not self._sees(way):
+        if scan is None or not _sees(self.robot, way):
             return 0.0
         points = ScanReader().read(scan).points
         along = points[:, 0] * way
         ahead = along[(np.abs(points[:, 1]) < radius) & (along > 0.0)]
         return float(ahead.min()) - radius if len(ahead) else math.inf
-
-    def _sees(self, way: float) -> bool:
-        return sees(self.robot[Lidar].scan, 0.0 if way > 0.0 else math.pi)
 
     async def _change_to(self, floor: int, redraw: bool) -> None:
         """Exchange the floors to the end, even if the ride is given up meanwhile: half of it would mix them."""
@@ -294,7 +291,11 @@ class LiftFloors(Floors):
     async def _exchange(self, floor: int, redraw: bool) -> None:
         async with self._changing:
             if floor != self._current:  # else a ride that was given up has brought it
-                await self._restore(floor, redraw)
+                with exchange(self.robot):
+                    await self._restore(floor, redraw)
+                    assert self._places is not None
+                    now, place = self.robot.clock.time(), self.belief.pose.relative_to(self._places[1])
+                    self.robot.events.publish(FloorReached(stamp=now, floor=floor, place=place))
 
     async def _restore(self, floor: int, redraw: bool) -> None:
         """Store the present floor's state and restore that of ``floor``, keeping the robot's place in the car."""
@@ -321,3 +322,8 @@ class LiftFloors(Floors):
         if redraw and MapAnnotations in robot and drawn != new.drawn:
             kept = new.drawn
             await robot[MapAnnotations].change(lambda _: kept)
+
+
+def _sees(robot: Robot, way: float) -> bool:
+    """Return whether the lidar sees ahead (``way`` 1) or behind (-1)."""
+    return sees(robot[Lidar].scan, 0.0 if way > 0.0 else math.pi)

@@ -92,7 +92,7 @@ class MapReplaced(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FloorReached(Event):
-    """The lift has brought the robot to another floor, counted from 0, though its ride was given up.
+    """The lift has brought the robot to another floor, counted from 0; its ride may have been given up.
 
     ``place``: of base_link in the frame of its place in the car, on the floor's map, which is in use.
     """

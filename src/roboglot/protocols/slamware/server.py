@@ -20,8 +20,8 @@ from roboglot.protocols.slamware.chapters.delivery.box_log import BoxLog
 from roboglot.protocols.slamware.chapters.delivery.voice import Voice
 from roboglot.protocols.slamware.chapters.firmware.updater import Updater
 from roboglot.protocols.slamware.chapters.motion.action_book import ActionBook
+from roboglot.protocols.slamware.chapters.motion.arrivals import Arrivals
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
-from roboglot.protocols.slamware.chapters.motion.given_up_rides import GivenUpRides
 from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
 from roboglot.protocols.slamware.chapters.multi_floor.floor_maps import LoadedStoreys
 from roboglot.protocols.slamware.chapters.platform.event_log import EventLog
@@ -67,7 +67,7 @@ class SlamwareDoor:
             shifts,
             cloud,
         )
-        self._rides = GivenUpRides(self._context)
+        self._arrivals = Arrivals(self._context)
         self._browsers = Browsers("[slamware]", config.origins, config.hosts)
         self._application = Application(self._context, self._browsers)
         self._gate = Gate(robot.admission, tls)
@@ -91,11 +91,12 @@ class SlamwareDoor:
             context.totals,
             context.boxes,
             context.shifts,
-            self._rides,
+            self._arrivals,
             self._voice,
         ):
             part.start()
         await context.maps.start()
+        self._arrivals.follow_car()
         if Storeys in self._robot:
             self._robot[Storeys].maps = LoadedStoreys(context)
         context.cloud.start()
@@ -141,6 +142,7 @@ class SlamwareDoor:
     async def _open_again(self) -> None:
         restore_masks(self._robot)
         await self._context.maps.start()
+        self._arrivals.follow_car()
         if self._server is None:
             await self._listen()
 
@@ -186,7 +188,7 @@ class SlamwareDoor:
             context.boxes,
             context.shifts,
             context.cloud,
-            self._rides,
+            self._arrivals,
             self._voice,
         ):
             part.close()

@@ -8,12 +8,15 @@ from typing import Any
 import httpx
 import pytest
 
+from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.map_memory import MapMemory
 from roboglot.model.components.motion.navigation import Navigation
 from roboglot.model.events import FloorReached
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.slam.last_place import last_place
 from roboglot.testing import Forward
+from tests.narrowing import known
 from tests.protocols.slamware.lift.two_floors import (
     ACTIONS,
     MULTI,
@@ -49,4 +52,6 @@ async def test_questions_on_arrival_wait_for_new_floor(
     assert (here["floor"], [place["id"] for place in places_here]) == ("first", ["u1"])
     await asyncio.gather(way, going)
     await forward(seconds=1)
+    assert known(last_place(robot)).floor == here["map_id"]  # for its next start
+    assert robot[Floors].current == 1
     assert (await client.get(f"{ACTIONS}/:current")).json()["stage"] == "GOING_TO_TARGET"  # without a ride

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from roboglot.config import RobotConfig, StartConfig
 from roboglot.fleet import build_fleet
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.driving import Driving
@@ -95,8 +97,22 @@ async def stored() -> AsyncIterator[Database]:
 async def test_robot_continues_at_its_place(stored: Database) -> None:
     async with running(stored, StartConfig(x=13.5, y=10.0, yaw=0.0, floor=1)) as run:
         assert await run.floor() == "first"
+        assert run.robot[Floors].current == 1
         assert run.robot[Localization].lost is None
         assert run.robot[Localization].pose.distance_to(run.truth) < 0.05
+
+
+async def test_robot_in_the_car_is_on_its_floor() -> None:
+    """The car has brought it there while it was off; the robot was switched off on the first floor."""
+    database, in_the_car = Database(":memory:"), StartConfig(x=1.0, y=10.0, yaw=math.pi, floor=0)
+    async with running(database, in_the_car) as run:
+        await run.load("first", Pose(1.0, 10.0, math.pi))
+    async with running(database, in_the_car) as run:
+        assert await run.floor() == "ground"
+        assert run.robot[Floors].current == 0
+        assert run.robot[Localization].lost is None
+        assert run.robot[Localization].pose.distance_to(run.truth) < 0.1
+    database.close()
 
 
 async def test_robot_on_its_dock_is_on_start_floor(stored: Database) -> None:

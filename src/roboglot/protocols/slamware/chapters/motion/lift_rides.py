@@ -126,8 +126,11 @@ async def change_floor(context: Context, errand: Errand, floor: FloorMap) -> Non
     floors, goal = robot[Floors], stop_at(context, floor.name)
     floors.begin_on(stop_at(context, maps.current))
     floors.set_lift(lift.waiting(), lift.inside)
-    await errand.do(floors.ride(goal, redraw=False, source=PART))  # ``enter`` does this for both floors
-    await maps.enter(floor.name.building, floor.name.floor, landing.waiting())
+    await errand.do(floors.ride(goal, redraw=False, source=PART))  # on arrival the floor is entered, drawings and all
+    if floor.name != maps.current:
+        await maps.enter(floor.name.building, floor.name.floor, landing.waiting())
+    elif robot[Localization].lost is not None:
+        robot[Localization].set_pose(landing.waiting())
 
 
 def shared_elevators(robot: Robot, floor: FloorMap) -> list[tuple[Elevator, Elevator]]:

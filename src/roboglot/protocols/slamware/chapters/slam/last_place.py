@@ -10,7 +10,7 @@ import msgspec
 from roboglot.model.clock import Timer
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.mapping.map_memory import is_settled
+from roboglot.model.components.mapping.map_memory import settle
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.events import MapReplaced
 from roboglot.model.geometry import Pose
@@ -85,7 +85,7 @@ class PlaceMemory:
 
     def _here(self) -> LastPlace | None:
         localization, frame = self._robot[Localization], self._frame()
-        if not self.known or frame is None or localization.lost is not None or not is_settled(self._robot):
+        if not self.known or frame is None or localization.lost is not None:
             return None
         digest, floor, (x, y) = frame
         here = localization.pose
@@ -99,6 +99,7 @@ class PlaceMemory:
         self._wait()
 
     async def _keep(self) -> None:
+        await settle(self._robot)
         here, stored = self._here(), last_place(self._robot)
         if here is not None and (stored is None or _differs(here, stored)):
             await self._robot[Settings].keep(PLACE, msgspec.to_builtins(here))

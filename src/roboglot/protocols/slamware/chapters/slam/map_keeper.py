@@ -69,6 +69,7 @@ class MapKeeper:
         self.status = MapLoadStatus.NOT_LOADED
         self._loaded = LoadedFloors()
         self.current = FloorName()
+        self.entered: Callable[[], None] = lambda: None  # called when another floor is in use
         self.place = PlaceMemory(robot, lambda: frame_on_disk(robot))
 
     @property
@@ -195,6 +196,7 @@ class MapKeeper:
                 self.status = MapLoadStatus.ERROR
                 raise
             self._loaded.hold(floors, digest)
+            self.entered()
             self._shifts.load(digest, floor.name.map_id)
             self.status = MapLoadStatus.LOADED
 
@@ -261,8 +263,10 @@ class MapKeeper:
             settle_home(self._robot)
         self._layers, self.current = floor.layers, floor.name
         self._loaded.restore()
+        self.entered()
         if pose is None and Docking in self._robot and (dock := home_dock(self._robot)) is not None:
             _take_place_at(dock, self._robot)
+        self.place.keep_soon()
 
     async def clear(self) -> None:
         """Clear the map and begin a new one where the robot is; return once the drawings are on it."""

@@ -1,8 +1,9 @@
-"""Rides that were given up in the car: the robot is where the car brings it, and needs that floor's map."""
+"""Arrivals on floors: the robot is where the lift's car brings it, and needs that floor's map."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -10,39 +11,73 @@ from contextlib import ExitStack
 from roboglot.model.components.logistics.lift_client import LiftClient
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
 from roboglot.model.components.mapping.floors import Floors
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import Drawings, exchange
 from roboglot.model.errors import NotFound, RobotError
-from roboglot.model.events import FloorReached
+from roboglot.model.events import FloorReached, PoseConfirmed
 from roboglot.model.geometry import Pose
 from roboglot.protocols.slamware.chapters.artifact.drawing import seen_from
 from roboglot.protocols.slamware.chapters.motion.lift_rides import shared_elevators, stop_at
-from roboglot.protocols.slamware.chapters.multi_floor.elevators import elevators_here
+from roboglot.protocols.slamware.chapters.multi_floor.elevators import Elevator, elevators_here
 from roboglot.protocols.slamware.context import Context
 
 log = logging.getLogger(__name__)
 
 
-class GivenUpRides:
-    """Uses the map of the floor that the robot has come to without a ride."""
+class Arrivals:
+    """Uses the map of the floor that the robot has come to."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
         self._entering: asyncio.Task[None] | None = None
         self._end: Callable[[], None] | None = None
+        self._end_look: Callable[[], None] = lambda: None
 
     def start(self) -> None:
         """Begin to follow the robot."""
         if Floors in self._context.robot:
             self._end = self._context.robot.events.listen(FloorReached, self._reached)
+            self._context.maps.entered = self._declare
 
     def close(self) -> None:
         """End following the robot."""
         if self._end is not None:
             self._end()
+        self._end_look()
         if self._entering is not None:
             self._entering.cancel()
 
+    def follow_car(self) -> None:
+        """Use the map of the car's floor, once scans confirm that the robot was switched on in a car.
+
+        The car may have gone on while the robot was off, and floors look alike from there.
+        """
+        self._end_look()
+        if Floors in self._context.robot and self._car() is not None:
+            self._end_look = self._context.robot.events.listen(PoseConfirmed, lambda _: self._look())
+
+    def _look(self) -> None:
+        self._end_look()
+        robot, car = self._context.robot, self._car()
+        with contextlib.suppress(RobotError):  # the lift is out of reach, or does not stop here
+            state = robot[LiftClient].state
+            if car and state.target is None and state.floor != stop_at(self._context, self._context.maps.current):
+                place = robot[Localization].pose.relative_to(car.inside)
+                self._reached(FloorReached(stamp=robot.clock.time(), floor=state.floor, place=place))
+
+    def _car(self) -> Elevator | None:
+        """Return the elevator that the robot is in."""
+        robot = self._context.robot
+        here = robot[Localization].pose
+        return next((elevator for elevator in elevators_here(robot) if elevator.area.contains(here)), None)
+
+    def _declare(self) -> None:
+        """Tell the lift's rides on which floor the robot is."""
+        with contextlib.suppress(RobotError):  # the lift does not stop there
+            self._context.robot[Floors].begin_on(stop_at(self._context, self._context.maps.current))
+
     def _reached(self, event: FloorReached) -> None:
+        self._end_look()
         waiting = ExitStack()
         waiting.enter_context(exchange(self._context.robot))  # that names of places are looked up on this floor
         self._entering = asyncio.get_running_loop().create_task(self._enter(event), name="entering a floor")
@@ -55,7 +90,7 @@ class GivenUpRides:
             shared = shared_elevators(robot, floor) if floor else []
             if floor is None or not shared:
                 stop = robot[LiftClient].floors[event.floor]
-                await maps.leave_floors(stop, self._car(event.place))
+                await maps.leave_floors(stop, self._car_alone(event.place))
                 raise NotFound(f"no loaded floor has a map of the lift's stop {stop}")
             _, landing = shared[0]
             await maps.enter(floor.name.building, floor.name.floor, landing.inside.compose(event.place))
@@ -63,7 +98,7 @@ class GivenUpRides:
         except RobotError as error:
             log.warning("robot %s was brought to a floor whose map it cannot use: %s", robot.id, error)
 
-    def _car(self, place: Pose) -> Drawings:
+    def _car_alone(self, place: Pose) -> Drawings:
         """Return the car's area, if only one is drawn, as seen from the robot at ``place`` in it."""
         now, elevators = self._context.robot[MapAnnotations].current, elevators_here(self._context.robot)
         if len(elevators) != 1:
