@@ -6,32 +6,22 @@ them.
 
 from __future__ import annotations
 
-import asyncio
-import json
 import random
 import shutil
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-import httpx
 import pytest
 
-from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.mapping import Mapping
-from roboglot.protocols.cyberdog.certificates import export_client
-from roboglot.protocols.visual.server import VisualDoor
-from roboglot.runtime import Runtime
-from roboglot.testing.addresses import free_addresses
-from tests.protocols.cyberdog.phone import Client, Messages, Pems
+from tests.protocols.cyberdog.phone import Messages
+from tests.protocols.life import ADDRESS, BODIES, Life
 from tests.protocols.lockstep import lockstep_runtime
 from tests.protocols.slamware.generated import SILENCING, Generator
 from tests.protocols.witness import Diary, seeds
 
-ADDRESS = free_addresses(1)
-BODIES = ["hermes", "universal", "robomaster_ep", "cyberdog2"]
 STEPS = 60
-LIMIT = 60.0  # s of robot time that an answer may take
 # They change what a restart resets, or leave no map to be saved.
 LEFT_OUT = SILENCING | {
     "PUT /api/core/slam/v1/mapping/:enable",
@@ -74,7 +64,6 @@ QUERIES: list[tuple[int, dict[str, Any]]] = [
     (8004, {}),
     (8013, {}),
 ]
-Answer = TypeVar("Answer")
 Request = tuple[int, dict[str, Any]]
 
 
@@ -109,65 +98,32 @@ def program_request(draw: random.Random) -> dict[str, Any]:
     return {"operate": "save", "target_id": [id], **words}
 
 
-class Life:
-    """The program from a start to its end, and a client of each of three doors."""
+class Keeper:
+    """Clients that write at random, and ask what is stored."""
 
-    def __init__(self, runtime: Runtime, data: Path, messages: Messages, diary: Diary) -> None:
-        assert isinstance(runtime.clock, LockstepClock)
-        self._runtime, self._clock, self._diary = runtime, runtime.clock, diary
-        self._http = httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", timeout=60)
-        pems = Pems(*(path.read_bytes() for path in export_client(data / "cyberdog", data / "phone")))
-        self._channel = pems.channel(50052, address=ADDRESS)
-        self._phone = Client(self._channel, messages)
-        self._visual = next(door for door in runtime.doors["a"]._doors if isinstance(door, VisualDoor))
-        self._paths: dict[str, Any] = {}
-
-    async def forward(self, seconds: float) -> None:
-        await self._clock.advance(seconds)
-
-    async def _during(self, request: Awaitable[Answer]) -> Answer:
-        """Let time pass until there is an answer."""
-        task, passed = asyncio.ensure_future(request), 0.0
-        while not (await asyncio.wait((task,), timeout=0.004))[0]:
-            if passed < LIMIT:
-                await self.forward(0.1)
-                passed += 0.1
-        return task.result()
-
-    async def rest(self, method: str, url: str, **content: Any) -> httpx.Response:
-        return await self._during(self._http.request(method, url, **content))
-
-    async def dog(self, code: int, params: dict[str, Any]) -> object:
-        return [data for _, data in await self._during(self._phone.raw(code, params))]
-
-    async def visual(self, words: dict[str, Any]) -> object:
-        frames: list[Any] = []
-        stop = self._visual.subscribe(lambda text: frames.append(json.loads(text)))
-        await self._during(self._visual.receive(json.dumps({"id": "q"} | words)))
-        stop()
-        answers = [frame.get("feedback") or frame.get("response") or {} for frame in frames]
-        return [answer for answer in answers if answer.get("id") == "q"]
+    def __init__(self, life: Life, diary: Diary) -> None:
+        self._life, self._diary = life, diary
 
     async def walk(self, draw: random.Random) -> None:
         """Write at random, wait until all rests, and save the map."""
         generator = Generator(await self._document(), draw.getrandbits(32), exclude=frozenset(LEFT_OUT))
-        generator.binaries[:] = [(await self.rest("GET", "/api/core/slam/v1/maps/stcm")).content]
+        generator.binaries[:] = [(await self._life.rest("GET", "/api/core/slam/v1/maps/stcm")).content]
         requests = generator.requests()
         for _ in range(STEPS):
             await self._step(draw, generator, requests)
-            await self.forward(draw.choice([0, 0.1, 1]))
-        await self.rest("DELETE", "/api/core/motion/v1/actions/:current")
-        await self.forward(8.0)
-        reply = await self.rest("POST", "/api/multi-floor/map/v1/stcm/:sync")
-        maps = Mapping in self._runtime.fleet.robots["a"]
+            await self._life.forward(draw.choice([0, 0.1, 1]))
+        await self._life.rest("DELETE", "/api/core/motion/v1/actions/:current")
+        await self._life.forward(8.0)
+        reply = await self._life.rest("POST", "/api/multi-floor/map/v1/stcm/:sync")
+        maps = Mapping in self._life.runtime.fleet.robots["a"]
         assert reply.status_code == (200 if maps else 501), reply.text
-        await self.forward(1.0)
+        await self._life.forward(1.0)
 
     async def _step(self, draw: random.Random, generator: Generator, requests: Any) -> None:
         kind = draw.random()
         if kind < 0.6:
             request = next(found for found in requests if found.method != "GET" and not found.wrong)
-            reply = await self.rest(
+            reply = await self._life.rest(
                 request.method, request.url, params=request.params, headers=request.headers, content=request.content
             )
             if reply.status_code < 400:
@@ -176,13 +132,13 @@ class Life:
                 generator.learn(reply.json())
         elif kind < 0.8:
             request = dog_request(draw)
-            self._diary.append((*request, await self.dog(*request)))
+            self._diary.append((*request, await self._life.dog(*request)))
         else:
             words = program_request(draw)
-            self._diary.append((words, await self.visual(words)))
+            self._diary.append((words, await self._life.visual(words)))
 
     async def _document(self) -> dict[str, Any]:
-        document: dict[str, Any] = (await self.rest("GET", "/openapi.json")).json()
+        document: dict[str, Any] = (await self._life.rest("GET", "/openapi.json")).json()
         return document
 
     async def state(self) -> dict[str, Any]:
@@ -191,36 +147,35 @@ class Life:
         for path, methods in (await self._document())["paths"].items():
             if "get" in methods and "{" not in path and not path.startswith(MEASURED):
                 params = {p["name"]: "1" for p in methods["get"].get("parameters", ()) if p["required"]}
-                reply = await self.rest("GET", path, params=params)
+                reply = await self._life.rest("GET", path, params=params)
                 found[path] = reply.status_code, reply.content
         for name in PARAMETERS:
-            found[name] = (await self.rest("GET", "/api/core/system/v1/parameter", params={"param": name})).content
+            found[name] = (
+                await self._life.rest("GET", "/api/core/system/v1/parameter", params={"param": name})
+            ).content
         for code, asked in QUERIES:
-            found[f"{code} {asked}"] = await self.dog(code, asked)
+            found[f"{code} {asked}"] = await self._life.dog(code, asked)
         for kind in ("task", "module"):
             for id in ["", *"abc"]:
                 words = {"operate": "inquiry", "type": kind, "target_id": [id]}
-                found[f"{kind} {id}"] = await self.visual(words)
+                found[f"{kind} {id}"] = await self._life.visual(words)
         return found
-
-    async def close(self) -> None:
-        await self._http.aclose()
-        await self._channel.close()
-        await self._runtime.close()
 
 
 def _sockets(folder: str, names: list[str]) -> list[str]:
     return [name for name in names if (Path(folder) / name).is_socket()]
 
 
-async def live(data: Path, body: str, messages: Messages, diary: Diary, use: Callable[[Life], Awaitable[None]]) -> None:
+async def live(
+    data: Path, body: str, messages: Messages, diary: Diary, use: Callable[[Keeper], Awaitable[None]]
+) -> None:
     """Start the program, ``use`` it, and close it."""
     robots = [{"name": "a", "body": body, "address": ADDRESS}]
     runtime = await lockstep_runtime(data, ADDRESS, "slamware", "cyberdog", "visual", robots=robots)
-    life = Life(runtime, data, messages, diary)
+    life = Life(runtime, data, messages)
     try:
         await life.forward(2.0)
-        await use(life)
+        await use(Keeper(life, diary))
     finally:
         await life.close()
 
@@ -233,14 +188,14 @@ async def test_data_of_three_doors_outlive_a_restart(seed: int, tmp_path: Path) 
     before: dict[str, Any] = {}
     after: dict[str, Any] = {}
 
-    async def write(life: Life) -> None:
-        await life.walk(draw)
-        before.update(await life.state())
+    async def write(keeper: Keeper) -> None:
+        await keeper.walk(draw)
+        before.update(await keeper.state())
         if power_cut:
             shutil.copytree(data, copy, ignore=_sockets)
 
-    async def read(life: Life) -> None:
-        after.update(await life.state())
+    async def read(keeper: Keeper) -> None:
+        after.update(await keeper.state())
 
     with diary.writing():
         await live(data, body, messages, diary, write)
