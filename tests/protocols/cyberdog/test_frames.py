@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator, Callable
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import grpc
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,6 +24,7 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.stores import StoredProgram
 from roboglot.programs.tasks import call_time
 from roboglot.programs.tasks.service import ProgramService
+from roboglot.protocols.cyberdog.app_line import AppLine, delivery
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.frame_queue import NEWS_MAX, ROOM, Delivery, FrameQueue
 from roboglot.protocols.cyberdog.server import CyberDogDoor
@@ -28,6 +32,8 @@ from roboglot.protocols.visual.server import VisualDoor
 from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
 from roboglot.storage.programs import program_stores
+from roboglot.wire.cyberdog.channel import SERVICE
+from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.visual.codes import FeedbackState
 from tests.protocols.cyberdog.phone import ADDRESS, App, Client, Messages, Pems, context_of, until
 
@@ -103,14 +109,14 @@ def in_pairs(count: int) -> list[tuple[str, str]]:
 
 
 async def test_every_block_of_quick_program_arrives_in_order(phone: Phone) -> None:
-    phone.app.slowness = 0.02
+    phone.app.slowness = 0.002
     await phone.start("t", "for n in range(40): cyberdog.task.block(str(n))")
     await until(lambda: len(phone.blocks()) == 80)
     assert phone.blocks() == in_pairs(40)
 
 
 async def test_an_inquiry_overtakes_what_programs_do(phone: Phone) -> None:
-    phone.app.slowness = 0.05
+    phone.app.slowness = 0.01
     await phone.start("t", "n = 0\nwhile True:\n    cyberdog.task.block(str(n))\n    n += 1")
     await until(lambda: len(phone.blocks()) > 20)
     for round in range(1, 4):
@@ -138,7 +144,7 @@ async def test_a_program_waits_for_a_slow_phone(phone: Phone) -> None:
 
 
 async def test_thirty_targets_get_thirty_feedbacks(phone: Phone) -> None:
-    phone.app.slowness = 0.02
+    phone.app.slowness = 0.002
     await phone.ask("delete", *(f"t{number}" for number in range(30)))
     await until(lambda: len(phone.answers("delete")) == 30)
     assert [answer["target_id"] for answer in phone.answers("delete")] == [f"t{number}" for number in range(30)]
@@ -244,6 +250,39 @@ async def test_frames_go_one_after_the_other(clock: LockstepClock) -> None:
     await settled(queue)
     assert wire.sent == ["0", "first", *map(str, range(1, 20))]
     assert wire.most == 1
+
+
+async def test_app_of_threads_sees_frames_in_order(clock: LockstepClock) -> None:
+    """Such an app handles pushes that are there at the same time in any order."""
+    handled: list[str] = []
+    later = threading.Event()
+
+    def handle(push: pb.SendRequest, _: object) -> Iterator[pb.RecResponse]:
+        if push.params == "0":
+            later.wait(0.1)  # the thread of a later push is faster, if there is one
+        handled.append(push.params)
+        later.set()
+        yield pb.RecResponse(nameCode=push.nameCode)
+
+    method = grpc.unary_stream_rpc_method_handler(handle, pb.SendRequest.FromString, pb.RecResponse.SerializeToString)
+    with ThreadPoolExecutor(2) as threads:
+        server = grpc.server(threads)
+        server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, {"sendMsg": method}),))
+        line = AppLine(f"127.0.0.1:{server.add_insecure_port('127.0.0.1:0')}", None)
+        server.start()
+
+        async def send(text: str) -> Delivery:
+            return delivery(await line.push(2001, text))
+
+        queue = FrameQueue(send, clock, 0)
+        queue.open()
+        for number in range(4):
+            queue.publish(str(number))
+        await until(lambda: len(handled) == 4)
+        await settled(queue)
+        await line.close()
+        server.stop(None).wait()
+    assert handled == ["0", "1", "2", "3"]
 
 
 async def test_a_broken_connection_loses_nothing(clock: LockstepClock) -> None:

@@ -39,6 +39,8 @@ class FrontEnds:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._all: list[FrontEnd] = []
+        self._delayed = 0  # frames that the network delays
+        self._due = 0.0  # robot time at which the last of them arrives
 
     def add(self, front_end: FrontEnd) -> Callable[[], None]:
         """Add a front end; return a function that removes it. Raises RuntimeError if there are too many."""
@@ -78,10 +80,20 @@ class FrontEnds:
             await front_end.room()
 
     def _each(self, give: Callable[[FrontEnd], None]) -> None:
-        if delay := lateness(self._robot):
-            self._robot.clock.call_later(delay, lambda: self._give(give))
-        else:
+        """Give a frame once the network lets it pass; none overtakes those before it when the network gets faster."""
+        clock = self._robot.clock
+        now = clock.time()
+        due = max(now + lateness(self._robot), self._due)
+        if not self._delayed and due <= now:
             self._give(give)
+            return
+        self._delayed += 1
+        self._due = due
+        clock.call_at(due, lambda: self._give_late(give))
+
+    def _give_late(self, give: Callable[[FrontEnd], None]) -> None:
+        self._delayed -= 1
+        self._give(give)
 
     def _give(self, give: Callable[[FrontEnd], None]) -> None:
         for front_end in tuple(self._all):
