@@ -289,6 +289,29 @@ async def test_only_the_stop_button_outlasts_a_restart(
         assert (restart.status, stop.engaged, stop.brake_released) == (ActionStatus.SUCCEEDED, pressed, False)
 
 
+async def test_stops_and_limits_during_a_restart_hold(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward
+) -> None:
+    restart = robot[Firmware].restart(Module.BASE)
+    await forward(seconds=1)
+    assert await put(client, "base.emergency_stop", "on") == 200
+    assert await put(client, "base.max_moving_speed", "0.2") == 200
+    await forward(seconds=3)
+    assert (restart.status, robot[EmergencyStop].engaged) == (ActionStatus.SUCCEEDED, True)
+    assert robot[Base].limits.twist.x == 0.2
+    with pytest.raises(RobotError):
+        robot[Driving].move_by(Pose(0.5))
+
+
+@pytest.mark.parametrize("ends", ["reboot", "power off"])
+async def test_a_stop_during_a_start_holds(robot: Robot, forward: Forward, ends: str) -> None:
+    robot[Firmware].reboot() if ends == "reboot" else robot[Power].shut_down(restart_after=3.0)
+    await forward(seconds=2)
+    robot[EmergencyStop].engage()  # through what stays up, such as the console
+    await forward(seconds=28)
+    assert robot[EmergencyStop].engaged
+
+
 @pytest.fixture
 async def hermes(clock: LockstepClock) -> AsyncIterator[Fleet]:
     """The delivery robot."""

@@ -41,6 +41,13 @@ class Rebooted(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ModuleRestarting(Event):
+    """A module (a ``Module`` value) restarts, and the rest stays up; what is asked for from now on holds."""
+
+    module: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ModuleRestarted(Event):
     """A module (a ``Module`` value) has restarted; the rest stayed up."""
 

@@ -64,8 +64,8 @@ class Firmware(Component):
     """Updates and reboots; every change publishes ``FirmwareChanged``, percent by percent.
 
     A reboot publishes ``Rebooting``: the runtime closes the robot's doors then and opens them again at
-    ``Rebooted``. The restart of a module publishes ``ModuleRestarted`` at its end. Installed versions survive a crash;
-    a power cut during an installation leaves the old version.
+    ``Rebooted``. The restart of a module publishes ``ModuleRestarting`` and ``ModuleRestarted``. Installed versions
+    survive a crash; a power cut during an installation leaves the old version.
     """
 
     @property

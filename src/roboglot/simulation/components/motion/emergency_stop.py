@@ -8,7 +8,7 @@ from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.firmware import Module
 from roboglot.model.errors import EmergencyStopped, Refused
-from roboglot.model.events import BrakeChanged, EmergencyStopChanged, ModuleRestarted, Rebooted
+from roboglot.model.events import BrakeChanged, EmergencyStopChanged, ModuleRestarting, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.motion.base import SimulatedBase
@@ -26,8 +26,9 @@ class SimulatedEmergencyStop(EmergencyStop):
     def __init__(self, base: SimulatedBase, robot: Robot) -> None:
         self._base, self._robot = base, robot
         self._engaged = self._pressed = self._released = False
-        robot.events.listen(Rebooted, lambda _: self._forget())
-        robot.events.listen(ModuleRestarted, self._module_restarted)
+        for kind in (Rebooting, ShuttingDown):  # when it begins: what is asked for meanwhile holds
+            robot.events.listen(kind, lambda _: self._forget())
+        robot.events.listen(ModuleRestarting, self._module_restarting)
 
     @property
     def engaged(self) -> bool:
@@ -66,7 +67,7 @@ class SimulatedEmergencyStop(EmergencyStop):
         self._base.roll_freely(released)
         self._robot.events.publish(BrakeChanged(stamp=self._robot.clock.time(), released=released))
 
-    def _module_restarted(self, event: ModuleRestarted) -> None:
+    def _module_restarting(self, event: ModuleRestarting) -> None:
         if event.module is Module.BASE:
             self._forget()
 

@@ -28,7 +28,7 @@ from roboglot.model.components.system.firmware import (
 )
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotFound, Refused
-from roboglot.model.events import FirmwareChanged, ModuleRestarted, Rebooted, Rebooting
+from roboglot.model.events import FirmwareChanged, ModuleRestarted, ModuleRestarting, Rebooted, Rebooting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
 from roboglot.simulation.bodies.part import Fitting, Part
@@ -229,6 +229,7 @@ class SimulatedFirmware(Firmware):
                 action.cancel(f"the {module} restarts")
             hold_still(robot, self._base.locks, lock, f"the {module} restarts")
             self._module = module
+            robot.events.publish(ModuleRestarting(stamp=self._clock.time(), module=module))
             try:
                 await self._clock.sleep(RESTART_SECONDS[module])
             finally:

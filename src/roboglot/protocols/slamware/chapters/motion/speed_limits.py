@@ -8,7 +8,7 @@ from dataclasses import replace
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal
-from roboglot.model.events import ModuleRestarted, Rebooted
+from roboglot.model.events import ModuleRestarting, Rebooted
 from roboglot.model.geometry import Twist
 from roboglot.model.robot import Robot
 
@@ -28,7 +28,7 @@ class SpeedLimits:
         """Set the configured limits; parameters set by clients are forgotten when the robot restarts."""
         listen = self._robot.events.listen
         self.reset()
-        self._endings = [listen(kind, lambda _: self.reset()) for kind in (Rebooted, ModuleRestarted)]
+        self._endings = [listen(kind, lambda _: self.reset()) for kind in (Rebooted, ModuleRestarting)]
 
     def close(self) -> None:
         """Restore the limits of its build."""
