@@ -110,12 +110,26 @@ async def test_place_found_everywhere_replaces_a_half_fitting_one(tour: Tour, mo
     estimator.whereabouts.lose(LostReason.NO_FIT, tour.clock.time())  # the believed place still fits
     news: list[LocalizationRecovered] = []
     tour.robot.events.listen(LocalizationRecovered, news.append)
-    for _ in range(20):
+    for _ in range(100):
         await tour.clock.advance(0.02)
         if news:
             break
     assert news[0].means is RecoveryMeans.WHOLE_MAP
     assert tour.robot[Localization].pose.distance_to(found.pose) < 0.01
+
+
+@pytest.mark.world("empty")
+async def test_a_place_found_once_replaces_none(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
+    await tour.go((2.0, 5.0))
+    estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
+    here = tour.robot[Localization].pose
+    found = [[Match(Pose(3.0, 2.0, 1.0), np.diag(SURE), 0.0, 100, 100, 100)]]  # as in a mirror, for a moment
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: found.pop() if found else [])
+    estimator.whereabouts.lose(LostReason.NO_FIT, tour.clock.time())
+    await tour.clock.advance(3.0)
+    assert not found
+    assert tour.robot[Localization].lost is None
+    assert tour.robot[Localization].pose.distance_to(here) < 0.05
 
 
 @pytest.mark.world("empty")

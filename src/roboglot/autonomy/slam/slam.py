@@ -158,8 +158,7 @@ class Slam:
         self._displacement.forget(event.stamp)
         if event.given:
             self._turns.forget()
-            self._given_at, self._missed = event.stamp, 0.0
-            self._unseen = True
+            self._given_at, self._missed, self._unseen = event.stamp, 0.0, True
             self._witness.forget()
             self.whereabouts.note_given(event.stamp)
 
@@ -334,15 +333,15 @@ class Slam:
             pose = belief.map_to_odom.compose(odometry)
             if given:  # of places that look alike, it is at the one that was meant
                 found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
-            near = found[0].pose.distance_to(pose) < NEAR
-            if belief.lost is None:
-                stood = anywhere or self._way - self._fell_at <= STOOD
-                meant = given and not anywhere
+            near, lost = found[0].pose.distance_to(pose) < NEAR, belief.lost is not None
+            if not lost:
+                stood, meant = anywhere or self._way - self._fell_at <= STOOD, given and not anywhere
                 if not self._elsewhere.replaces(found[0], odometry, belief, agreement, given=meant, stood=stood):
                     return
                 if not given or len(found) > 1:
                     self.whereabouts.lose(LostReason.NO_FIT, stamp)
-            if len(found) > 1:
+            doubtful = lost and not near and not self._elsewhere.is_certain(found[0], odometry, belief)
+            if len(found) > 1 or doubtful:
                 self.whereabouts.be_ambiguous(found, pose)
                 return
             self._mapped_from = self._way + (0.0 if near else PROBATION)

@@ -16,7 +16,7 @@ from roboglot.model.events import (
     PoseConfirmed,
     RecoveryMeans,
 )
-from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.model.geometry import Pose
 
 DENIED_AGREEMENT, DENIED_SHARE = 0.5, 0.3  # contradiction by the map: agreement below, share of points above
 DENIED_HIDDEN = 0.2  # … or share of rays through walls, which no crowd explains
@@ -106,7 +106,7 @@ class Whereabouts:
             self._events.publish(LocalizationLost(stamp=stamp, reason=reason, quality=self._belief.quality))
 
     def be_ambiguous(self, found: Sequence[Match], believed: Pose) -> None:
-        """Note that the scan fits several places; if none is near the ``believed`` one, only a search ends that."""
+        """Note that the scan may be from several places; if none is near the ``believed`` one, a search ends that."""
         self._belief.lost = LostReason.AMBIGUOUS
         self._elsewhere = all(match.pose.distance_to(believed) >= NEAR for match in found)
 
@@ -163,15 +163,19 @@ class Elsewhere:
     ) -> bool:
         """Return whether to believe ``found`` instead of the believed place, whose ``agreement`` is given.
 
-        On a map that fitted, a distant place has to be found twice: while others leave a bare corridor, its mirror
-        image may fit better for a moment. A robot on its way amid others that move along fits best where it was: nearby
-        places do not count.
+        A robot on its way amid others that move along fits best where it was: nearby places do not count.
         """
         believed = belief.map_to_odom.compose(odometry)
         near = found.pose.distance_to(believed) < NEAR
         if not (near if given else not near or stood) or found.agreement < agreement + BETTER:
             return False
+        return self.is_certain(found, odometry, belief) or near
+
+    def is_certain(self, found: Match, odometry: Pose, belief: Belief) -> bool:
+        """Return whether a distant place may be believed: on a map that fitted, an earlier search has found it, too.
+
+        While others leave a bare corridor, its mirror image may fit better for a moment.
+        """
         before, self._map_to_odom = self._map_to_odom, found.pose.compose(odometry.inverse())
-        again = before.compose(odometry) if before else believed
-        turned = abs(wrap_angle(again.yaw - found.pose.yaw))
-        return near or self.is_new(belief.map) or (again.distance_to(found.pose) < SAME and turned < SAME_YAW)
+        again = before is not None and before.compose(odometry).is_near(found.pose, SAME, SAME_YAW)
+        return again or self.is_new(belief.map)
