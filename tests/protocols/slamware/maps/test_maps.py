@@ -167,13 +167,13 @@ async def test_drawing_on_a_floor_survives_leaving_it(client: httpx.AsyncClient,
     assert await there() == ({"new below"}, 1)
     await go("2F")
     assert await there() == ({"new above"}, 0)
-    # A restarted robot is on the first floor again, and has confused neither.
+    # A restarted robot is where it was, and has confused neither.
     await ok(await client.post("/api/core/system/v1/power/:restartmodule", json={"mode": "RestartModeSoft"}))
     await forward(seconds=10)
-    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "1F"
-    assert await there() == ({"new below"}, 1)
-    await go("2F")
+    assert (await client.get(f"{MULTI}/floors/:current")).json()["floor"] == "2F"
     assert await there() == ({"new above"}, 0)
+    await go("1F")
+    assert await there() == ({"new below"}, 1)
     await ok(await client.post(f"{MULTI}/stcm/:reload"))  # the file's own
     assert await there() == ({"d1"}, 1)
     await go("2F")
