@@ -37,6 +37,7 @@ CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message, whatever
 LOST = "\0"  # in place of a client that lost a right
 CALLERS_MAX = 1024  # whose names are kept
 CALLS_MAX = 512  # at the same time, over all connections
+WRITE_MAX = 10.0  # s of real time for a client to take a message after its call has ended
 HOST_CALLS_MAX = CALLS_MAX * 3 // 4  # of one host, so that others still reach the robot
 
 
@@ -178,9 +179,19 @@ class Service:
         outside.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
 
     async def _write(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
-        """Write to a client; the time that this takes is not robot time."""
+        """Write to a client; the time that this takes is not robot time.
+
+        A call that ends meanwhile finishes the message: gRPC refuses a last one during another's write.
+        """
         with self._context.robot.clock.holding():
-            await rpc.write(message)
+            writing = asyncio.ensure_future(rpc.write(message))
+            try:
+                await asyncio.shield(writing)
+            except asyncio.CancelledError:
+                done, _ = await asyncio.wait([writing], timeout=WRITE_MAX)
+                for written in done:
+                    _ = written.cancelled() or written.exception()  # the client may be gone
+                raise
 
     async def _count(self, peer: str, size: int) -> None:
         """Count bytes to or from a client; delay one beyond its share."""
