@@ -350,6 +350,7 @@ async def test_page_asks_again_until_a_robot_is_programmable(studio: Open, brows
     page = await loaded(await studio(context), COUNTING)
     await page.wait_for_selector("text=This robot cannot be programmed at the moment: it starts")
     await page.keyboard.press("F5")  # kept until the robot is back
+    await page.wait_for_selector("text=as soon as the robot can be programmed")
     await until(page, "studio.runner.printed.value.some(e => e.text === '12')")
     await becomes(page.locator(".banner.warn").count, 0)
     assert len(asked) == 3

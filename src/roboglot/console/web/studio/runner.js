@@ -5,7 +5,7 @@ import { command } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
 import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
-import { ask, debug, frame, listen, online, opened } from "./link.js";
+import { ask, debug, frame, listen, online, opened, unopened } from "./link.js";
 import { learn, ownerOf } from "./modules.js";
 import { isStored, program, python, saveNow, withLineShown } from "./program.js";
 
@@ -62,7 +62,7 @@ function orLater(what) {
   if (why) return void say(why, true); // a key was pressed: buttons say it themselves
   if (online.value === "open" && opened.value) return what();
   postponed = what;
-  say(t("studio.later"), true);
+  say(t(unopened.value ? "studio.later.robot" : "studio.later"), true);
   return undefined;
 }
 
