@@ -1,4 +1,4 @@
-"""A Slamware client, one of the text protocol, and an app of a dog, each judged by what it was told."""
+"""A Slamware client, one of the text protocol, and an app of a dog, each judged by the answers it got."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ SHOWN = {Posture.LIMP: (0,), Posture.LYING: (101,), Posture.STANDING: (111, 112)
 
 
 class MixedWalk:
-    """All clients, and somebody who puts a box in the way."""
+    """All clients, and hands that put a box in the way."""
 
     def __init__(self, draw: random.Random, life: Life, witness: Witness) -> None:
         self._draw, self._life, self._witness = draw, life, witness

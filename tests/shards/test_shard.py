@@ -46,7 +46,7 @@ async def test_reason_of_a_failed_start_is_reported(
     ours, theirs = pair()
     with ours, theirs:
         assert await _serve(settings_of({"data": str(tmp_path)}), Reporter(theirs), None) == 1
-        told = msgspec.json.decode(ours.recv(MESSAGE_MAX), type=News)
-    assert isinstance(told, Refusal)
-    assert (reason or str(error)) in told.reason
-    assert not told.lasting
+        refusal = msgspec.json.decode(ours.recv(MESSAGE_MAX), type=News)
+    assert isinstance(refusal, Refusal)
+    assert (reason or str(error)) in refusal.reason
+    assert not refusal.lasting

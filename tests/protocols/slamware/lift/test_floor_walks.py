@@ -14,7 +14,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.protocols.slamware.lift.two_floors import ACTIONS, MAPS, MULTI, drive_to, on_map, start, two_floors
+from tests.protocols.slamware.lift.two_floors import ACTIONS, MAPS, MULTI, map_two_floors, on_map, start
 from tests.protocols.witness import Witness, seeds
 
 WALLS, SLAM = "/api/core/artifact/v1/lines/walls", "/api/core/slam/v1"
@@ -196,11 +196,7 @@ async def test_floors_keep_their_drawings(
     forward: Forward,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    draw, origin = random.Random(seed), world.truth.pose_of("a")
-    world.hands.person("person 0 0").place(28.5, 10.5)
-    await forward(seconds=1)
-    await drive_to(client, forward, origin, 10.0, 5.0)
-    await two_floors(robot, client, origin)
+    draw, origin = random.Random(seed), await map_two_floors(robot, client, world, forward)
     witness = Witness(world, robot, forward)
     walk = FloorWalk(draw, client, witness, origin)
     with witness.writing():

@@ -14,7 +14,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
-from tests.protocols.slamware.lift.two_floors import ACTIONS, MAPS, MULTI, drive_to, on_map, start, two_floors
+from tests.protocols.slamware.lift.two_floors import ACTIONS, MAPS, MULTI, map_two_floors, on_map, start
 from tests.protocols.witness import Witness
 
 
@@ -79,11 +79,7 @@ class RideWalk:
 async def test_rides_given_up_at_any_moment(
     seed: int, robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    draw, origin = random.Random(seed), world.truth.pose_of("a")
-    world.hands.person("person 0 0").place(28.5, 10.5)
-    await forward(seconds=1)
-    await drive_to(client, forward, origin, 10.0, 5.0)
-    await two_floors(robot, client, origin)
+    draw, origin = random.Random(seed), await map_two_floors(robot, client, world, forward)
     witness = Witness(world, robot, forward)
     walk = RideWalk(draw, client, witness, origin)
     with witness.writing():

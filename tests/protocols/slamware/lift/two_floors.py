@@ -14,6 +14,7 @@ from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of
+from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, encode_stcm
 
@@ -89,3 +90,13 @@ async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> N
     here = robot[Localization].pose
     pose = {"x": here.x, "y": here.y, "yaw": here.yaw}
     assert (await client.post(f"{MULTI}/stcm/:reload", json={"pose": pose})).status_code == 200
+
+
+async def map_two_floors(robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward) -> Pose:
+    """Map the way to the lift, and load that as both floors; return the map's origin in the world."""
+    origin = world.truth.pose_of("a")
+    world.hands.person("person 0 0").place(28.5, 10.5)  # out of the way
+    await forward(seconds=1)
+    await drive_to(client, forward, origin, 10.0, 5.0)
+    await two_floors(robot, client, origin)
+    return origin
