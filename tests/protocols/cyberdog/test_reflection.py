@@ -53,5 +53,5 @@ async def test_tools_find_the_service(robot, data: Path, pems: Pems, package: st
 async def test_it_is_off_by_default(door, pems: Pems) -> None:
     async with pems.channel(door.port) as channel:
         with pytest.raises(grpc.aio.AioRpcError) as refused:
-            await ask(channel, VERSIONS[0], {"list_services": "*"})
+            await ask(channel, VERSIONS[0])  # no question: a refusal may come before one is sent
     assert refused.value.code() is grpc.StatusCode.UNIMPLEMENTED
