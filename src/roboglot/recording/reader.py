@@ -70,6 +70,11 @@ class Recording:
         return sorted({exchange.robot for exchange in self.exchanges})
 
     @property
+    def everyone(self) -> Sequence[str]:
+        """Names of all robots in it, also of those without exchanges, sorted."""
+        return sorted({topic.split("/")[1] for topic in self.topics if topic.count("/") > 1} - {"truth"})
+
+    @property
     def seconds(self) -> float:
         """Duration in robot time, s."""
         return (self.last - self.first) / 1e9

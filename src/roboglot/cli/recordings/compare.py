@@ -31,10 +31,12 @@ def command(
     other: Annotated[str, typer.Argument(help="A recording or URL to compare it with.")],
     by: Annotated[
         By | None,
-        typer.Option(help="values: every value; behaviour: fields, units, rates and times (always for URLs)."),
+        typer.Option(
+            help="values: every value, place and action; behaviour: fields, units, rates and times (always for URLs)."
+        ),
     ] = None,
     robot: Annotated[str, typer.Option(help="Only this robot; needed if there are several.")] = "",
-    door: Annotated[str, typer.Option(help="Only this protocol.")] = "",
+    door: Annotated[str, typer.Option(help="Only the messages of this protocol.")] = "",
     commands: Annotated[
         bool, typer.Option("--commands", help="Also send recorded requests that move or change the robot.")
     ] = False,
@@ -71,12 +73,16 @@ async def compared(
     from roboglot.recording.comparing.comparison import answers_only, compare
 
     live = ["://" in name for name in names]
+    if not any(live) and by is not By.BEHAVIOUR:
+        from roboglot.recording.comparing.recordings import compare_recordings
+
+        return compare_recordings(Path(names[0]), Path(names[1]), mask, robot, door)
     one, other = await _sessions(names, live, robot, door, commands=commands)
     if any(live):
         one, other = answers_only(one), answers_only(other)
-    if (by or (By.BEHAVIOUR if any(live) else By.VALUES)) is By.BEHAVIOUR:
-        return compare_behaviour(one, other, mask)
-    return compare(one, other, mask, order=not any(live))
+    comparison = compare(one, other, mask, order=False) if by is By.VALUES else compare_behaviour(one, other, mask)
+    comparison.reason = "a robot at a URL only answers" if any(live) else "--by behaviour leaves single places out"
+    return comparison
 
 
 async def _sessions(

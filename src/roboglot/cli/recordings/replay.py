@@ -50,6 +50,7 @@ def command(
     if withheld:
         print(f"{withheld} requests are not sent, because they contain [redacted]", file=sys.stderr)
     comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast, names=Names())
+    comparison.reason = "a replay compares answers"
     try:
         if html:
             html.write_text(reports.page(comparison, (str(file), against)), encoding="utf-8")

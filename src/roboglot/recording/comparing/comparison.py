@@ -47,8 +47,18 @@ class Row:
         self.checks += 1
         if good:
             self.agreed += 1
-        elif len(self.differences) < SHOWN_MAX:
+        else:
+            self.note(what, one, other)
+
+    def note(self, what: str, one: object, other: object) -> None:
+        """Show a difference, up to ``SHOWN_MAX``."""
+        if len(self.differences) < SHOWN_MAX:
             self.differences.append(Difference(what, _short(one), _short(other)))
+
+    @property
+    def share(self) -> float:
+        """Share of comparisons that agree, 0 to 1; 1.0 if nothing was compared."""
+        return self.agreed / self.checks if self.checks else 1.0
 
     @property
     def compared(self) -> bool:
@@ -58,20 +68,36 @@ class Row:
 
 @dataclass(slots=True)
 class Comparison:
-    """All rows, by door and operation."""
+    """All rows of messages, by door and operation, and those of what the robots did.
+
+    ``figures``: what was compared of the robots' places, in words; ``reason``: why they were not compared.
+    """
 
     rows: list[Row]
+    drive: list[Row] = field(default_factory=list)
+    figures: str = ""
+    reason: str = ""
 
     @property
-    def fidelity(self) -> float:
-        """Share of comparisons that agree, 0 to 1; 1.0 if nothing was compared."""
+    def messages(self) -> float:
+        """Share of the messages' comparisons that agree, 0 to 1; 1.0 if nothing was compared."""
         checks = sum(row.checks for row in self.rows)
         return sum(row.agreed for row in self.rows) / checks if checks else 1.0
 
     @property
+    def driven(self) -> float:
+        """The smallest share that agrees of what the robots did; 1.0 if nothing was compared."""
+        return min((row.share for row in self.drive), default=1.0)
+
+    @property
+    def fidelity(self) -> float:
+        """The smaller share of messages and drive, so that many equal messages hide no other drive."""
+        return min(self.messages, self.driven)
+
+    @property
     def differs(self) -> bool:
         """True if any comparison does not agree."""
-        return any(row.agreed < row.checks for row in self.rows)
+        return any(row.agreed < row.checks for row in (*self.rows, *self.drive))
 
     def of(self, door: str) -> Comparison:
         """Return a comparison with the rows of one door."""

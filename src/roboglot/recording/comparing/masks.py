@@ -49,7 +49,8 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The first matching rule counts; without one, numbers have these tolerances and other values must be equal.
 
-    ``seconds``, ``seconds_share``: absolute and relative tolerance of the times of answers and pushes.
+    ``seconds``, ``seconds_share``: absolute and relative tolerance of the times of answers and pushes. ``metres``,
+    ``degrees``: tolerance of places, about the same time (``seconds``).
     """
 
     rule: tuple[Rule, ...] = ()
@@ -57,6 +58,8 @@ class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     share: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.05
     seconds: Annotated[float, msgspec.Meta(ge=0)] = 0.5
     seconds_share: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.25
+    metres: Annotated[float, msgspec.Meta(ge=0)] = 0.1
+    degrees: Annotated[float, msgspec.Meta(ge=0, le=180)] = 10.0
 
     def agree(self, operation: str, path: str, one: object, other: object) -> bool:
         """Return whether two values agree under this mask."""
@@ -80,7 +83,7 @@ class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return abs(one - other) <= max(self.seconds, self.seconds_share * max(abs(one), abs(other)))
 
 
-STRICT = Mask(tolerance=0.0, share=0.0, seconds=1e-6, seconds_share=0.0)
+STRICT = Mask(tolerance=0.0, share=0.0, seconds=1e-6, seconds_share=0.0, metres=0.0, degrees=0.0)
 
 
 def read_mask(path: Path) -> Mask:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from xml.etree import ElementTree
 
@@ -21,15 +22,30 @@ def percent(share: float) -> str:
 
 
 def table(comparison: Comparison) -> str:
-    """Return a line for each operation with its differences below, and the total at the end."""
+    """Return a line for each operation with its differences below, and the totals at the end."""
     lines = []
-    for row in comparison.rows:
+    for row in (*comparison.rows, *comparison.drive):
         operation = in_line(row.operation) or "(none)"
-        lines.append(f"{percent(_share(row)):>8}  {row.ones:5} {row.others:5}  {in_line(row.door)} {operation}")
+        lines.append(f"{percent(row.share):>8}  {row.ones:5} {row.others:5}  {in_line(row.door)} {operation}")
         lines += [in_line(f"{'':24}{d.what}: {d.one} | {d.other}") for d in row.differences[:5]]
     lines += [f"{in_line(door)}: {percent(comparison.of(door).fidelity)}" for door in comparison.doors]
+    lines += [in_line(line) for line in _drive_lines(comparison)]
     lines.append(f"fidelity: {percent(comparison.fidelity)}")
     return "\n".join(lines)
+
+
+def _drive_lines(comparison: Comparison) -> list[str]:
+    """Return what was compared besides messages, and what was not."""
+    lines = []
+    if comparison.drive:
+        figures = f" ({comparison.figures})" if comparison.figures else ""
+        lines.append(f"drive: {percent(comparison.driven)}{figures}")
+    if comparison.reason:
+        only = "messages and actions" if comparison.drive else "messages"
+        lines.append(f"only {only} were compared, not where the robots were: {comparison.reason}")
+    if not comparison.rows:
+        lines.append("no messages were compared: there are none")
+    return lines
 
 
 def page(comparison: Comparison, names: tuple[str, str]) -> str:
@@ -42,18 +58,25 @@ def page(comparison: Comparison, names: tuple[str, str]) -> str:
     ]
     for door in comparison.doors:
         of_door = comparison.of(door)
-        parts.append(f"<h2>{escape(door)}: {percent(of_door.fidelity)}</h2>")
-        parts.append("<table><tr><th>operation<th>first<th>second<th>agrees<th>what does not</tr>")
-        parts += [_html_row(row) for row in of_door.rows]
-        parts.append("</table>")
+        parts += _html_table(f"{door}: {percent(of_door.fidelity)}", of_door.rows)
+    if comparison.drive:
+        parts += _html_table(f"drive: {percent(comparison.driven)}", comparison.drive)
+    parts += [f"<p>{escape(line)}</p>" for line in _drive_lines(comparison)]
     return "\n".join(parts)
+
+
+def _html_table(title: str, rows: Sequence[Row]) -> list[str]:
+    head = "<table><tr><th>operation<th>first<th>second<th>agrees<th>what does not</tr>"
+    return [f"<h2>{escape(title)}</h2>", head, *map(_html_row, rows), "</table>"]
 
 
 def junit(comparison: Comparison) -> bytes:
     """Return one test case for each operation."""
     suites = ElementTree.Element("testsuites", name="roboglot compare")
-    for door in comparison.doors:
-        rows = comparison.of(door).rows
+    sections = {door: comparison.of(door).rows for door in comparison.doors}
+    if comparison.drive:
+        sections["drive"] = comparison.drive
+    for door, rows in sections.items():
         failed = sum(row.agreed < row.checks for row in rows)
         suite = ElementTree.SubElement(suites, "testsuite", name=door, tests=str(len(rows)), failures=str(failed))
         for row in rows:
@@ -62,11 +85,11 @@ def junit(comparison: Comparison) -> bytes:
                 text = "\n".join(f"{d.what}: {d.one} | {d.other}" for d in row.differences)
                 why = f"{row.checks - row.agreed} of {row.checks} do not agree"
                 ElementTree.SubElement(case, "failure", message=why).text = xml_text(text)
+    if comparison.reason:
+        suite = ElementTree.SubElement(suites, "testsuite", name="drive", tests="1", skipped="1")
+        case = ElementTree.SubElement(suite, "testcase", classname="drive", name="places")
+        ElementTree.SubElement(case, "skipped", message=xml_text(comparison.reason))
     return bytes(ElementTree.tostring(suites, encoding="utf-8", xml_declaration=True))
-
-
-def _share(row: Row) -> float:
-    return row.agreed / row.checks if row.checks else 1.0
 
 
 def _html_row(row: Row) -> str:
@@ -75,5 +98,5 @@ def _html_row(row: Row) -> str:
         for d in row.differences
     )
     bad = " class=bad" if row.differences else ""
-    share = percent(_share(row))
+    share = percent(row.share)
     return f"<tr{bad}><td>{escape(row.operation)}<td>{row.ones}<td>{row.others}<td>{share}<td>{wrong}</tr>"
