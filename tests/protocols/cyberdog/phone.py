@@ -109,6 +109,7 @@ class App:
     ticks: list[Any] = field(default_factory=list)
     pushed: list[tuple[int, str]] = field(default_factory=list)
     silent: bool = False
+    refusing: bool = False  # answers pushes with an error
     gate: asyncio.Event = field(default_factory=asyncio.Event)  # it answers pushes only while this is set
     slowness: float = 0.0  # s of the machine's time for each push, in turn
     robot: CyberDogDoor | None = None  # dials this app
@@ -140,7 +141,9 @@ class App:
         self.ticks.append(request)
         return self.messages.Result(result="ok")
 
-    async def _push(self, request: Any, _context: Any) -> AsyncIterator[Any]:
+    async def _push(self, request: Any, context: Any) -> AsyncIterator[Any]:
+        if self.refusing:
+            await context.abort(grpc.StatusCode.INTERNAL, "a bug")
         self.pushed.append((request.nameCode, request.params))
         await self.gate.wait()
         if self.slowness:

@@ -17,6 +17,7 @@ from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.legs import Legs, Posture
 from roboglot.model.robot import Robot
 from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, early_share, host_of
+from roboglot.protocols.cyberdog.chapters.motion.motion import SERVO_RESPONSE
 from roboglot.protocols.cyberdog.chapters.programming import TO_APP
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.outbox import Outbox
@@ -119,6 +120,19 @@ async def test_a_silent_app_is_a_lost_one(phoned, app, passing: Passing) -> None
     await passing(lambda: not link.connected)
     app.silent = False
     await passing(lambda: link.connected)
+
+
+async def test_log_names_pushes_an_app_does_not_take(phoned, app, passing: Passing, caplog) -> None:
+    link = phoned._context.app
+    await passing(lambda: link.connected)
+    app.refusing = True
+    link.push(SERVO_RESPONSE, "{}")
+    await passing(lambda: "the app answers push 1003 with the error internal" in caplog.text)
+    app.refusing = False
+    app.gate.clear()
+    link.push(SERVO_RESPONSE, "{}")
+    await passing(lambda: "the app did not end its call for push 1003 within 3.0 s" in caplog.text)
+    assert link.connected
 
 
 async def test_an_app_with_a_strange_certificate_gets_nothing(

@@ -52,7 +52,21 @@ async def test_the_log_names_the_wrong_type(client, caplog) -> None:
     assert await client.ask(1004, {}) == {"error_code": 323}
     assert "missing" in caplog.text
     assert await client.raw(1021, {"account": 7}) == await client.raw(1021, {})
-    assert "1021: taken as missing: account must be text, not a whole number" in caplog.text
+    assert "1021: ignored: account must be text, not a whole number" in caplog.text
+
+
+async def test_the_log_names_what_a_request_loses(client, caplog) -> None:
+    fields = {"motion_id": 111, "cmd_source": 0, "vel_dest": [0.2, 0.0, 0.0], "pos_des": [0.1], "colour" * 20: 1}
+    assert (await client.ask(1004, fields))["code"] == 0
+    (line,) = [record for record in caplog.records if "ignored" in record.message]
+    assert line.levelno == logging.WARNING
+    assert "vel_dest is unknown; did you mean 'vel_des'?" in line.message
+    assert "pos_des must have at least 3 entries" in line.message
+    assert "colourcolour" in line.message
+    assert "colour" * 20 not in line.message
+    assert "cmd_source" not in line.message
+    assert await client.ask(1004, {"motionid": 111}) == {"error_code": 323}
+    assert "motionid is unknown; did you mean 'motion_id'?" in caplog.text
 
 
 async def test_only_certificates_of_our_ca_get_in(door, pems, messages, tmp_path) -> None:

@@ -16,11 +16,12 @@ from urllib.parse import unquote
 from roboglot.model.clock import Clock
 from roboglot.model.inputs.outside import Outside
 from roboglot.model.tap import Tap
-from roboglot.protocols.cyberdog.app_line import DONE, AppLine, Credentials, delivery
+from roboglot.protocols.cyberdog.app_line import BROKEN, DONE, AppLine, Credentials, delivery
 from roboglot.protocols.cyberdog.frame_queue import Delivery
 from roboglot.protocols.cyberdog.outbox import Outbox
 from roboglot.protocols.cyberdog.table import Push
 from roboglot.transport.limiter import pay
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.values import dataclass
 from roboglot.wire.cyberdog.channel import HEARTBEAT_DEADLINE, HEARTBEAT_PERIOD, LOST_AFTER, PUSH_DEADLINE, PUSH_MAX
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, Beats
@@ -28,6 +29,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import write
 
 log = logging.getLogger(__name__)
+seldom = LogLimiter(log)
 WILDCARDS = ("0.0.0.0", "::")
 EARLY_MAX = 0.75
 REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: first, then doubled up to the maximum
@@ -220,10 +222,12 @@ class AppLink:
     async def _got_through(self, line: AppLine, ticks: pb.Ticks) -> bool:
         asking = self._outside.call_out(HEARTBEAT, lambda: line.heartbeat(ticks))
         try:
-            return await self._clock.wait_for(asking, HEARTBEAT_DEADLINE) == DONE
+            outcome = await self._clock.wait_for(asking, HEARTBEAT_DEADLINE)
         except TimeoutError:
             log.debug("no heartbeat within %s s", HEARTBEAT_DEADLINE)
             return False
+        _note_error(HEARTBEAT, outcome)
+        return outcome == DONE
 
     def _note(self, ticks: pb.Ticks) -> None:
         """Report a delivered heartbeat to the tap."""
@@ -268,10 +272,23 @@ class AppLink:
             self._tap.push("cyberdog", self._target, key, text)
         try:
             asking = self._outside.call_out(key, lambda: line.push(code, text))
-            return delivery(await self._clock.wait_for(asking, PUSH_DEADLINE))
+            outcome = await self._clock.wait_for(asking, PUSH_DEADLINE)
         except TimeoutError:
-            log.debug("push %s was not acknowledged within %s s", key, PUSH_DEADLINE)
+            seldom.warning(
+                f"no end of {key}",
+                "the app did not end its call for push %s within %s s; until it does, it gets one of them in that time",
+                key,
+                PUSH_DEADLINE,
+            )
             return Delivery.SILENT
+        _note_error(f"push {key}", outcome)
+        return delivery(outcome)
+
+
+def _note_error(what: str, outcome: str) -> None:
+    """Log an error that the app itself answered with; a line that broke is none."""
+    if outcome != DONE and outcome not in BROKEN:
+        seldom.warning(f"{outcome} of {what}", "the app answers %s with the error %s", what, outcome)
 
 
 @lru_cache(64)

@@ -31,11 +31,13 @@ from roboglot.protocols.cyberdog.chapters.system import (  # noqa: F401
 )
 from roboglot.protocols.cyberdog.errors import RecordedEnd, codes_of
 from roboglot.protocols.cyberdog.table import TABLE, unread
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.wire.contracts import contract
-from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, InBandError
-from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_params, write
+from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, UNUSED, InBandError
+from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_params, strangers, write
 
 log = logging.getLogger(__name__)
+seldom = LogLimiter(log)
 DOOR = "cyberdog"
 _NAMES = {int(row.key): row.name for row in contract("cyberdog")}
 KNOWN = (_NAMES.keys() | UNPUBLISHED) - TEXT_ONLY
@@ -140,8 +142,11 @@ async def _answered(call: Call) -> object | None:
 def _taken(call: Call, values: Mapping[str, object], fields: type[Struct]) -> tuple[Mapping[str, object], list[str]]:
     """Return the values that count, and what is wrong with the others, which is logged."""
     taken, wrong = fitting(values, fields), []
-    if len(taken) < len(values) and (wrong := mismatches(values, fields)):
-        log.info("%d: taken as missing: %s", call.code, "; ".join(wrong))
+    if len(taken) < len(values):
+        wrong = mismatches(values, fields)
+        unknown = strangers(values, fields, UNUSED.get(call.code, frozenset()))
+        if ignored := "; ".join([*wrong, *unknown]):
+            seldom.warning(f"{call.code} {ignored}", "%d: ignored: %s", call.code, ignored)
     return taken, wrong
 
 

@@ -158,7 +158,9 @@ class FrameQueue:
                 self._silent = False
             case Delivery.SILENT:
                 if not self._silent:
-                    log.warning("the app acknowledges no program frames: programs no longer wait for it")
+                    log.warning(
+                        "the app acknowledges no program frames: programs no longer wait for it, their news comes late"
+                    )
                 self._silent = True
             case Delivery.FAILED:
                 self._keep(frame)

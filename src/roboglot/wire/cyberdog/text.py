@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from functools import cache
 from typing import Annotated, NoReturn
 
 import msgspec
 
+from roboglot.spelling import WORD_MAX, meant
 from roboglot.validation import why_invalid
 
 # Used when the strict reader fails: raw line ends inside strings, as in one app's SDP.
@@ -16,6 +17,8 @@ _lenient = json.JSONDecoder(strict=False, parse_constant=lambda name: _refuse(na
 
 NOTHING = "{}"  # usual params of requests without fields
 Int32 = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)]
+Three = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
+TwoOrThree = Annotated[list[float], msgspec.Meta(min_length=2, max_length=3)]
 
 
 class NotJson(ValueError):
@@ -70,6 +73,16 @@ def mismatches(values: Mapping[str, object], fields: type[msgspec.Struct]) -> li
         reason
         for field in _fields(fields)
         if field.name in values and (reason := _misfit(field.name, values[field.name], field.type))
+    ]
+
+
+def strangers(values: Mapping[str, object], fields: type[msgspec.Struct], unused: Set[str]) -> list[str]:
+    """Describe the names in ``values`` that are neither fields nor ``unused``, with the field that was meant."""
+    known = fields.__struct_fields__
+    return [
+        f"{name[:WORD_MAX]} is unknown{meant(name, known)}"
+        for name in values
+        if name not in known and name not in unused
     ]
 
 

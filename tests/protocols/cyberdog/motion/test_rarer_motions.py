@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -20,6 +21,9 @@ from roboglot.model.components.motion.legs import (
     Step,
 )
 from roboglot.model.geometry import Orientation, Pose, Twist
+from roboglot.protocols.cyberdog.chapters.motion.motion_start import MotionRequest
+from roboglot.protocols.cyberdog.chapters.motion.reasons import reason
+from roboglot.wire.cyberdog.chapters.motion.motion import MotionCode
 from tests.protocols.cyberdog.phone import App, Client, answered, until
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
@@ -178,6 +182,34 @@ async def test_a_frame_begins_the_calibration(client, robot, forward) -> None:
     assert (await answered(client, 1004, {"motion_id": 111}, forward))["code"] == 0
 
 
+@pytest.mark.parametrize(
+    ("values", "why"),
+    [
+        ({"motion_id": 132, "duration": 10}, "motion 132 has its own time: leave duration out"),
+        ({"motion_id": 303}, "motion 303 needs a duration in ms"),
+        ({"motion_id": 303, "duration": 60_001}, "duration is 0 to 60000 ms"),
+        ({"motion_id": 212, "duration": 500, "rpy_des": [0.0, 1.0, 0.0]}, "turns by at most 0.9 rad"),
+        ({"motion_id": 211, "duration": 500, "pos_des": [0.0, 0.0, 0.9]}, "cannot be done with these values"),
+        ({"motion_id": 99}, "there is no such motion"),
+        ({"motion_id": 180}, "no such gait or sequence"),
+    ],
+)
+async def test_log_names_why_a_motion_was_refused(client, caplog, values: dict[str, object], why: str) -> None:
+    caplog.set_level(logging.INFO)
+    assert (await client.ask(1004, values))["result"] is False
+    assert why in caplog.text
+
+
+async def test_log_names_why_a_frame_was_refused(client, caplog) -> None:
+    await client.ask(1002, {"motion_id": 303, "cmd_type": 7})
+    assert "1002 refused: cmd_type is 0, 1 or 2, not 7" in caplog.text
+
+
+def test_each_refusal_of_a_motion_has_its_reason() -> None:
+    for code in MotionCode:
+        assert code is MotionCode.DONE or reason(code, 303, MotionRequest())
+
+
 async def test_a_dog_that_was_knocked_over_says_so(client, robot, world, forward) -> None:
     world.hands.roll_over("a")
     await forward(seconds=1)
@@ -191,6 +223,8 @@ async def test_someone_takes_the_dog_up(client, robot, world, forward) -> None:
     world.hands.lift("a")
     await forward(seconds=1)
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 114
+    walk = {"motion_id": 303, "vel_des": [0.2, 0.0, 0.0], "duration": 1000}
+    assert (await client.ask(1004, walk))["code"] == 3003  # its feet find no floor
     world.hands.let_go("a")
     await forward(seconds=2)
     assert (await client.ask(10001))["motion_status"]["motion_id"] in (111, 112)

@@ -17,7 +17,6 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_states import begins_in,
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
     DANCED,
     DANCES,
-    FIXED_TIME,
     KNOWN,
     NUMBERS,
     ON_LEGS,
@@ -29,15 +28,14 @@ from roboglot.protocols.cyberdog.chapters.motion.motion_table import (
     USERS,
     WALK_STANDS,
     WALKS,
-    may_be_added,
 )
 from roboglot.protocols.cyberdog.chapters.motion.readiness import machine_state, posture_of, refusal_of
+from roboglot.protocols.cyberdog.chapters.motion.reasons import asks_too_much, lasts_as_allowed
 from roboglot.protocols.cyberdog.errors import codes_of
 from roboglot.values import dataclass
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion, MotionCode, SwitchStatus
 from roboglot.wire.cyberdog.codes import MachineState
 
-DURATION_MAX = 60.0  # s: the longest walk by a result command, which only an emergency stop ends
 NOTHING_SPECIAL = MotionRequest()
 MOVING = 0.01  # m/s or rad/s from which the body counts as walking
 
@@ -110,7 +108,7 @@ class Gaits:
             return Executed(refusal, SwitchStatus.LOW_BATTERY if refusal is MotionCode.LOW_BATTERY else status)
         if not self._frames_may_ask_for(motion):
             return Executed(MotionCode.UNSUPPORTED)
-        if _asks_too_much(motion, request):
+        if asks_too_much(motion, request):
             return Executed(MotionCode.PARAMETERS)
         if self.busy:
             return Executed(MotionCode.BUSY)
@@ -242,7 +240,7 @@ class Gaits:
             return MotionCode.UNSUPPORTED
         if motion in STATES:
             return MotionCode.BANNED
-        if not _lasts_as_allowed(motion, request.seconds) or _asks_too_much(motion, request):
+        if not lasts_as_allowed(motion, request.seconds) or asks_too_much(motion, request):
             return MotionCode.PARAMETERS
         if motion in PRESETS or (motion in USERS and not self._robot[Legs].choreography.steps):
             return MotionCode.NO_SEQUENCE
@@ -267,17 +265,3 @@ class Gaits:
 def _is_supported(robot: Robot, motion: int) -> bool:
     """True if the robot has what the motion needs."""
     return motion in KNOWN and (motion not in ON_LEGS or Legs in robot) and (motion not in SEEING or sees(robot))
-
-
-def _lasts_as_allowed(motion: int, seconds: float) -> bool:
-    """True if a duration is given where the motion needs one, and only there."""
-    if not 0 <= seconds <= DURATION_MAX:
-        return False
-    either = motion == Motion.USER_GAIT or (motion in POSES and not POSES[motion][1])
-    return either or (seconds > 0) != (motion in FIXED_TIME)
-
-
-def _asks_too_much(motion: int, request: MotionRequest) -> bool:
-    """Return whether a relative pose is out of range; the legs check absolute ones."""
-    relative, _ = POSES.get(motion, (False, False))
-    return relative and not may_be_added(request.body)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import STILL
 from roboglot.operations import Right
@@ -9,13 +11,16 @@ from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.motion.gait import Executed
 from roboglot.protocols.cyberdog.chapters.motion.motion_start import MotionRequest
 from roboglot.protocols.cyberdog.chapters.motion.motion_table import POSES, SERVO_POSES, WALKS
+from roboglot.protocols.cyberdog.chapters.motion.reasons import reason, servo_reason
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.table import TABLE, push
 from roboglot.protocols.cyberdog.vocabulary import ALL_FEET, body_of, feet_of, lift_of, twist_of
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.wire.cyberdog.chapters.motion.motion import CommandType, Motion, MotionCode
 from roboglot.wire.cyberdog.codes import Code, InBandError
-from roboglot.wire.cyberdog.text import Int32
+from roboglot.wire.cyberdog.text import Int32, Three, TwoOrThree
 
+seldom = LogLimiter(logging.getLogger(__name__))
 SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2)
 CALIBRATION = 4  # ``value`` of a frame
 ANSWER_MAX = 20.0  # s after which the answer is a time-out, whether or not the motion continues
@@ -27,10 +32,10 @@ async def servo(
     *,
     motion_id: Int32,
     cmd_type: Int32 = CommandType.DATA,
-    vel_des: list[float] = [],  # noqa: B006 - never changed
-    pos_des: list[float] = [],  # noqa: B006
-    rpy_des: list[float] = [],  # noqa: B006
-    step_height: list[float] = [],  # noqa: B006
+    vel_des: Three = [],  # noqa: B006 - never changed
+    pos_des: Three = [],  # noqa: B006
+    rpy_des: Three = [],  # noqa: B006
+    step_height: TwoOrThree = [],  # noqa: B006
     value: Int32 = 0,
     cmd_id: Int32 | None = None,
 ) -> str:
@@ -54,6 +59,9 @@ async def servo(
         executed = gaits.servo(motion_id, MotionRequest(body=body_of(pos_des, rpy_des)))
     else:
         executed = Executed(MotionCode.UNSUPPORTED)
+    if executed.code is not MotionCode.DONE:
+        why = servo_reason(executed.code, motion_id, cmd_type)
+        seldom.warning(f"{motion_id} {why}", "%d refused: %s", call.code, why)
     response: dict[str, object] = {
         "motion_id": motion_id,
         "result": executed.code is MotionCode.DONE,
@@ -70,10 +78,10 @@ async def motion(
     call: Call,
     *,
     motion_id: Int32,
-    vel_des: list[float] = [],  # noqa: B006 - never changed
-    pos_des: list[float] = [],  # noqa: B006
-    rpy_des: list[float] = [],  # noqa: B006
-    step_height: list[float] = [],  # noqa: B006
+    vel_des: Three = [],  # noqa: B006 - never changed
+    pos_des: Three = [],  # noqa: B006
+    rpy_des: Three = [],  # noqa: B006
+    step_height: TwoOrThree = [],  # noqa: B006
     contact: Int32 = ALL_FEET,
     duration: Int32 = 0,
 ) -> dict[str, object]:
@@ -90,6 +98,8 @@ async def motion(
         code = await call.context.robot.clock.wait_for(call.context.gaits.carry_out(motion_id, request), ANSWER_MAX)
     except TimeoutError:
         return {"error_code": int(InBandError.TIMEOUT)}
+    if code is not MotionCode.DONE:
+        call.why = reason(code, motion_id, request)
     motion = (
         call.context.gaits.motion if call.context.profile is Profile.ROBOT else motion_id
     )  # what robots then report

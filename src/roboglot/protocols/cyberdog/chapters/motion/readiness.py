@@ -10,11 +10,13 @@ from roboglot.model.components.system.firmware import Firmware, FirmwareState
 from roboglot.model.components.system.health import MOTOR_ALARM, Health
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
-from roboglot.protocols.cyberdog.chapters.motion.motion_table import FIGURES
+from roboglot.protocols.cyberdog.chapters.motion.motion_states import entered
+from roboglot.protocols.cyberdog.chapters.motion.motion_table import FIGURES, USERS, WALKS
 from roboglot.wire.cyberdog.chapters.motion.motion import ALLOWED_ON_LOW_BATTERY, ALLOWED_WHEN_STOPPED, MotionCode
 from roboglot.wire.cyberdog.codes import MachineState
 
 PROTECTED_BELOW, LOW_POWER_BELOW = 0.20, 0.05  # charge
+GOING = WALKS.keys() | USERS
 UPDATING = frozenset({FirmwareState.INSTALLING, FirmwareState.INSTALLED, FirmwareState.REBOOTING})
 
 
@@ -48,6 +50,8 @@ def refusal_of(robot: Robot, motion: int) -> MotionCode | None:
     if state is MachineState.ACTIVE:
         if Health in robot and robot[Health].has(MOTOR_ALARM):
             return MotionCode.MOTOR_OFFLINE
+        if motion in GOING and entered(robot):
+            return MotionCode.STATE  # its feet find no floor
         return _unfit(robot) if motion in FIGURES else None
     return MotionCode.LOW_BATTERY if state is MachineState.PROTECTED else MotionCode.STATE
 
