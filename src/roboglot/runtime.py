@@ -19,7 +19,7 @@ from roboglot.clients.visual.cloud import CloudLink
 from roboglot.config import Config, RobotConfig, refuse_unguarded
 from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.desk import World as ConsoleWorld
-from roboglot.console.recordings import Recordings
+from roboglot.console.recordings.running import Recordings
 from roboglot.console.server import Console
 from roboglot.console.studio.programs import FOLDER, ClassHome, Programs, Studio
 from roboglot.control.lease_server import LeaseServer

@@ -20,7 +20,6 @@ from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.system.lease import Lease
-from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
 from tests.browser.served import ADDRESS, OpenConsole, Page, Served, becomes, drive_until, is_driven, shows
@@ -130,22 +129,6 @@ async def test_a_gamepad_drives_and_stops(served: Served, open_console: OpenCons
     await until(lambda: not is_driven(served.robot))
     await served.clock.advance(0.5)
     assert speed_of(served) < 0.02
-
-
-@pytest.mark.slow  # a view of its own; tests/recording has the recorder
-async def test_a_recording_is_begun_marked_and_ended(served: Served, open_console: OpenConsole) -> None:
-    page = await open_console()
-    page.on("dialog", lambda dialog: asyncio.ensure_future(dialog.accept("it bumped")))
-    await page.click("#tab-actions")
-    await page.click("button:has-text('Record')")
-    await page.wait_for_selector("header >> text=REC")
-    async with page.expect_response("**/api/recording"):
-        await page.click("button:has-text('Mark')")
-    await served.clock.advance(1.0)
-    await page.click("text=End the recording")
-    await page.wait_for_selector("text=of the data folder.")
-    (file,) = (served.runtime.config.data / "recordings").glob("*.mcap")
-    assert read_recording(file).topics["/marks"] == 1
 
 
 def rest(served: Served, x: float) -> tuple[int, str]:

@@ -349,6 +349,7 @@ async def test_pupils_join_by_code_and_the_teacher_leads(guarded: Guarded, open_
     assert await pupils[0].evaluate("fetch('/api/class').then((r) => r.status)") == 403
     record = "fetch('/api/recording', {method: 'POST', body: '{\"do\": \"start\"}'}).then((r) => r.status)"
     assert await pupils[0].evaluate(record) == 403
+    assert await pupils[0].evaluate("fetch('/api/recordings').then((r) => r.status)") == 403
     emils = shown[0][0][-1]
     await teacher.wait_for_selector(".tile:has-text('Frida'):has-text('here')")
     if folder := os.environ.get("ROBOGLOT_PICTURES"):

@@ -13,7 +13,7 @@ from roboglot.console.desk import CLIENT, Desk
 from roboglot.console.http import Problem, Receive, Scope, Send, answer, answer_json, read_as, read_json
 from roboglot.console.openapi import document
 from roboglot.console.people.classes import Classes, ClassRequest
-from roboglot.console.recordings import RecordingRequest
+from roboglot.console.recordings.running import RecordingRequest, Recordings
 from roboglot.console.resend import resend
 from roboglot.console.state import link_of
 from roboglot.console.studio import blocks, lessons, plans
@@ -98,8 +98,8 @@ class Api:
                     with self._desk.noting("class"):
                         self._classes.check_teacher()
                 await answer_json(send, await self._classes.do(await read_as(receive, ClassRequest)))
-            case "GET" | "POST", ["recording"]:
-                await answer_json(send, await self._serve_recording(method, receive))
+            case "GET" | "POST", ["recording" | "recordings", *_]:
+                await self._route_recordings(method, parts, receive, send)
             case _, ["robots", *_]:
                 await self._route_robot(method, parts, receive, send, client)
             case _, ["world" | "world.toml", *_]:
@@ -137,9 +137,29 @@ class Api:
             case _:
                 raise _nothing_here()
 
-    async def _serve_recording(self, method: str, receive: Receive) -> dict[str, object]:
-        if (recordings := self._desk.recordings) is None:
+    def _recordings(self) -> Recordings:
+        if self._desk.recordings is None:
             raise NotFound("this program cannot record")
+        return self._desk.recordings
+
+    async def _route_recordings(self, method: str, parts: list[str], receive: Receive, send: Send) -> None:
+        """Serve the recording under way, and those of the data folder, which have all robots in them."""
+        recordings = self._recordings()
+        if parts == ["recording"]:
+            await answer_json(send, await self._serve_recording(recordings, method, receive))
+            return
+        self._desk.check_all("look at recordings", Right.ADMIN)
+        match method, parts:
+            case "GET", ["recordings"]:
+                await answer_json(send, await recordings.all())
+            case "GET", ["recordings", file]:
+                await recordings.shelf.send(file, send)
+            case "GET", ["recordings", one, "compared", other, *robot] if len(robot) < 2:
+                await recordings.shelf.send_comparison(one, other, "".join(robot), send)
+            case _:
+                raise _nothing_here()
+
+    async def _serve_recording(self, recordings: Recordings, method: str, receive: Receive) -> dict[str, object]:
         for name in self._desk.views:
             self._desk.view(name, "look at the recording")
         if method == "GET":

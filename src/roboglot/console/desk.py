@@ -28,7 +28,7 @@ from roboglot.spelling import meant
 from roboglot.values import dataclass
 
 if TYPE_CHECKING:
-    from roboglot.console.recordings import Recordings
+    from roboglot.console.recordings.running import Recordings
 
 CLIENT = "console"
 COMMAND = "command"  # the kind of recorded inputs for commands

@@ -19,7 +19,10 @@ NUMBER = NAME | {"name": "number"}
 READS = {
     "/api/me": "Who asks, and whether names are asked for here",
     "/api/class": "The class that is open, for its teacher; POST {do: open, lock, unlock, reset, give_back, close}",
-    "/api/recording": "How the recording of all robots goes; POST {do: start, stop, mark}",
+    "/api/recording": "How the recording of all robots goes; POST {do: start, stop, mark, delete}",
+    "/api/recordings": "The recordings in the data folder",
+    "/api/recordings/{file}": "A file of a recording",
+    "/api/recordings/{file}/compared/{other}": "A page that compares two recordings; with /{name}, of one robot",
     "/api/blocks": "Every function of robot programs for an editor: names, types, ranges, choices",
     "/api/lessons": "The missions of the studio",
     "/api/robots": "All robots with their poses",

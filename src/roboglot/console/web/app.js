@@ -11,9 +11,10 @@ import { Wire } from "./views/wire.js";
 import { World } from "./views/world.js";
 
 const SignIn = later(() => import("./views/sign.js").then((m) => m.SignIn));
+const Recordings = later(() => import("./views/recordings.js").then((m) => m.Recordings));
 const Class = later(() => import("./views/class.js").then((m) => m.Class));
 
-const VIEWS = { live: ["map", Live], wire: ["wire", Wire], world: ["world", World], robots: ["robots", Robots], class: ["school", Class] };
+const VIEWS = { live: ["map", Live], wire: ["wire", Wire], world: ["world", World], robots: ["robots", Robots], recordings: ["dot", Recordings], class: ["school", Class] };
 const named = () => (location.hash.slice(2) in VIEWS ? location.hash.slice(2) : "live");
 const view = signal(named());
 addEventListener("hashchange", () => { view.value = named(); });
@@ -61,8 +62,8 @@ function Header() {
 }
 
 function Nav() {
-  return html`<nav aria-label=${t("views")}>${Object.entries(VIEWS).filter(([name]) => name !== "class" || hello.value?.teacher).map(([name, [icon]]) => html`
-    <a href=${`#/${name}`} aria-current=${view.value === name ? "page" : undefined}><${Icon} name=${icon} size=${22} /><span>${t(`view.${name}`)}</span></a>`)}
+  return html`<nav aria-label=${t("views")}>${Object.entries(VIEWS).filter(([name]) => (name === "class" ? hello.value?.teacher : name !== "recordings" || hello.value?.all)).map(([name, [icon]]) => html`
+    <a class=${name === "recordings" ? "seldom" : ""} href=${`#/${name}`} aria-current=${view.value === name ? "page" : undefined}><${Icon} name=${icon} size=${22} /><span>${t(`view.${name}`)}</span></a>`)}
     <a href="/studio/"><${Icon} name="blocks" size=${22} /><span>${t("view.studio")}</span></a></nav>`;
 }
 
@@ -99,7 +100,7 @@ function App() {
   useEffect(() => want({ wire: view.value === "wire" }), [view.value]);
   const [, Shown] = VIEWS[view.value];
   if (status.value === "out") return html`<${Header} /><main class="lone"><${SignIn} /></main><${Notice} />`;
-  return html`<${Header} /><${Nav} /><main>${view.value !== "robots" && html`<h1 class="unseen">${t(`view.${view.value}`)} · ${t("robot.named", { name: current.value })}</h1>`}<${Banner} />${hello.value?.robots.length ? html`<${Shown} />` : html`<p class="empty">${t(hello.value ? "robots.hidden" : `link.${status.value}`)}</p>`}</main><${Notice} />`;
+  return html`<${Header} /><${Nav} /><main>${!["robots", "recordings"].includes(view.value) && html`<h1 class="unseen">${t(`view.${view.value}`)} · ${t("robot.named", { name: current.value })}</h1>`}<${Banner} />${hello.value?.robots.length ? html`<${Shown} />` : html`<p class="empty">${t(hello.value ? "robots.hidden" : `link.${status.value}`)}</p>`}</main><${Notice} />`;
 }
 
 await loadWords();

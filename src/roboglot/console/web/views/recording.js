@@ -2,7 +2,7 @@
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, duration, fetched, html, say, t } from "../base.js";
-import { connections, recording } from "../link.js";
+import { connections, hello, recording } from "../link.js";
 
 const LOOK = 1000; // ms
 const known = signal(/** @type {any} */ (null));
@@ -30,5 +30,6 @@ export function Recording() {
   const { seconds, bytes, file, failure } = known.value;
   return html`<div class="card"><h3>${t("record")}</h3><p class=${failure ? "warned" : "muted"}>${failure || (on ? t("record.on", { file, time: duration(seconds), megabytes: (bytes / 1e6).toFixed(1) }) : t("record.hint"))}</p>
     <div class="buttons"><${Button} kind=${on ? "danger" : ""} icon=${on ? "stop" : "dot"} label=${t(on ? "record.stop" : "record.start")} verb="record" onClick=${() => (on ? end() : ask({ do: "start" }))} />
-      ${on && html`<${Button} label=${t("record.mark")} verb="record" onClick=${() => { const text = prompt(t("record.words")); if (text) ask({ do: "mark", text }); }} />`}</div></div>`;
+      ${on && html`<${Button} label=${t("record.mark")} verb="record" onClick=${() => { const text = prompt(t("record.words")); if (text) ask({ do: "mark", text }); }} />`}
+      ${hello.value?.all && location.hash !== "#/recordings" && html`<a class="button" href="#/recordings">${t("view.recordings")}</a>`}</div></div>`;
 }

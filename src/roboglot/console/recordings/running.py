@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
+from roboglot.console.recordings.kept import Kept, Shelf
 from roboglot.model.errors import Refused
 
 if TYPE_CHECKING:
@@ -17,9 +19,10 @@ FOLDER = "recordings"  # in the data folder
 
 
 class RecordingRequest(msgspec.Struct, forbid_unknown_fields=True):
-    """Request of a person; ``text``: text of a mark."""
+    """Request of a person; ``text``: text of a mark; ``file``: first file of the recording to be deleted."""
 
-    do: Literal["start", "stop", "mark"]
+    do: Literal["start", "stop", "mark", "delete"]
+    file: Annotated[str, msgspec.Meta(max_length=255)] = ""
     text: Annotated[str, msgspec.Meta(max_length=500)] = ""
 
 
@@ -28,6 +31,7 @@ class Recordings:
 
     def __init__(self, data: Path, recorder: Callable[[], Recorder]) -> None:
         self._folder, self._recorder = data / FOLDER, recorder
+        self.shelf = Shelf(self._folder)
 
     @property
     def on(self) -> bool:
@@ -46,8 +50,17 @@ class Recordings:
             "failure": status.failure,
         }
 
+    async def all(self) -> list[Kept]:
+        """Return the recordings in the data folder, the newest first."""
+        return await asyncio.to_thread(self.shelf.look, self._running)
+
+    @property
+    def _running(self) -> Path | None:
+        status = self._recorder().status
+        return Path(status.path) if status.on else None
+
     async def do(self, request: RecordingRequest) -> dict[str, object]:
-        """Begin, mark or end the recording. Raises Refused."""
+        """Begin, mark or end the recording, or delete another. Raises Refused, NotFound."""
         recorder = self._recorder()
         match request.do:
             case "start":
@@ -57,6 +70,8 @@ class Recordings:
                 if not request.text.strip():
                     raise Refused("a mark needs text")
                 recorder.mark(request.text.strip())
+            case "delete":
+                await asyncio.to_thread(self.shelf.remove, request.file, self._running)
             case "stop":
                 ended = await recorder.stop()
                 return self.look() | {"file": Path(ended.path).name, "bytes": ended.bytes}

@@ -1,0 +1,1 @@
+"""Recordings on pages: the running one, and those that are kept in the data folder."""

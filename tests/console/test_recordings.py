@@ -1,0 +1,129 @@
+"""The recordings in the data folder on pages: listed, fetched, compared, deleted; nothing outside of the folder."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from roboglot.console.recordings.kept import Shelf
+from roboglot.model.errors import Busy, NotFound, Refused
+from roboglot.recording.entries import NANO, Entry
+from roboglot.recording.files import Files, Limits, Origin
+from roboglot.recording.redaction import Redaction
+from tests.console.conftest import Shown
+
+FACTS = {"version": "1", "world": "office", "robots": '{"a": "universal", "b": "cyberdog2"}'}
+
+
+def written(path: Path, seconds: int, limits: Limits | None = None) -> None:
+    files = Files(path, Origin(FACTS), Redaction(), limits or Limits())
+    files.open(1000 * NANO)
+    for second in range(seconds + 1):
+        files.write(Entry("/a/events", "event", (1000 + second) * NANO, 0, {"event": "Tick", "number": second}))
+        files.flush()
+    files.close()
+
+
+def test_recordings_are_listed_with_what_people_look_for(tmp_path: Path) -> None:
+    for number, name in enumerate(("old", "new")):
+        written(tmp_path / f"{name}.mcap", 5 + number)
+        os.utime(tmp_path / f"{name}.mcap", (1e9 + number, 1e9 + number))
+    (tmp_path / "notes.txt").write_text("no recording")
+    new, old = Shelf(tmp_path).look(None)
+    assert (new.file, new.seconds, new.robots, new.world, new.at) == ("new.mcap", 6.0, ["a", "b"], "office", 1e9 + 1)
+    assert (old.file, old.seconds, old.bytes) == ("old.mcap", 5.0, (tmp_path / "old.mcap").stat().st_size)
+    assert f"--robot 'a=recording:{tmp_path / 'new.mcap'}#a'" in new.play
+
+
+def test_parts_are_one_recording(tmp_path: Path) -> None:
+    written(tmp_path / "long.mcap", 20, Limits(part_seconds=5.0))
+    written(tmp_path / "walk-002.mcap", 3)  # a name that looks like that of a part
+    long, walk = sorted(Shelf(tmp_path).look(None), key=lambda one: one.file)
+    assert [part.file for part in long.parts] == ["long.mcap", *(f"long-00{n}.mcap" for n in (2, 3, 4))]
+    assert (long.seconds, len(walk.parts), walk.seconds) == (20.0, 1, 3.0)
+    Shelf(tmp_path).remove("long.mcap", None)
+    assert [path.name for path in tmp_path.iterdir()] == ["walk-002.mcap"]
+
+
+def test_files_without_an_end_have_no_length(tmp_path: Path) -> None:
+    written(tmp_path / "killed.mcap", 3)
+    os.truncate(tmp_path / "killed.mcap", (tmp_path / "killed.mcap").stat().st_size - 100)
+    (tmp_path / "other.mcap").write_bytes(b"no MCAP at all")
+    (tmp_path / "empty.mcap").touch()
+    assert {one.file: one.seconds for one in Shelf(tmp_path).look(None)} == dict.fromkeys(
+        ("killed.mcap", "other.mcap", "empty.mcap")
+    )
+
+
+def test_nothing_outside_of_the_folder_is_touched(tmp_path: Path) -> None:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    written(tmp_path / "outside.mcap", 1)
+    (folder / "link.mcap").symlink_to(tmp_path / "outside.mcap")
+    (folder / ".hidden.mcap").touch()
+    shelf = Shelf(folder)
+    for name in (
+        "../outside.mcap",
+        "link.mcap",
+        ".hidden.mcap",
+        "..",
+        "",
+        "absent.mcap",
+        str(tmp_path / "outside.mcap"),
+    ):
+        with pytest.raises(NotFound):
+            shelf.path(name)
+        with pytest.raises(NotFound):
+            shelf.remove(name, None)
+    assert (tmp_path / "outside.mcap").exists()
+
+
+def test_running_recording_is_not_deleted(tmp_path: Path) -> None:
+    written(tmp_path / "now.mcap", 1)
+    shelf = Shelf(tmp_path)
+    assert shelf.look(tmp_path / "now.mcap")[0].running
+    with pytest.raises(Refused, match="end the recording first"):
+        shelf.remove("now.mcap", tmp_path / "now.mcap")
+    assert not shelf.look(tmp_path.parent / "now.mcap")[0].running
+
+
+async def test_one_comparison_at_a_time(tmp_path: Path) -> None:
+    shelf = Shelf(tmp_path)
+    async with shelf._comparing:
+        with pytest.raises(Busy):
+            await shelf.send_comparison("a.mcap", "b.mcap", "", lambda _message: pytest.fail("sent"))
+
+
+async def test_recording_is_fetched_and_deleted(shown: Shown) -> None:
+    assert await shown.ask("/api/recordings") == (200, [])
+    _, begun = await shown.ask("/api/recording", {"do": "start"})
+    await shown.clock.advance(2.0)
+    file = begun["file"]
+    (listed,) = (await shown.ask("/api/recordings"))[1]
+    assert (listed["file"], listed["running"]) == (file, True)
+    assert (await shown.ask("/api/recording", {"do": "delete", "file": file}))[0] == 409
+    await shown.ask("/api/recording", {"do": "stop"})
+    (listed,) = (await shown.ask("/api/recordings"))[1]
+    assert (listed["seconds"], listed["robots"]) == (2.0, ["a"])
+    path = shown.runtime.config.data / "recordings" / file
+    assert await shown.read(f"/api/recordings/{file}") == path.read_bytes()
+    assert (await shown.ask("/api/recordings/no.mcap"))[0] == 404
+    assert (await shown.ask("/api/recording", {"do": "delete", "file": file}))[0] == 200
+    assert not path.exists()
+    assert (await shown.ask("/api/recording", {"do": "delete", "file": file}))[0] == 404
+
+
+@pytest.mark.slow  # starts a process; tests/recording/test_drives.py compares
+async def test_two_recordings_are_compared_on_a_page(shown: Shown) -> None:
+    files = []
+    for _ in range(2):
+        files.append((await shown.ask("/api/recording", {"do": "start"}))[1]["file"])
+        await shown.clock.advance(1.0)
+        await shown.ask("/api/recording", {"do": "stop"})
+    one, other = files
+    page = (await shown.read(f"/api/recordings/{one}/compared/{other}/a")).decode()
+    assert "ground truth: at most 0.00 m apart" in page
+    status, words = await shown.ask(f"/api/recordings/{one}/compared/{other}/z")
+    assert (status, words["error"]) == (409, f"{one} has nothing of that robot and protocol")
