@@ -27,9 +27,11 @@ from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.docking import Docking
+from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.microphone import Microphone
+from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Unconnected
 from roboglot.model.geometry import Point, Pose
@@ -92,6 +94,17 @@ async def test_one_robot_is_driven_mapped_and_refused(shown: Shown) -> None:
     ):
         status, answer = await shown.ask(path, values)
         assert (status, words in answer["error"]) == (expected, True), answer
+
+
+async def test_a_robot_that_restarts_takes_what_holds_only(shown: Shown) -> None:
+    shown.robot[Firmware].reboot()
+    await shown.clock.advance(1.0)
+    for verb, values in (("set_pose", {"x": 1.0, "y": 1.0}), ("clear_map", {}), ("relocalize", {})):
+        assert await shown.ask(f"/api/robots/a/{verb}", values) == (409, {"error": "the robot restarts"})
+    assert (await shown.ask("/api/robots/a/emergency_stop", {"engage": True}))[0] == 200
+    await shown.clock.advance(40.0)
+    assert shown.robot[EmergencyStop].engaged
+    assert (await shown.ask("/api/robots/a/set_pose", {"x": 1.0, "y": 1.0}))[0] == 200
 
 
 async def test_control_taken_by_others_refuses_the_console(shown: Shown) -> None:

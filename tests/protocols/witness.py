@@ -104,9 +104,9 @@ class Witness:
         while left > 0 and self.robot.actions.running():
             await self.pass_time(GRACE)
             left -= GRACE
-        assert not self.running, f"still running {seconds} s later"
+        assert not self.running, f"still running {seconds} s later: {self.running}"
         await self.pass_time(2 * GRACE)
-        assert not self.running
+        assert not self.running, f"running again: {self.running}"
 
     def look(self) -> None:
         """Assert that what no action moves stands."""
@@ -151,6 +151,7 @@ class Witness:
     def _note(self, event: ActionChanged) -> None:
         action: Action = event.action
         if action.status.ended:
+            self.note(action.name, action.id, action.status.name, action.reason, self.pose)
             self._freed |= dict.fromkeys(action.resources, event.stamp)
 
 

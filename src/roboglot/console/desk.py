@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 CLIENT = "console"
 COMMAND = "command"  # the kind of recorded inputs for commands
 TAKE = "take_control"  # handled separately because it concerns the caller
+# They hold although the robot is off or restarts; what others set would be lost at its start.
+HOLD = frozenset({"stop", "cancel", "emergency_stop", "give_control", "release_control", "dismiss_fault"})
 assert map_verbs  # importing it registers its verbs
 
 
@@ -175,6 +177,8 @@ class Desk:
         if operation.right is Right.SEE:
             return await operation.call(robot, values)
         with robot.admission.noting(CLIENT, verb), self._input(robot, verb, values, client):
+            if robot.starts.down and verb not in HOLD:
+                raise Refused(robot.starts.down)
             return await operation.call(robot, values)
 
     @staticmethod

@@ -66,7 +66,7 @@ from roboglot.protocols.slamware.errors import REASON, HttpError, bad_request, f
 from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.parameters import Parameters
 from roboglot.protocols.slamware.routes import BEYOND, Match, Routes
-from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text, concerns_map
+from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text, changes_map, concerns_map
 from roboglot.protocols.turns import wait_for_turn
 from roboglot.wire.contracts import Row, contract
 
@@ -211,16 +211,8 @@ class Application:
         path = scope["raw_path"].decode("latin-1").encode("unicode_escape").decode()[:LOGGED_MAX]
         why = f": {body[:LOGGED_MAX].decode(errors='replace')!r}" if status >= 400 else ""
         ms = seconds * 1000
-        log.debug(
-            "robot %s: %s %s %s -> %d, %.1f ms%s",
-            self._context.robot.id,
-            client,
-            scope["method"],
-            path,
-            status,
-            ms,
-            why,
-        )
+        words = self._context.robot.id, client, scope["method"], path, status, ms, why
+        log.debug("robot %s: %s %s %s -> %d, %.1f ms%s", *words)
 
     async def _enter(self, scope: Scope) -> None:
         """Act for the client's proven identity from here on. Raises HttpError 401: unknown client."""
@@ -294,6 +286,8 @@ class Application:
         try:
             if self._admission.enforced and "body" in values:
                 await self._check_again(scope, row.key, operation.right)
+            if changes_map(operation):
+                await self._context.maps.starting.ended()
             if concerns_map(operation):
                 await settle(self._context.robot)
             return await operation.call(self._context, values)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from roboglot.extras import MissingExtra, in_words, is_there, open_uvicorn
 from roboglot.model.components.mapping.storeys import Storeys
 from roboglot.model.components.system.firmware import Module
-from roboglot.model.events import ModuleRestarted, Rebooted, Rebooting, ShuttingDown
+from roboglot.model.events import ModuleRestarting, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.robot import Robot
 from roboglot.protocols.browsers import Browsers
 from roboglot.protocols.door import Endpoint
@@ -95,7 +95,7 @@ class SlamwareDoor:
             self._voice,
         ):
             part.start()
-        await context.maps.start()
+        await context.maps.starting.begin()
         self._arrivals.follow_car()
         if Storeys in self._robot:
             self._robot[Storeys].maps = LoadedStoreys(context)
@@ -105,7 +105,7 @@ class SlamwareDoor:
             listen(Rebooting, lambda _: self._fall_silent()),
             listen(ShuttingDown, lambda _: self._fall_silent()),
             listen(Rebooted, lambda _: self._reopen()),
-            listen(ModuleRestarted, self._module_restarted),
+            listen(ModuleRestarting, self._module_restarting),
         ]
 
     async def _listen(self) -> None:
@@ -132,16 +132,19 @@ class SlamwareDoor:
 
     def _reopen(self) -> None:
         """Open again; state in memory was lost in the restart."""
-        self._opening = asyncio.get_running_loop().create_task(self._open_again(), name="slamware door opens again")
+        restore_masks(self._robot)
+        starting = self._context.maps.starting.begin()
+        self._opening = asyncio.get_running_loop().create_task(
+            self._open_again(starting), name="slamware door opens again"
+        )
 
-    def _module_restarted(self, event: ModuleRestarted) -> None:
-        """Reload the map from disk after the software has restarted; the base has no map."""
+    def _module_restarting(self, event: ModuleRestarting) -> None:
+        """Reload the map from disk as the software begins to restart; the base has no map."""
         if event.module == Module.SOFTWARE:
             self._reopen()
 
-    async def _open_again(self) -> None:
-        restore_masks(self._robot)
-        await self._context.maps.start()
+    async def _open_again(self, starting: asyncio.Task[None]) -> None:
+        await starting
         self._arrivals.follow_car()
         if self._server is None:
             await self._listen()

@@ -11,9 +11,11 @@ from __future__ import annotations
 from enum import Enum
 
 from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import MapMemory
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
-from roboglot.operations import Operation, OperationTable
+from roboglot.operations import Operation, OperationTable, Right
 from roboglot.protocols.slamware.routes import BEYOND
 from roboglot.values import dataclass
 
@@ -43,6 +45,12 @@ ON_MAP = ("/api/multi-floor/", "POST /api/core/motion/v1/actions")  # others tha
 def concerns_map(operation: Operation[str]) -> bool:
     """Return whether an operation reads what lies on the map: it has to wait while another map comes into use."""
     return not DRAWN.isdisjoint(operation.needs | operation.some) or any(part in operation.key for part in ON_MAP)
+
+
+def changes_map(operation: Operation[str]) -> bool:
+    """Return whether an operation changes the map, what lies on it, or the robot's place: a load would undo that."""
+    placed = not {Localization, Mapping}.isdisjoint(operation.needs | operation.some)
+    return operation.right is not Right.SEE and (placed or concerns_map(operation))
 
 
 def implemented() -> set[str]:

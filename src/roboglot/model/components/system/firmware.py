@@ -131,4 +131,4 @@ class Firmware(Component):
 
     @abstractmethod
     def restart(self, module: Module, *, source: str = "") -> Action:
-        """Restart one module: motions are cancelled, and the robot stands until it is up again."""
+        """Restart one module, until when the robot stands. It cancels motions, the software's restart all actions."""

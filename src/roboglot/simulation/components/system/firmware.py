@@ -13,6 +13,7 @@ from msgspec import Meta, Struct
 
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.energy.power import POWER
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.system.disk import Disk
@@ -223,10 +224,11 @@ class SimulatedFirmware(Firmware):
         return self._module
 
     def restart(self, module: Module, *, source: str = "") -> Action:
-        async def run(_: Action) -> None:
+        async def run(restart: Action) -> None:
             robot, lock = self._robot, f"restart of {module}"
-            for action in robot.actions.running(BASE):
-                action.cancel(f"the {module} restarts")
+            for action in robot.actions.running(BASE if module is Module.BASE else None):
+                if action is not restart and POWER not in action.resources:
+                    action.cancel(f"the {module} restarts")
             hold_still(robot, self._base.locks, lock, f"the {module} restarts")
             self._module = module
             robot.events.publish(ModuleRestarting(stamp=self._clock.time(), module=module))

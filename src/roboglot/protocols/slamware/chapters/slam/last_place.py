@@ -83,7 +83,8 @@ class PlaceMemory:
     def _replaced(self, event: MapReplaced) -> None:
         self.known = self.known and event.origin is not None
 
-    def _here(self) -> LastPlace | None:
+    def here(self) -> LastPlace | None:
+        """Return the present place; None while it is unknown."""
         localization, frame = self._robot[Localization], self._frame()
         if not self.known or frame is None or localization.lost is not None:
             return None
@@ -100,7 +101,7 @@ class PlaceMemory:
 
     async def _keep(self) -> None:
         await settle(self._robot)
-        here, stored = self._here(), last_place(self._robot)
+        here, stored = self.here(), last_place(self._robot)
         if here is not None and (stored is None or _differs(here, stored)):
             await self._robot[Settings].keep(PLACE, msgspec.to_builtins(here))
 

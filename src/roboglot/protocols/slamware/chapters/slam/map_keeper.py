@@ -31,7 +31,7 @@ from roboglot.protocols.slamware.chapters.artifact.poi_shifts import PoiShifts
 from roboglot.protocols.slamware.chapters.cloud import CloudFolder
 from roboglot.protocols.slamware.chapters.motion.home_docks import BOUND, before, home_dock, known_docks, settle_home
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
-from roboglot.protocols.slamware.chapters.slam.last_place import PlaceMemory, is_docked
+from roboglot.protocols.slamware.chapters.slam.last_place import PlaceMemory, is_docked, last_place
 from roboglot.protocols.slamware.chapters.slam.loaded_floors import LoadedFloors
 from roboglot.protocols.slamware.chapters.slam.map_frames import (
     BASIS,
@@ -49,6 +49,7 @@ from roboglot.protocols.slamware.chapters.slam.map_frames import (
     resumed,
     with_docks,
 )
+from roboglot.protocols.slamware.chapters.slam.map_start import MapStart
 from roboglot.wire.slamware.chapters.multi_floor import MapLoadStatus
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 from roboglot.wire.slamware.chapters.slam.stcm import Layer, decode_stcm, encode_stcm
@@ -67,6 +68,7 @@ class MapKeeper:
         self._loading = False
         self._layers: tuple[Layer, ...] = ()  # of the map in memory, of unknown type
         self.status = MapLoadStatus.NOT_LOADED
+        self.starting = MapStart(self.start)
         self._loaded = LoadedFloors()
         self.current = FloorName()
         self.entered: Callable[[], None] = lambda: None  # called when another floor is in use
@@ -185,7 +187,8 @@ class MapKeeper:
                 floors, digest = await self._parse(data), _digest(data)
                 floor = _start_of(self._robot, floors)
                 if restarting:
-                    floor, pose = resumed(self._robot, floors, digest) or (floor, None)
+                    last = self.place.here() or last_place(self._robot)
+                    floor, pose = resumed(self._robot, floors, digest, last) or (floor, None)
                 keep = restarting and digest in bases(self._robot)
                 draw = self._turn_over(floor, digest) if keep else put_drawings(self._robot, floor, {digest: NOT_MOVED})
                 await self._use(floor, pose, draw)
