@@ -171,7 +171,7 @@ class Screen:
                 self._witness.note(id, "ended", state)
                 assert (state["result"] == 0) == (state["reason"] == ""), state
                 if id in self._goals and state["result"] == 0:
-                    assert self._goals[id].distance_to(self._witness.pose) < OFF, (id, self._goals[id])
+                    assert self._goals[id].distance_to(self._witness.ends[id]) < OFF, (id, self._goals[id])
             else:
                 assert self._witness.now - self._begun[id] < ENDLESS, f"{id} does not end"
         if not self._robot.actions.running():

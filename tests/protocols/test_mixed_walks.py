@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose
+from roboglot.simulation.components.system.firmware import RESTART_SECONDS
 from tests.protocols.cyberdog.phone import Messages
 from tests.protocols.cyberdog.test_walks import STATUS
 from tests.protocols.life import ADDRESS, BODIES, Life
@@ -59,6 +61,8 @@ class MixedWalk:
 
     async def end(self) -> None:
         """Let all clients go, and assert that the doors agree about the robot at rest."""
+        if self._witness.robot[Firmware].restarting:  # programs go on until then
+            await self._witness.pass_time(max(RESTART_SECONDS.values()))
         await self.screen.end()
         self._speaker.leave()
         await self._phone.end()

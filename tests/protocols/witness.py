@@ -60,6 +60,7 @@ class Witness:
     def __init__(self, world: World, robot: Robot, forward: Forward) -> None:
         self.world, self.robot, self._forward = world, robot, forward
         self._freed: dict[str, float] = {}  # s, by resource: when its last action ended
+        self.ends: dict[int, Pose] = {}  # where the robot was when its actions ended
         robot.events.listen(ActionChanged, self._note)
         self._joints: dict[str, tuple[float, ...]] = {}
         self._before, self._followed = (self.now, self.pose), -math.inf
@@ -151,6 +152,7 @@ class Witness:
     def _note(self, event: ActionChanged) -> None:
         action: Action = event.action
         if action.status.ended:
+            self.ends[action.id] = self.pose
             self.note(action.name, action.id, action.status.name, action.reason, self.pose)
             self._freed |= dict.fromkeys(action.resources, event.stamp)
 

@@ -306,6 +306,19 @@ async def test_the_jack_as_an_action(robot: Robot, client: httpx.AsyncClient, fo
     assert robot[Jack].stage is JackStage.UP
 
 
+async def test_errands_replace_drives_from_the_start(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    """The jack rises first: the robot does not drive to its earlier goal meanwhile."""
+    await forward(seconds=1)
+    here = robot[Localization].pose
+    before = await start(client, "MoveToAction", target={"x": here.x + 3.0, "y": here.y})
+    await forward(seconds=2)
+    id = await start(client, "JackTopMoveToAction", target={"x": here.x, "y": here.y})
+    await forward(seconds=1)
+    assert await state(client, before) == {"status": 4, "result": -2, "reason": "carry took over"}
+    assert (robot[Base].velocity, robot[Jack].stage) == (Twist(), JackStage.MOVING)
+    assert (await client.get(f"{ACTIONS}/:current")).json()["action_id"] == id
+
+
 async def test_lifted_shelf_is_carried_to_a_place(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:

@@ -13,7 +13,7 @@ from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
-from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback
 from roboglot.model.components.motion.sweeping import Sweeping
 from roboglot.model.components.motion.tag_docking import TagDocking
@@ -159,7 +159,8 @@ async def search_path(context: Context, body: PathQuery) -> PathPoints:
 
 def create(context: Context, request: ActionRequest) -> Action:
     """Start an action in place of the current one. Raises HttpError 400 for a refusal."""
-    before = context.robot.actions.running(ERRAND)
+    running = context.robot.actions.running
+    before = [*running(ERRAND), *running(BASE)]  # an errand takes the base as late as its first drive
     factory = FACTORIES.get(action_word(request.action_name) or "")
     try:
         if factory is None:
@@ -172,8 +173,9 @@ def create(context: Context, request: ActionRequest) -> Action:
             BAD_REQUESTS["POST /api/core/motion/v1/actions"],
             why_invalid(error, field="options", wanted=factory and factory.options),
         ) from None
-    for errand in before:
-        errand.cancel(f"{action.name} took over")
+    for other in before:
+        if other is not action:  # MoveBy continues
+            other.cancel(f"{action.name} took over")
     return action
 
 
