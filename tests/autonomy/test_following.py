@@ -11,6 +11,7 @@ from roboglot.model.actions import ActionStatus
 from roboglot.model.components.motion.following import Following, FollowSide
 from roboglot.model.components.system.bluetooth import Bluetooth
 from roboglot.model.errors import InvalidGoal, NotFound
+from roboglot.model.geometry import Pose
 
 if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
@@ -35,6 +36,21 @@ async def test_it_keeps_near_who_walks(tour: Tour, side: FollowSide) -> None:
     action.cancel()
     await tour.end_of(action)
     assert action.status is ActionStatus.CANCELED
+
+
+@pytest.mark.world("playground", body="cyberdog2")
+async def test_it_stands_still_at_a_person_too_near_to_see(tour: Tour) -> None:
+    anna = tour.world.hands.person("anna")
+    tour.world.hands.place("a", Pose(anna.pose.x - 2.0, anna.pose.y, 0.0))
+    action, gaps, searched = tour.robot[Following].follow(distance=1.0), [], 0
+    for _ in range(140):
+        await tour.clock.advance(0.1)
+        gaps.append(tour.truth.distance_to(anna.pose))
+        searched += action.feedback == "searching" and len(gaps) > 20
+    assert max(gaps[60:]) - min(gaps[60:]) < 0.05
+    assert 0.8 < gaps[-1] < 1.2
+    assert searched == 0
+    action.cancel()
 
 
 @pytest.mark.world("empty")

@@ -31,6 +31,8 @@ GAIN, TURN_GAIN = 1.2, 2.5  # 1/s
 AHEAD = 1.0  # m of free room straight ahead that suffice for the moment
 ROUND_THE_CORNER = 0.3  # m from the last sighting at which the robot turns to where the person went
 TOO_NEAR = 1.8  # m within which a person may stand unrecognized
+UNSEEN = 0.3  # s without sight of a person after which the lidar tracks one who is TOO_NEAR
+BY_LIDAR_MAX = 15.0  # s for which it does: then the camera has to see the person again
 BACK, BACK_BEARING = 0.2, 0.5  # m/s, rad
 CLOSE = 0.08  # m from its place within which the robot stands still
 BESIDE = math.radians(130.0)  # from the person's course, at which the robot's place beside them lies: a little behind
@@ -50,6 +52,7 @@ class _Quarry:
     trail: Trail = field(default_factory=Trail)
     around: float | None = None  # rad in odom: the direction of the current detour
     ranged_at: float = -math.inf  # robot time
+    recognized_at: float = -math.inf  # robot time at which the camera saw the person last
     _anchor: Point | None = None
 
     def spot(self, place: Point, stamp: float, seen_from: Pose) -> None:
@@ -96,6 +99,7 @@ class SightFollowing(Following):
                 def look() -> None:
                     for sighting in viewer.drain():
                         self._spot(quarry, sighting)
+                    self._see_near(quarry)
 
                 await self._run(action, quarry, look, side, distance)
 
@@ -135,6 +139,20 @@ class SightFollowing(Following):
         goal = (place, side, distance)
         return start_on_base(self._robot, "follow thing", run, goal=goal, source=source)
 
+    def _see_near(self, quarry: _Quarry) -> None:
+        """Track by the lidar a person who stands too near for the camera."""
+        unseen = self._robot.clock.time() - quarry.recognized_at
+        scan = self._robot[Lidar].scan
+        if quarry.place is None or scan is None or not UNSEEN < unseen <= BY_LIDAR_MAX:
+            return
+        here = self._robot[Odometry].reading.pose
+        if scan.stamp <= quarry.ranged_at or here.point.distance_to(quarry.place) > TOO_NEAR:
+            return
+        quarry.ranged_at = scan.stamp
+        last = Pose(quarry.place.x, quarry.place.y).relative_to(here).point
+        if (now := thing_at(self._reader.read(scan).points, last)) is not None:
+            quarry.spot(here.compose(Pose(now.x, now.y)).point, scan.stamp, here)
+
     def _see(self, quarry: _Quarry, scan: LaserScan | None) -> None:
         """Update the place of the followed thing by a new scan."""
         if scan is None or scan.stamp <= quarry.ranged_at or quarry.place is None:
@@ -173,6 +191,7 @@ class SightFollowing(Following):
                 seen_from = self._robot[Odometry].reading.pose
                 place = seen_from.compose(Pose(person.place.x, person.place.y)).point
                 quarry.spot(place, sighting.stamp, seen_from)
+                quarry.recognized_at = sighting.stamp
                 return
 
     def _range(self, quarry: _Quarry, tag: TagReading) -> None:
