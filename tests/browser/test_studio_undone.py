@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 
 import pytest
 
-from tests.browser.served import shows, until
+from roboglot.model.components.motion.driving import Driving
+from roboglot.model.geometry import Pose
+from tests.browser.served import Served, becomes, is_driven, shows, until
 from tests.browser.test_studio import READY, Open, loaded, phase, prints, studio
 
 __all__ = ["studio"]  # the fixture
@@ -87,6 +90,39 @@ async def test_walk_that_a_person_stops_is_no_refusal(studio: Open) -> None:
     await until(page, READY)
     await shows(page, WORD, "Ended")
     await shows(page, "document.querySelector('#panel').innerText.trim()", "Output\nended by the user")
+    assert page.errors == []
+
+
+@pytest.mark.slow  # in short: test_walk_that_a_person_stops_is_no_refusal
+async def test_walk_stopped_before_its_program_is_no_refusal(studio: Open, served: Served) -> None:
+    """The robot stands, and has said why, before a busy machine has ended the program."""
+    service = next(iter(served.runtime._programs.values())).service
+    page = await loaded(await studio(), WALK)
+    await page.click("#tab-output")
+    await page.keyboard.press("F5")
+    await until(page, "document.querySelector('.lit')?.dataset.id === 'walk'")
+    await served.clock.advance(1.0)
+    async with service._turns.take():
+        await page.keyboard.press("Escape")
+        await becomes(lambda: asyncio.sleep(0, is_driven(served.robot)), False)
+        await served.clock.advance(1.0)
+    await shows(page, WORD, "Ended")
+    await page.reload()
+    await until(page, READY)
+    await shows(page, WORD, "Ended")
+    await shows(page, "document.querySelector('#panel').innerText.trim()", "Output\nended by the user")
+
+
+async def test_escape_stops_the_robot_without_a_program(studio: Open, served: Served) -> None:
+    page = await studio()
+    served.robot[Driving].move_by(Pose(1.0, 0.0, 0.0), source="somebody else")
+    await served.clock.advance(0.5)
+    await until(page, "studio.runner.phase.value === 'idle' && document.querySelector('header .stop')")
+    await page.keyboard.press("Escape")
+    await becomes(lambda: asyncio.sleep(0, is_driven(served.robot)), False)
+    await served.clock.advance(1.0)
+    assert served.robot.actions.running() == []
+    assert await page.locator(".notice.bad").count() == 0
     assert page.errors == []
 
 

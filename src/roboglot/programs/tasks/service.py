@@ -6,7 +6,7 @@ Changes are stored before they are acknowledged. Knows no frame and no socket: d
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from datetime import UTC, tzinfo
 from functools import partial
@@ -248,6 +248,7 @@ class ProgramService:
         ``why`` is the last line of their logs; by default the user ended them.
         """
         refused: dict[str, ProgramError] = {}
+        _expect_end(self._runs, ids)
         async with self._turns.take():
             states: dict[str, TaskState] = {}
             for id in ids:
@@ -255,6 +256,7 @@ class ProgramService:
                     states[id] = await self._check_table(TaskOperation.SHUTDOWN, id)
                 except ProgramError as refusal:
                     refused[id] = refusal
+                    _expect_end(self._runs, [id], ends=False)
             for id in states:
                 if id in self._runs:
                     self._runs[id].call_off()
@@ -350,3 +352,10 @@ def _shut_down(run: TaskRun) -> str:
     else:
         why = "the server shut down while the task was under way; the task was ended"
     return why
+
+
+def _expect_end(runs: Mapping[str, TaskRun], ids: Collection[str], *, ends: bool = True) -> None:
+    """Note that runs are about to end: what is cut short until their turn comes is no fault of the robot's."""
+    for id in ids:
+        if id in runs:
+            runs[id].is_ending = ends

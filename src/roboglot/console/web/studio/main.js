@@ -3,7 +3,7 @@ import { render } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { computed, effect, signal, untracked } from "@preact/signals";
 import { Button, Icon, PATHS, html, kept, lacks, language, loadWords, notice, place, say, t, theme } from "../base.js";
-import { choose, connect as connectRobot, current, hello, me, status, want } from "../link.js";
+import { choose, connect as connectRobot, current, hello, me, state, status, want } from "../link.js";
 import { loadTable } from "./blocks.js";
 import { Group } from "./class.js";
 import { Help, Keys, Library, Schedule, shown } from "./dialogs.js";
@@ -45,7 +45,7 @@ function Header() {
     <label class="robot"><span>${t("robot")}</span>
       <select value=${current.value} onChange=${(e) => { choose(e.target.value); open(); }}>${robots.map((r) => html`<option>${r.name}</option>`)}</select></label>
     <label class="name"><span class="unseen">${t("studio.name")}</span><input value=${program.value.name} placeholder=${t("studio.untitled")} maxlength="60" onChange=${(e) => rename({ name: e.target.value })} /></label>
-    <span class="stored muted" role="status">${stored.value && t(`studio.stored.${stored.value}`)}</span>
+    <span class="stored muted" role="status" title=${stored.value && t(`studio.stored.${stored.value}`)}>${stored.value && t(`studio.stored.${stored.value}`)}</span>
     <span class="grow"></span>
     <label class="looks"><span class="unseen">${t("studio.look")}</span><select value=${editor.look.value} onChange=${(e) => { editor.look.value = e.target.value; }}>${looks.map((l) => html`<option value=${l}>${t(`studio.look.${l}`)}</option>`)}</select></label>
     <button type="button" class="button plain" lang=${language.value === "zh" ? "en" : "zh-CN"} onClick=${() => { language.value = language.value === "zh" ? "en" : "zh"; }}>${language.value === "zh" ? "EN" : "中文"}</button>
@@ -124,13 +124,16 @@ function Side() {
     <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><h2 class="unseen">${t(`studio.tab.${tab.value in TABS ? tab.value : "python"}`)}</h2><${Shown} /></div></aside>`;
 }
 
+/** Whether there is something to stop: the program, or what anybody else has the robot do. */
+const moves = () => runner.phase.value !== "idle" || Boolean(state.value?.actions?.length);
+
 const WINDOWS = { library: Library, schedule: Schedule, keys: Keys, help: Help };
 function App() {
   useEffect(() => {
     const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: (e) => runner.step(e.shiftKey ? "out" : "step"), F10: () => runner.step("over"),
       F9: () => { if (program.value.kind === "blocks") editor.toggleBreak(); } };
     const key = (event) => {
-      if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && runner.phase.value !== "idle") { runner.halt(); return; }
+      if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && moves()) { runner.halt(); return; }
       if (/^s$/i.test(event.key) && (event.ctrlKey || event.metaKey)) { event.preventDefault(); keepNow(); return; }
       if (event.key === "F5" && event.shiftKey) { event.preventDefault(); runner.stop(); return; }
       if (/^[zy]$/i.test(event.key) && (event.ctrlKey || event.metaKey) && !event.defaultPrevented && program.value.kind === "blocks" && !shown.value

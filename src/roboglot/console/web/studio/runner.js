@@ -114,7 +114,7 @@ async function go(step) {
 export const pause = () => orLater(() => operate("suspend"));
 export const stop = () => orLater(async () => { ending = true; ending = await operate("shutdown"); });
 /** Stop the robot, and its program. */
-export function halt() { if (!lacks("program")) stop(); return command("stop"); }
+export function halt() { if (phase.value !== "idle" && !lacks("program")) stop(); return command("stop"); }
 export const step = (/** @type {Step} */ how = "step") => run(how);
 
 /** @param {"suspend" | "shutdown" | "recover"} operation @param {string} [id] */
