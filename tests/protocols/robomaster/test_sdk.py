@@ -124,6 +124,29 @@ async def test_a_refusal_names_the_nearest_valid_command(client, listen, caplog,
     assert await client.ask(f"{advised}{at_once};") not in ("fail;", "command format error: command parse error;")
 
 
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("chassis move x 0.1 vx 1;", "ok; (vx 1 have no effect; did you mean 'vxy'?)"),
+        (
+            "led control comp all r 1 effects blink effect solid;",
+            "effects blink have no effect; did you mean 'effect'?",
+        ),
+        ("blaster bead 3 4;", "ok; (3 has no effect)"),
+        ("stream on now;", "now has no effect"),
+        ("robotic_gripper open leve 4;", ""),
+        ("chassis wheel w1 0 w2 0 w3 0 w4 0;", ""),
+    ],
+)
+async def test_words_without_effect_are_logged(client, listen, caplog, text: str, hint: str) -> None:
+    reader = await listen("explanations")
+    assert await client.ask(text) == "ok;"
+    assert ("no effect" in caplog.text) is bool(hint)
+    if hint:
+        assert hint in caplog.text
+        assert hint in (await asyncio.wait_for(reader.readline(), 5)).decode()
+
+
 async def test_lost_link_is_logged_by_its_driver_alone(client, robot, caplog) -> None:
     """Each command of a client that drove on gave a warning of its own."""
     link = robot.add(Link, Link("robomaster://ep", robot.clock, robot.events, robot[Health]))

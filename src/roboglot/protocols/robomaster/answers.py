@@ -15,11 +15,13 @@ Result = str | Sequence[Number | str] | None  # of a handler: a Reply or free te
 class Answer:
     """Bytes for the client and, of a refusal, the reason in plain words for the log.
 
-    ``explain`` is called only when a listener needs it: the search for the intended command is slow.
+    ``explain`` is called only when a listener needs it: the search for the intended command is slow. ``warn`` gives
+    what the log says of a command that was carried out.
     """
 
     reply: bytes
     explain: Why | None = None
+    warn: Why | None = None
 
     @property
     def why(self) -> str:

@@ -245,7 +245,7 @@ class ControlConnection(asyncio.Protocol):
 
     def _reply(self, text: str | None, result: Answer) -> None:
         self.transport.write(result.reply + self._line_end)
-        if result.explain:
+        if result.explain or result.warn:
             explained = cache(lambda: self._refusal(text, result))
             self._explain(explained)
             if self._explained < EXPLANATIONS_MAX and not self._is_lost(result):
@@ -259,7 +259,8 @@ class ControlConnection(asyncio.Protocol):
 
     def _refusal(self, text: str | None, result: Answer) -> str:
         shown = "(a text)" if text is None else repr(text[:TEXT_SHOWN_MAX])
-        return f"{self._shown} asked {shown}: {result.reply.decode()} ({result.why})"
+        why = result.warn() if result.warn else result.why
+        return f"{self._shown} asked {shown}: {result.reply.decode()} ({why})"
 
     def _join(self) -> None:
         """Join the session: a command in SDK mode keeps the robot there."""

@@ -36,7 +36,7 @@ from roboglot.protocols.robomaster.chapters import (  # noqa: F401
 from roboglot.protocols.robomaster.chapters.sdk import OUTSIDE_SDK_MODE
 from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.errors import reply_to
-from roboglot.protocols.robomaster.explain import completed, nearest_command, nearest_values
+from roboglot.protocols.robomaster.explain import completed, nearest_command, nearest_values, without_effect
 from roboglot.protocols.robomaster.shapes import Shape, shape_of
 from roboglot.protocols.robomaster.table import TABLE
 from roboglot.values import dataclass
@@ -70,6 +70,7 @@ class _Meaning:
     key: str = ""
     values: Mapping[str, object] = field(default_factory=dict)
     refusal: tuple[Reply, Why] | None = None
+    warn: Why | None = None  # words in it have no effect
 
 
 class _Refusal(Exception):
@@ -118,7 +119,7 @@ async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer
     except Exception as error:
         log.exception("robomaster: %r broke", text)
         return _refused(context.profile, error, seq)
-    return Answer(_worded(context.profile, result, seq))
+    return Answer(_worded(context.profile, result, seq), warn=meant.warn)
 
 
 def _enter(context: Context, key: str, text: str, asked: _Asked) -> None:
@@ -217,7 +218,9 @@ def _meant(text: str, active: bool, as_robots: bool) -> _Meaning:
         operation = TABLE.get(key)
         if operation is not None and (active or key in OUTSIDE_SDK_MODE):
             try:
-                return _Meaning(command.seq, key, _checked(operation, words, as_robots))
+                values, shape = _checked(operation, words, as_robots), shape_of(operation, as_robots)
+                warn = partial(without_effect, shape, ignored) if (ignored := shape.ignored(words)) else None
+                return _Meaning(command.seq, key, values, warn=warn)
             except _Refusal as refusal:
                 return _Meaning(command.seq, key, refusal=(refusal.reply, refusal.why))
     return _Meaning(command.seq, refusal=(Reply.PARSE_ERROR, partial(_unknown, command)))

@@ -13,7 +13,7 @@ from msgspec import Meta
 
 from roboglot.operations import BadParameters
 from roboglot.protocols.robomaster.shapes import Shape
-from roboglot.spelling import nearest
+from roboglot.spelling import meant, nearest
 from roboglot.wire.robomaster.commands import QUERY, Command, Value
 
 EXCLUSIVE_STEP = 0.1  # distance of a suggested number from an excluded bound
@@ -21,9 +21,9 @@ EXCLUSIVE_STEP = 0.1  # distance of a suggested number from an excluded bound
 
 def nearest_command(command: Command, keys: typing.Collection[str]) -> str:
     """Return the most similar known command with the given words, or ""."""
-    meant = " ".join((*command.words[:2], *((QUERY,) if command.query else ())))
+    wanted = " ".join((*command.words[:2], *((QUERY,) if command.query else ())))
     alike = {key for key in keys if key.endswith(QUERY) == command.query}
-    near = nearest(meant, alike) or nearest(meant, keys)  # perhaps only the mark is wrong
+    near = nearest(wanted, alike) or nearest(wanted, keys)  # perhaps only the mark is wrong
     return f"did you mean `{_spelt(near, command.words[2:])}`?" if near else ""
 
 
@@ -51,6 +51,12 @@ def nearest_values(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
         return ""
     words = [str(v) if key in shape.bare else f"{key} {v}" for key, v in better.items()]
     return f"{'; '.join(wrong)}; did you mean `{_spelt(name, words)}`?"
+
+
+def without_effect(shape: Shape, ignored: typing.Sequence[str]) -> str:
+    """Return that the ``ignored`` words of a command have no effect, and which parameter was probably meant."""
+    hint = next((near for word in ignored if (near := meant(word, shape.kinds))), "")
+    return f"{' '.join(ignored)} {'has' if len(ignored) == 1 else 'have'} no effect{hint}"
 
 
 def completed(name: str, shape: Shape, values: Mapping[str, Value]) -> str:

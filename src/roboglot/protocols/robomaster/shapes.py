@@ -19,7 +19,7 @@ from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.robomaster.ranges import OnRobots
 from roboglot.validation import why_invalid
 from roboglot.values import dataclass
-from roboglot.wire.robomaster.commands import Value, parameters_of
+from roboglot.wire.robomaster.commands import Value, ignored_words, parameters_of
 
 Kinds = dict[str, object]  # parameter name: annotation
 
@@ -36,6 +36,10 @@ class Shape:
     def values(self, words: Sequence[str]) -> dict[str, Value]:
         """Return the words by parameter, unchecked."""
         return parameters_of(words, tuple(self.kinds), self.bare)
+
+    def ignored(self, words: Sequence[str]) -> tuple[str, ...]:
+        """Return the words that have no effect."""
+        return ignored_words(words, tuple(self.kinds), self.bare)
 
     def check(self, values: Mapping[str, Value | None]) -> dict[str, object]:
         """Return the converted and checked values of all parameters. Raises BadParameters naming the parameter."""

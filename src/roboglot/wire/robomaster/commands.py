@@ -14,6 +14,7 @@ from roboglot.wire.robomaster.replies import Reply
 
 SEQ_MAX = 2**64 - 1
 QUERY = "?"
+MISSPELT = "leve"  # the gripper's level in the manual
 _INTEGER = re.compile(r"[+-]?[0-9]{1,30}", re.ASCII)
 _HEX = re.compile(r"0[xX][0-9a-fA-F]{1,16}", re.ASCII)
 _FLOAT = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
@@ -105,6 +106,22 @@ def parameters_of(words: Sequence[str], names: Sequence[str], bare: Sequence[str
     last one counts. Remaining words go to the bare parameters, the last words if there are too many (so the number
     counts in ``leve 1``); all others are ignored, as on real robots.
     """
+    values, left = _named(words, names)
+    empty = [name for name in bare if name not in values]
+    for name, word in zip(empty, left[-len(empty) :], strict=False):
+        values[name] = value_of(word)
+    return values
+
+
+def ignored_words(words: Sequence[str], names: Sequence[str], bare: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the words that have no effect in ``parameters_of``, but the manual's ``leve``."""
+    values, left = _named(words, names)
+    taken = sum(name not in values for name in bare)
+    return tuple(word for word in left[: max(0, len(left) - taken)] if word != MISSPELT)
+
+
+def _named(words: Sequence[str], names: Sequence[str]) -> tuple[dict[str, Value], list[str]]:
+    """Return the values behind ``names``, and the remaining words."""
     values: dict[str, Value] = {}
     left: list[str] = []
     rest = list(reversed(words))
@@ -114,7 +131,4 @@ def parameters_of(words: Sequence[str], names: Sequence[str], bare: Sequence[str
             values[word] = value_of(rest.pop()) if rest and rest[-1] not in names else ""
         else:
             left.append(word)
-    empty = [name for name in bare if name not in values]
-    for name, word in zip(empty, left[-len(empty) :], strict=False):
-        values[name] = value_of(word)
-    return values
+    return values, left
