@@ -182,7 +182,7 @@ def serve(line: socket.socket) -> None:
             socket.send_fds(bed, [message], descriptors)
             answer = bed.recv(64)
         else:
-            answer = zygote_bed.born(partial(_become, wish, descriptors), fork)
+            answer = zygote_bed.born(partial(_become, wish, descriptors), partial(fork, partial(_take_signals, wish)))
         line.send(answer)
         for descriptor in descriptors:
             os.close(descriptor)
@@ -194,6 +194,12 @@ def _make_bed() -> socket.socket:
         command = [sys.executable, "-s", "-S", "-P", zygote_bed.__file__, SOURCES, str(its.fileno())]
         subprocess.Popen(command, env=ZYGOTES, stdin=subprocess.DEVNULL, pass_fds=[its.fileno()]).returncode = 0
     return ours
+
+
+def _take_signals(wish: Any) -> None:
+    from roboglot.cli.warm.parent import take_signals
+
+    take_signals(wish)
 
 
 def _become(wish: Any, descriptors: list[int]) -> NoReturn:

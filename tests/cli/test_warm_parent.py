@@ -37,7 +37,7 @@ FORKS_ONLY = """
 import signal
 from roboglot.cli.warm import parent as warm_parent
 fork = warm_parent.fork
-warm_parent.fork = lambda: fork() and signal.pause() or 0
+warm_parent.fork = lambda prepare: fork(prepare) and signal.pause() or 0
 """
 ANNOUNCE = "import os, signal\nsignal.signal(signal.SIGINT, lambda *_: os.write(1, b'heard\\n'))\n"
 

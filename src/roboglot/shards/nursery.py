@@ -76,7 +76,7 @@ class Nursery:
         return True
 
     def _fork(self, number: int, folder: str, link: int, output: int) -> None:
-        pid = fork()
+        pid = fork(_take_signals)
         if pid == 0:
             self._become_shard(folder, link, output)
         self._children[pid] = number
@@ -86,8 +86,6 @@ class Nursery:
         """Become the shard, in the child; never returns."""
         status = EXIT_BROKEN
         try:
-            for kind in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM):
-                signal.signal(kind, signal.SIG_DFL)
             _take_descriptors(link, output)
             status = self._run(folder, socket.socket(fileno=LINK_FD))
         except BaseException:  # noqa: BLE001 - a forked child has no caller to raise to
@@ -111,6 +109,12 @@ class Nursery:
 
     def _send(self, message: Birth) -> None:
         self._control.send(encode(message))
+
+
+def _take_signals() -> None:
+    """Drop the nursery's handlers."""
+    for kind in (signal.SIGCHLD, signal.SIGINT, signal.SIGTERM):
+        signal.signal(kind, signal.SIG_DFL)
 
 
 def _take_descriptors(link: int, output: int) -> None:

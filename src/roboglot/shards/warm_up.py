@@ -11,7 +11,7 @@ import pkgutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
 
 PACKAGES = ("runtime", "simulation", "autonomy", "storage", "protocols", "programs", "console", "access")
@@ -111,14 +111,31 @@ def refuse_threads() -> None:
         raise Threaded(f"a module started a thread when it was imported; {len(os.listdir(TASKS))} run")
 
 
-def fork() -> int:
-    """Fork; return 0 in the child, which is killed when this process ends. Raises Threaded."""
+def fork(prepare: Callable[[], None]) -> int:
+    """Fork; return 0 in the child, which is killed when this process ends. Raises Threaded.
+
+    The child calls ``prepare`` before it hears signals: one sent meanwhile meets the handlers that are set there, not
+    those of this process. If that fails, the child ends.
+    """
     refuse_threads()
-    parent, pid = os.getpid(), os.fork()
-    if pid == 0:
+    parent, heard = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+    try:
+        if (pid := os.fork()) == 0:
+            _begin(parent, prepare)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
+    return pid
+
+
+def _begin(parent: int, prepare: Callable[[], None]) -> None:
+    """Prepare a forked child, or end it."""
+    try:
         signal.set_wakeup_fd(-1)
         end_with(parent)
-    return pid
+        prepare()
+    except BaseException:  # noqa: BLE001 - the caller's handlers are the parent's, which this process must not become
+        sys.excepthook(*sys.exc_info())
+        os._exit(EXIT_BROKEN)
 
 
 def end_with(parent: int) -> None:

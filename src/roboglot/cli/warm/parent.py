@@ -152,9 +152,12 @@ class WarmParent:
         return wanted
 
     def _fork(self, wanted: Wanted, descriptors: list[int], caller: socket.socket) -> int:
-        pid = fork()
-        if pid == 0:
+        def prepare() -> None:
             caller.send(b"+")  # first: if we are killed now, its caller must not start again
+            take_signals(wanted)
+
+        pid = fork(prepare)
+        if pid == 0:
             ctypes.CDLL(None).prctl(PR_SET_NAME, b"roboglot", 0, 0, 0)
             os.setpgid(0, 0)  # in our session, so that the commands of one caller share its part of the processors
             become(wanted, descriptors, _run_code if wanted["kind"] == CODE else _run_command)
@@ -209,9 +212,6 @@ def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], No
     """Turn the fork into the command with everything inherited from its caller, and call ``run``."""
     try:
         _take(descriptors, wanted["descriptors"])
-        for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}:
-            with contextlib.suppress(OSError, ValueError):
-                signal.signal(number, signal.SIG_IGN if number in wanted["ignored"] else signal.SIG_DFL)
         if signal.SIGINT not in wanted["ignored"]:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         for kind, soft, hard in wanted["limits"]:
@@ -232,6 +232,13 @@ def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], No
         sys.excepthook(*sys.exc_info())
         status = 130 if isinstance(error, KeyboardInterrupt) else 1
         run_to_end(lambda: sys.exit(status))
+
+
+def take_signals(wanted: Wanted) -> None:
+    """Ignore the signals that the caller ignores, and let the others end this process."""
+    for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}:
+        with contextlib.suppress(OSError, ValueError):
+            signal.signal(number, signal.SIG_IGN if number in wanted["ignored"] else signal.SIG_DFL)
 
 
 def _take(descriptors: list[int], numbers: list[int]) -> None:
