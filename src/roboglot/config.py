@@ -21,7 +21,7 @@ import msgspec
 
 from roboglot.spelling import instead
 from roboglot.text_files import parse_toml, text_of
-from roboglot.validation import why_invalid
+from roboglot.validation import host_and_port, why_invalid
 from roboglot.values import dataclass
 
 RECORDING = "recording:"  # prefix of the body of a recorded robot
@@ -200,6 +200,8 @@ class Config:
     def __post_init__(self) -> None:
         if self.lockstep and self.speed != 1.0:
             raise ValueError("speed has no effect in lockstep, where input advances time: leave one of them out")
+        if self.access.gateway:
+            host_and_port(self.access.gateway, "access.gateway")
 
     @property
     def opened(self) -> tuple[RobotConfig, ...]:

@@ -46,6 +46,7 @@ from roboglot.storage.programs import program_stores
 from roboglot.storage.residence import Residence, holder_of
 from roboglot.storage.transactions import Transactions
 from roboglot.transport.tls import Tls, server_context
+from roboglot.validation import host_and_port
 
 if TYPE_CHECKING:
     from roboglot.access.guard import Guard
@@ -180,7 +181,7 @@ class Runtime:
         from roboglot.protocols.cyberdog.certificates import ensure_certificates
         from roboglot.protocols.cyberdog.pem_files import FOLDER, SERVER_CERT, SERVER_KEY
 
-        config, (host, _, port) = self.config, self.config.access.gateway.rpartition(":")
+        config, (host, port) = self.config, host_and_port(self.config.access.gateway, "access.gateway")
 
         def numbers(kind: PortKind) -> tuple[int, ...]:
             return tuple(number for door in self._types for number in door.numbers(config, kind).values())
@@ -192,7 +193,7 @@ class Runtime:
         }
         ensure_certificates(config.data / FOLDER)
         tls = config.data / FOLDER / "tls"
-        return Gateway(guard, robots, host.strip("[]"), int(port), (tls / SERVER_CERT, tls / SERVER_KEY))
+        return Gateway(guard, robots, host, port, (tls / SERVER_CERT, tls / SERVER_KEY))
 
     def _build_tls(self) -> Tls | None:
         """Return TLS for REST, programs and pages; None: no encryption. Raises OSError, ValueError."""

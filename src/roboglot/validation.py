@@ -16,6 +16,7 @@ from msgspec import inspect
 from roboglot.spelling import meant
 
 CHOICES_MAX = 30  # words or fields named in a sentence
+PORT_MAX = 65535
 T = TypeVar("T")
 
 KINDS = {
@@ -160,6 +161,14 @@ def _in_words(value: str, kinds: Mapping[str, str]) -> str:
     if set(value.split(" | ")) <= {*kinds, "null"}:
         return " or ".join(kinds.get(kind, kind) for kind in value.split(" | "))
     return value.removesuffix(".0").replace("\\\\", "\\")  # a pattern comes as Python writes it
+
+
+def host_and_port(text: str, field: str) -> tuple[str, int]:
+    """Return host and port of "HOST:PORT"; port 0 is any free one. Raises ValueError that names ``field``."""
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal() or int(port) > PORT_MAX:
+        raise ValueError(f"{field} must be HOST:PORT, not {text!r}")
+    return host.strip("[]"), int(port)
 
 
 def decode_json(data: bytes | str, kind: type[T]) -> T:

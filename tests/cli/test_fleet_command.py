@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
+import signal
 from contextlib import nullcontext
 from functools import cached_property
 from pathlib import Path
@@ -11,8 +14,8 @@ from typing import TYPE_CHECKING, cast
 import pytest
 
 from roboglot.cli import fleet
-from roboglot.shards import nursery_client
-from roboglot.shards.plan import PLAN, plan_fleet, save
+from roboglot.shards import nursery_client, serving
+from roboglot.shards.plan import PLAN, load, plan_fleet, save
 from roboglot.shards.requests import Answer, RobotRow, Row
 from roboglot.shards.states import Shards, State
 from roboglot.testing.addresses import free_addresses
@@ -33,6 +36,10 @@ class Hopeless:
     def shards(self) -> Shards:
         return Shards(self.plan, self.folder)
 
+    @cached_property
+    def ended(self) -> asyncio.Future[None]:
+        return asyncio.get_running_loop().create_future()
+
     async def start(self) -> float:
         self.folder.mkdir(exist_ok=True)
         save(self.plan, self.folder)
@@ -43,6 +50,41 @@ class Hopeless:
 
     async def close(self) -> None:
         self.closed = True
+
+
+class Unfinished(Hopeless):
+    """A fleet that has begun to start when Ctrl-C comes, or its shards' machine is lost."""
+
+    loss: OSError | None = None
+
+    async def start(self) -> float:
+        save(self.plan, self.folder)
+        if self.loss is None:
+            os.kill(os.getpid(), signal.SIGINT)
+        else:
+            self.ended.set_exception(self.loss)
+        await asyncio.Event().wait()
+        return 0.0
+
+
+@pytest.mark.parametrize("known", [False, True])
+@pytest.mark.parametrize("lasting", [False, True])
+async def test_an_interrupted_start_keeps_no_new_plan(known: bool, lasting: bool, tmp_path: Path) -> None:
+    host, old = Unfinished(tmp_path), plan_fleet(1, 1, {}, tmp_path)
+    if known:
+        save(old, tmp_path)
+    with pytest.raises(serving.Interrupted, match="before all worlds were up"):
+        await serving.serve(lambda: cast("FleetHost", host), tmp_path, print, 0.0, lasting=lasting)
+    assert host.closed
+    assert load(tmp_path) == (host.plan if lasting else old if known else None)
+
+
+async def test_a_lost_cluster_ends_the_command(tmp_path: Path) -> None:
+    host = Unfinished(tmp_path)
+    host.loss = OSError("raylet has ended")
+    with pytest.raises(OSError, match="raylet has ended"):
+        await serving.serve(lambda: cast("FleetHost", host), tmp_path, print, 0.0, lasting=False)
+    assert host.closed
 
 
 @pytest.mark.parametrize("known", [False, True])
@@ -148,4 +190,4 @@ async def test_only_robots_that_are_up_are_counted(tmp_path: Path) -> None:
     shards = Shards(plan, tmp_path)
     shards.turn_to(shards["w1"], State.READY)
     host = cast("FleetHost", SimpleNamespace(plan=plan, shards=shards))
-    assert fleet._up(host, 1.0, 0.0, "").startswith("1 of 2 worlds with 3 robots are up")
+    assert serving.up_text(host, 1.0, 0.0, "").startswith("1 of 2 worlds with 3 robots are up")

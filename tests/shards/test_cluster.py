@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
+import signal
 import time
 import warnings
 from collections.abc import Iterator
@@ -174,6 +175,9 @@ class FakeRay(SimpleNamespace):
     def __init__(self, *names: str) -> None:
         super().__init__(names=list(names), util=SimpleNamespace(list_named_actors=lambda: list(self.names)))
         self.failure: Exception | None = None
+        self.dead: list[tuple[str, object]] = []
+        node = SimpleNamespace(dead_processes=lambda: self.dead)
+        self._private = SimpleNamespace(worker=SimpleNamespace(_global_node=node))
 
     def remote(self, _: type) -> FakeRay:
         return self
@@ -219,6 +223,43 @@ async def test_shards_of_an_earlier_plan_end(tmp_path: Path, monkeypatch: pytest
     assert {*new} < {*old}, "those with the same settings"
     assert {*await up(2, "127.16.6.1")} & {*new} == {"another:w1:1234"}
     assert len(await up(2, "127.16.6.1", tmp_path / "of another fleet")) == 5
+
+
+@pytest.mark.parametrize("part", ["raylet", "gcs_server"])
+async def test_a_lost_ray_ends_the_fleet(part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ray itself would report that its only node is gone after a minute, and never start another."""
+    fake = FakeRay()
+    fake.dead = [("log_monitor", None)]
+    monkeypatch.setattr(cluster_module, "ray", fake)
+    monkeypatch.setattr(cluster_module, "PERIOD", 0.001)
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+    await fleet.start()
+    assert not fleet.ended.done()
+    fake.dead.append((part, None))
+    with pytest.raises(OSError, match=f"^{part}, a process of Ray, has ended, and Ray with it; start again$"):
+        await asyncio.wait_for(fleet.ended, PATIENCE)
+    await fleet.close()
+
+
+def test_ray_that_was_never_started_has_lost_nothing() -> None:
+    assert cluster_module.lost_part() == ""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_another_signal_does_not_disturb_rays_end(number: signal.Signals, monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[str] = []
+    monkeypatch.setattr(ray, "init", lambda **_: None)
+
+    def shut_down() -> None:
+        os.kill(os.getpid(), number)
+        ended.append("whole")
+
+    monkeypatch.setattr(ray, "shutdown", shut_down)
+    before = signal.getsignal(number)
+    with joined("local"):
+        pass
+    assert ended == ["whole"]
+    assert signal.getsignal(number) is before
 
 
 @pytest.mark.parametrize(

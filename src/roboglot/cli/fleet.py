@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import os
-import signal
 import sqlite3
 import sys
 import time
 from collections import deque
-from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -37,6 +36,7 @@ app = typer.Typer(
     no_args_is_help=True,
     help="Run many worlds on this machine or on several, each in a process of its own (a shard).",
 )
+INTERRUPTED = 130  # exit status
 PATIENCE = 120.0  # s for a request; stopping and starting 100 shards takes a while
 MEGABYTE = 1 << 20
 LINES_MAX = 100_000
@@ -45,10 +45,6 @@ Data = Annotated[
     Path | None,
     typer.Option(envvar="ROBOGLOT_FLEET", help="The fleet's folder; by default `fleet` in the data folder."),
 ]
-
-
-class NoWorld(ValueError):
-    """The settings of every world are wrong."""
 
 
 @app.command()
@@ -81,7 +77,7 @@ def up(
     with launched(wanted=not on) as nursery:  # it loads while we import what a plan needs
         from roboglot.hosting.folder_lock import FolderInUse
         from roboglot.hosting.logs import set_up_logging
-        from roboglot.shards.plan import kept_after
+        from roboglot.shards.serving import Interrupted, serve
 
         set_up_logging(verbose=False)
         folder = _folder(data)
@@ -93,8 +89,12 @@ def up(
             if memory_max and on:
                 raise ValueError("--memory-max is for shards without --on: Ray places and limits its own")
             where = _Where(on, detached, memory_max << 20, nursery)
-            with _joined(plan, on), kept_after(NoWorld, folder):
-                asyncio.run(_serve(lambda: _fleet_host(plan, folder, where), folder, began))
+            say = partial(print, flush=True)
+            with _joined(plan, on):
+                asyncio.run(serve(lambda: _fleet_host(plan, folder, where), folder, say, began, lasting=detached))
+        except Interrupted as early:
+            print(f"roboglot fleet: {early}", file=sys.stderr)
+            sys.exit(INTERRUPTED)
         except (ValueError, OSError, FolderInUse, NotWarm, MissingExtra) as error:
             sys.exit(f"roboglot fleet: {in_words(error)}")
 
@@ -297,65 +297,6 @@ def _fleet_host(plan: FleetPlan, folder: Path, where: _Where) -> FleetHost:
     from roboglot.shards.supervisor import Supervisor
 
     return Supervisor(plan, folder, memory_max=where.memory_max, nursery=where.nursery)
-
-
-async def _serve(fleet_host: Callable[[], FleetHost], folder: Path, began: float) -> None:
-    """Keep the fleet up until a signal. Raises NoWorld."""
-    from roboglot.shards.classes import FleetClasses
-    from roboglot.shards.command_server import CommandServer
-    from roboglot.shards.overview import Overview
-
-    stop = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    host = fleet_host()
-    commands, classes = CommandServer(host, folder), FleetClasses(folder)
-    page = Overview(host, _first_address(host))
-    ending = asyncio.ensure_future(stop.wait())
-    await classes.open()  # shards look for this socket when they start
-    starting = asyncio.ensure_future(host.start())
-    try:
-        await commands.open()
-        await asyncio.wait([ending, starting], return_when=asyncio.FIRST_COMPLETED)
-        if starting.done():
-            _refuse_hopeless(host)
-            page.open()
-            print(_up(host, time.monotonic() - began, starting.result(), page.address))
-            print("ready", flush=True)
-            await ending
-    finally:
-        starting.cancel()
-        ending.cancel()
-        await page.close()
-        await commands.close()  # first, as a move must be over before the folder is released
-        await host.close()
-        await classes.close()
-
-
-def _refuse_hopeless(fleet_host: FleetHost) -> None:
-    reasons = [shard.reason for shard in fleet_host.shards.values() if shard.hopeless]
-    if len(reasons) == len(fleet_host.shards):
-        raise NoWorld(f"no world can start: {reasons[0]}")
-
-
-def _first_address(fleet_host: FleetHost) -> str:
-    return str(fleet_host.plan.shards[0].settings["robots"][0]["address"])
-
-
-def _up(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
-    """Return the text of `fleet up` when all worlds are up or have failed."""
-    from roboglot.shards.states import State
-
-    shards = list(fleet_host.shards.values())
-    ready = [shard for shard in shards if shard.state is State.READY]
-    robots = sum(len(shard.plan.robots) for shard in ready)
-    where = f"; all on one page: {page}" if page else ""
-    loading = f" ({warm:.1f} s of it to load)" if warm else ""
-    return (
-        f"{len(ready)} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s{loading};"
-        f" robots on {_first_address(fleet_host)} and up{where}."
-        " `roboglot fleet list` shows them."
-    )
 
 
 def _ask(verb: Verb, data: Path | None, **fields: str) -> Answer:

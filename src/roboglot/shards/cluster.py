@@ -9,6 +9,7 @@ import asyncio
 import hashlib
 import logging
 import os
+import signal
 import sqlite3
 import warnings
 from collections.abc import Iterator, Mapping
@@ -49,6 +50,7 @@ with explaining("--on", "fleet"):
 
 log = logging.getLogger(__name__)
 LOCAL = "local"
+PARTS = "raylet", "gcs_server"  # processes of Ray that it does not start again
 NAMESPACE = "roboglot"
 CLIENT_PORT = 10001  # default port of ray://HOST
 STORE_BYTES = 80 << 20  # of a cluster that we start: actors share no objects
@@ -94,7 +96,26 @@ def joined(where: str) -> Iterator[None]:
     try:
         yield
     finally:
-        ray.shutdown()
+        with _undisturbed():
+            ray.shutdown()
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Context that ignores further signals to end: a second Ctrl-C would leave processes of Ray behind."""
+    before = [(number, signal.signal(number, signal.SIG_IGN)) for number in (signal.SIGINT, signal.SIGTERM)]
+    try:
+        yield
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)
+
+
+def lost_part() -> str:
+    """Return the part without which a Ray started by this program is of no use, if it has ended; else ""."""
+    node = ray._private.worker._global_node  # only Ray's own health checks are public, which take a minute
+    ended = node.dead_processes() if node is not None else []
+    return next((kind for kind, _ in ended if kind in PARTS), "")
 
 
 class Reference(Protocol):
@@ -133,6 +154,7 @@ class ClusterFleet:
         self._watch: asyncio.Task[None] | None = None
         self._silence: asyncio.Task[None] | None = None
         self._loop = asyncio.get_running_loop()
+        self.ended: asyncio.Future[None] = self._loop.create_future()
 
     @property
     def nursery(self) -> int:
@@ -253,6 +275,8 @@ class ClusterFleet:
     async def _look_always(self) -> None:
         seldom = LogLimiter(log)
         while True:
+            if self._local and (part := lost_part()) and not self.ended.done():
+                self.ended.set_exception(OSError(f"{part}, a process of Ray, has ended, and Ray with it; start again"))
             ends = await asyncio.gather(*map(self._look, self.shards.values()), return_exceptions=True)
             for shard, error in zip(self.shards.values(), ends, strict=True):
                 if isinstance(error, Exception):  # of Ray, whose client raises bare ones, too; of a full disk

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Protocol
 
@@ -14,6 +15,7 @@ class FleetHost(Protocol):
 
     plan: FleetPlan
     folder: Path
+    ended: asyncio.Future[None]  # done when it has to end; with OSError if its shards cannot go on
 
     @property
     def shards(self) -> Shards:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from ipaddress import IPv4Address, ip_address
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import msgspec
 from roboglot.config import RECORDING, ROBOTS_MAX, Config, ConsoleConfig, is_loopback, refuse_unguarded
 from roboglot.shards.shard import settings_of
 from roboglot.spelling import instead, meant
+from roboglot.validation import host_and_port
 
 WORLDS_MAX = 500
 FIRST_ADDRESS = "127.10.0.1"
@@ -109,13 +109,13 @@ def plan_fleet(
         ]
         if to := template.get("record", {}).get("to"):
             settings["record"] = {**template["record"], "to": f"{to}/w{number}/"}
-        if "access" in template:  # one list of people for all worlds
-            settings["access"] = {"people": str(data), **template["access"]}
+        if "access" in template:
+            settings["access"] = _access(template["access"], data, number)
         settings["console"] = _console(template, settings["robots"][0]["address"], number)
         settings["seed"] = int(template.get("seed", 1)) + number - 1
         shards.append(ShardPlan(f"w{number}", settings))
     plan = FleetPlan({**request, "robots_each": len(robots)}, shards)
-    for shard in plan.shards[:1]:  # they differ only in names and addresses
+    for shard in (plan.shards[0], plan.shards[-1]):  # they differ only in names, addresses and ports
         refuse_unguarded(checked(shard))
     return plan
 
@@ -143,7 +143,7 @@ def save(plan: FleetPlan, folder: Path) -> None:
 def _store(text: bytes, folder: Path) -> None:
     """Write a plan, which may hold a database's password, for its owner only; a crash leaves the old or the new one."""
     stored, fresh = folder / PLAN, folder / f"{PLAN}.new"
-    if stored.is_file() and stored.read_bytes() == text:
+    if _text_in(folder) == text:
         return
     try:
         with fresh.open("wb") as file:
@@ -157,19 +157,25 @@ def _store(text: bytes, folder: Path) -> None:
         raise OSError(error.errno, error.strerror, str(stored)) from None
 
 
-@contextmanager
-def kept_after(failure: type[Exception], folder: Path) -> Iterator[None]:
-    """Context that ends with the plan it began with, or none, after ``failure``: another was stored and tried."""
-    stored = folder / PLAN
-    before = stored.read_bytes() if stored.is_file() else None
-    try:
-        yield
-    except failure:
-        if before is None:
-            stored.unlink(missing_ok=True)
+class EarlierPlan:
+    """The plan that a folder has, or that it has none, to go back to after another one was tried."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._text = folder, _text_in(folder)
+
+    def restore(self) -> bool:
+        """Store it again; return False if it is there still. Raises OSError."""
+        if _text_in(self._folder) == self._text:
+            return False
+        if self._text is None:
+            (self._folder / PLAN).unlink()
         else:
-            _store(before, folder)
-        raise
+            _store(self._text, self._folder)
+        return True
+
+
+def _text_in(folder: Path) -> bytes | None:
+    return (folder / PLAN).read_bytes() if (folder / PLAN).is_file() else None
 
 
 def load(folder: Path) -> FleetPlan | None:
@@ -209,6 +215,15 @@ def _console(template: dict[str, Any], address: str, number: int) -> dict[str, A
     if given.get("address") and (port := given.get("port", ConsoleConfig().port)):  # one address: separate ports
         given["port"] = port + number - 1
     return {"address": address, **given} if is_loopback(address) else {"enabled": False, **given}
+
+
+def _access(given: dict[str, object], data: Path, number: int) -> dict[str, object]:
+    """Return a world's access control: all have one list of people, and gateways with successive ports."""
+    access = {"people": str(data), **given}
+    if gateway := str(given.get("gateway", "")):
+        _, port = host_and_port(gateway, "access.gateway")
+        access["gateway"] = f"{gateway.rpartition(':')[0]}:{port + number - 1 if port else 0}"
+    return access
 
 
 def _addresses(first: str, count: int) -> Iterator[str]:

@@ -48,6 +48,7 @@ class Supervisor:
         self._turn: asyncio.Task[None] | None = None
         self._watch: asyncio.TimerHandle | None = None
         self._loop = asyncio.get_running_loop()
+        self.ended: asyncio.Future[None] = self._loop.create_future()
         self._wake = asyncio.Event()
         self._closing = False
 

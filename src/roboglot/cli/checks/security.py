@@ -21,6 +21,7 @@ from roboglot.operations import Right
 from roboglot.protocols import DOORS
 from roboglot.protocols.door import PortKind
 from roboglot.storage.transactions import FAILURES
+from roboglot.validation import host_and_port
 
 UNUSED_DAYS = 30
 DAY = 86400.0  # s
@@ -58,8 +59,7 @@ def _listeners(config: Config) -> Iterator[Finding]:
     if config.console.enabled:
         places.append(("console", config.console.address, config.console.port))
     if config.access.on and config.access.gateway:
-        host, _, number = config.access.gateway.rpartition(":")
-        places.append(("gateway", host.strip("[]"), int(number)))
+        places.append(("gateway", *host_and_port(config.access.gateway, "access.gateway")))
     for label, address, port in places:
         holder = holder_of(address, port) if ":" not in address else None
         now = f"open now, by {holder}" if holder else "closed now"

@@ -1,0 +1,111 @@
+"""Serves a fleet in the foreground: starts it, answers commands and pages, and ends it in order at a signal."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from roboglot.hosting.error_text import in_words
+from roboglot.shards.classes import FleetClasses
+from roboglot.shards.command_server import CommandServer
+from roboglot.shards.fleet_host import FleetHost
+from roboglot.shards.overview import Overview
+from roboglot.shards.plan import EarlierPlan
+from roboglot.shards.states import State
+
+log = logging.getLogger(__name__)
+
+
+class NoWorld(ValueError):
+    """The settings of every world are wrong."""
+
+
+class Interrupted(Exception):
+    """A signal came before the worlds were up."""
+
+
+async def serve(
+    fleet_host: Callable[[], FleetHost], folder: Path, say: Callable[[str], None], began: float, *, lasting: bool
+) -> None:
+    """Keep the fleet up until a signal; ``say`` that it is. Raises NoWorld, Interrupted, OSError.
+
+    A new plan is kept once the worlds are up, or when shards outlive this program (``lasting``).
+    """
+    host = fleet_host()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, _end, host.ended)
+    commands, classes = CommandServer(host, folder), FleetClasses(folder)
+    page = Overview(host, _first_address(host))
+    earlier, keep = EarlierPlan(folder), lasting
+    await classes.open()  # shards look for this socket when they start
+    starting = asyncio.ensure_future(host.start())
+    try:
+        await commands.open()
+        await _either(host.ended, starting)
+        if not starting.done():
+            host.ended.result()
+            raise Interrupted("interrupted before all worlds were up")
+        seconds = starting.result()
+        keep = not _all_hopeless(host)
+        if not keep:
+            raise NoWorld(f"no world can start: {next(iter(host.shards.values())).reason}")
+        page.open()
+        say(up_text(host, time.monotonic() - began, seconds, page.address))
+        say("ready")
+        await host.ended
+    finally:
+        starting.cancel()
+        await page.close()
+        await commands.close()  # first, as a move must be over before the folder is released
+        if not keep:
+            _restore(earlier)
+        await host.close()
+        await classes.close()
+
+
+async def _either(*futures: asyncio.Future[None] | asyncio.Future[float]) -> None:
+    """Wait until one is done."""
+    done = asyncio.Event()
+    for future in futures:
+        future.add_done_callback(lambda _: done.set())
+    await done.wait()
+
+
+def _end(ended: asyncio.Future[None]) -> None:
+    if not ended.done():
+        ended.set_result(None)
+
+
+def _all_hopeless(fleet_host: FleetHost) -> bool:
+    return all(shard.hopeless for shard in fleet_host.shards.values())
+
+
+def _restore(earlier: EarlierPlan) -> None:
+    """Go back to the earlier plan, or none; on a full disk, the new one stays."""
+    try:
+        if earlier.restore():
+            log.warning("the new plan is not kept")
+    except OSError as error:
+        log.warning("the new plan stays: %s", in_words(error))
+
+
+def _first_address(fleet_host: FleetHost) -> str:
+    return str(fleet_host.plan.shards[0].settings["robots"][0]["address"])
+
+
+def up_text(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> str:
+    """Return the text of `fleet up` when all worlds are up or have failed."""
+    shards = list(fleet_host.shards.values())
+    ready = [shard for shard in shards if shard.state is State.READY]
+    robots = sum(len(shard.plan.robots) for shard in ready)
+    where = f"; all on one page: {page}" if page else ""
+    loading = f" ({warm:.1f} s of it to load)" if warm else ""
+    return (
+        f"{len(ready)} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s{loading};"
+        f" robots on {_first_address(fleet_host)} and up{where}."
+        " `roboglot fleet list` shows them."
+    )
