@@ -11,6 +11,7 @@ from roboglot.config import Config, RobotConfig, StartConfig
 from roboglot.fleet import Fleet, build_fleet, origin_of
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.logistics.delivery import Delivery, OrderKind, OrderRequest
+from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
@@ -46,6 +47,16 @@ async def test_robots_start_where_configured_and_others_keep_away() -> None:
     outside = RobotConfig("a", start=StartConfig(1e6, 0.0))
     with pytest.raises(ValueError, match="has no place"):
         build_fleet("empty", [outside], clock=LockstepClock(), seed=1, database=database)
+    await fleet.close()
+    database.close()
+
+
+async def test_a_robot_set_up_upstairs_knows_its_floor() -> None:
+    """No map says so: no Slamware door is open."""
+    database, upstairs = Database(":memory:"), StartConfig(13.5, 10.0, floor=1)
+    robots = [RobotConfig("a", "hermes", start=upstairs), RobotConfig("b", "hermes")]
+    fleet = build_fleet("office", robots, clock=LockstepClock(), seed=1, database=database)
+    assert [robot[Floors].current for robot in fleet.robots.values()] == [1, 0]
     await fleet.close()
     database.close()
 

@@ -26,6 +26,7 @@ from roboglot.model.components.interaction.input_device import InputDevice
 from roboglot.model.components.interaction.members import Members
 from roboglot.model.components.logistics.traffic_radio import TrafficRadio
 from roboglot.model.components.mapping.annotations import MapAnnotations
+from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.map_library import MapLibrary
 from roboglot.model.components.mapping.map_memory import MapMemory
 from roboglot.model.components.mapping.places import Places
@@ -144,7 +145,11 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
             _add_memory(robot, clock, database)
             robot.add(Lease, Lease(robot))
             robot.fairness = fairness
-    return Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers.all)
+    fleet = Fleet(simulated, built, [Autonomy(robot) for robot in built.values()], drivers.all)
+    for robot in built.values():
+        if Floors in robot:  # its first map is that of the floor where it is set up
+            robot[Floors].begin_on(simulated.truth.floor_of(robot.id))
+    return fleet
 
 
 def _placement(robot: RobotConfig) -> RobotPlacement:
