@@ -36,6 +36,11 @@ async def carried(tour: Tour, x: float, y: float, deg: float) -> None:
     await tour.clock.advance(0.3)
 
 
+async def confirmed(*_: object) -> bool:
+    """Stand for a newer scan that fits the place, too."""
+    return True
+
+
 @pytest.mark.world("office")
 async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
     await tour.go((12.0, 9.8))
@@ -130,6 +135,29 @@ async def test_a_place_found_once_replaces_none(tour: Tour, monkeypatch: pytest.
     assert not found
     assert tour.robot[Localization].lost is None
     assert tour.robot[Localization].pose.distance_to(here) < 0.05
+
+
+@pytest.mark.world("empty")
+@pytest.mark.parametrize(
+    ("others", "may_move"),
+    [
+        ([Pose(7.0, 2.0, 1.0)], False),
+        *(pytest.param(others, True, marks=pytest.mark.slow) for others in ([], [Pose(7.0, 2.0, 1.0)])),
+    ],
+)
+async def test_search_succeeds_at_no_place_found_once(
+    tour: Tour, monkeypatch: pytest.MonkeyPatch, others: list[Pose], may_move: bool
+) -> None:
+    """A mirror image fits the newest scans for a moment, and perhaps another one after it."""
+    await tour.go((2.0, 5.0))
+    here = tour.robot[Localization].pose
+    found = [[Match(pose, np.diag(SURE), 0.0, 100, 100, 100)] for pose in (*others, Pose(3.0, 2.0, 1.0))]
+    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_, **__: found.pop() if found else [])
+    monkeypatch.setattr("roboglot.autonomy.slam.look_around.settle", confirmed)
+    action = await tour.end_of(tour.robot[Localization].relocalize(may_move=may_move))
+    assert not found
+    assert (action.status, type(action.error)) == (ActionStatus.ABORTED, NotLocalized)
+    assert may_move or tour.robot[Localization].pose.distance_to(here) < 0.05
 
 
 @pytest.mark.world("empty")

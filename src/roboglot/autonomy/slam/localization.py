@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from roboglot.autonomy.computing import computed
-from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.belief import NEAR, Belief, DistantPlaces
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal, NotLocalized, NotReady
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 SEARCH_SECONDS = 10.0  # to search for a place that fits
 AROUND_SECONDS = 60.0  # … including driving around, if allowed
 SEARCH_PERIOD = 0.5  # s between two scans that are tried
+AGAIN_SECONDS = 1.0  # s until a distant place is searched again: those that hide walls move
 
 
 class LidarLocalization(Localization):
@@ -80,10 +81,11 @@ class LidarLocalization(Localization):
         return self._robot.actions.start("relocalize", search, resources={LOCALIZATION}, goal=region, source=source)
 
     async def _search_standing(self, region: Region | None) -> None:
-        deadline = self._robot.clock.time() + SEARCH_SECONDS
+        deadline, distant = self._robot.clock.time() + SEARCH_SECONDS, DistantPlaces()
         while True:
             found, odometry = await self._look(region)
-            if len(found) == 1 and await self._settle(found[0], odometry):
+            certain = len(found) == 1 and self._is_certain(found[0], odometry, distant)
+            if certain and await self._settle(found[0], odometry):
                 return
             if len(found) > 1:  # another scan from the same place adds nothing
                 raise NotLocalized(f"{len(found)} places look alike to the lidar: drive to a place where they differ")
@@ -91,7 +93,7 @@ class LidarLocalization(Localization):
                 if not self.started:
                     raise NotReady("localization is warming up: no scan has been compared with the map yet")
                 raise NotLocalized("the scan fits nowhere on the map")
-            await self._robot.clock.sleep(SEARCH_PERIOD)
+            await self._robot.clock.sleep(AGAIN_SECONDS if found else SEARCH_PERIOD)
 
     async def _search_driving(self, region: Region | None, source: str) -> None:
         """Search, and drive on while several places, or none, explain the scans. Raises NotReady, NotLocalized."""
@@ -102,11 +104,14 @@ class LidarLocalization(Localization):
             await self._robot.clock.sleep(SEARCH_PERIOD)
         from roboglot.autonomy.slam.look_around import Hypotheses, go_on  # needs the kernels, which are loaded by now
 
-        hypotheses = Hypotheses()
+        hypotheses, distant = Hypotheses(), DistantPlaces()
         while self._robot.clock.time() <= deadline:
             found, odometry = await self._look(region)
             place = hypotheses.narrow(found, odometry)
             if place is not None:
+                if not self._is_certain(place, odometry, distant):
+                    await self._robot.clock.sleep(AGAIN_SECONDS)
+                    continue
                 if await self._settle(place, odometry):
                     return
                 hypotheses = Hypotheses()
@@ -120,8 +125,14 @@ class LidarLocalization(Localization):
         """Return candidate poses (map) of the newest scan, and odometry (odom) at its time."""
         if self.estimator is None or (search := self.estimator.placing(region)) is None:
             return [], ORIGIN
-        odometry, work = search
-        return await computed(self._robot.clock, work), odometry
+        (odometry, work), grid = search, self._belief.map
+        found = await computed(self._robot.clock, work)
+        return found if self._belief.map is grid else [], odometry
+
+    def _is_certain(self, place: Match, odometry: Pose, distant: DistantPlaces) -> bool:
+        """Return whether to believe a place: one ``distant`` from the believed one has to be found twice in a row."""
+        believed = self._belief.map_to_odom.compose(odometry)
+        return place.pose.distance_to(believed) < NEAR or distant.add(place.pose, odometry)
 
     async def _settle(self, place: Match, odometry: Pose) -> bool:
         """Believe ``place`` and match newer scans there; return whether they confirm it."""

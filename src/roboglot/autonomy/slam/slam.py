@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.slam.adding import Adding
-from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.belief import NEAR, Belief
 from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, is_well_painted, supported
 from roboglot.autonomy.slam.contradictions import STOOD, WheelWitness, is_long
 from roboglot.autonomy.slam.displacement import DisplacementWatch
@@ -38,7 +38,7 @@ from roboglot.autonomy.slam.scan_points import ScanPoints, is_covered
 from roboglot.autonomy.slam.slip import SlipWatch
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
 from roboglot.autonomy.slam.turns import Turns
-from roboglot.autonomy.slam.whereabouts import NEAR, Elsewhere, Whereabouts
+from roboglot.autonomy.slam.whereabouts import Elsewhere, Whereabouts
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.events import (
     LoopClosed,

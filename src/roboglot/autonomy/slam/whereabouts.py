@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.belief import NEAR, Belief, DistantPlaces
 from roboglot.autonomy.slam.certainty import Support
 from roboglot.autonomy.slam.matcher import Match
 from roboglot.model.events import (
@@ -26,8 +26,7 @@ POOR_AGREEMENT, POOR_SECONDS = 0.7, 5.0  # after a contradiction, a fit that sta
 CONFIRMED = 5  # confirmations in a row before the pose is known again
 BLIND_SECONDS, BLIND_INTERVALS = 2.0, 5.0  # s without a scan, and in usual intervals, from which the pose is uncertain
 INTERVAL_GAIN = 0.1
-NEAR, BETTER = 1.5, 0.08  # m; the gain in agreement that another place needs over the believed one
-SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad between two searches' places up to which they are one
+BETTER = 0.08  # the gain in agreement that another place needs over the believed one
 
 
 class Whereabouts:
@@ -147,12 +146,13 @@ class Elsewhere:
     """Decides whether another place, found by a search, replaces the believed one of a robot that is not lost."""
 
     def __init__(self) -> None:
-        self._map_to_odom: Pose | None = None  # by the distant place that the last search found
+        self._distant = DistantPlaces()
         self._fitted: object = None  # the map that fitted where the robot believes to be
 
     def note_fit(self, grid: object) -> None:
         """Note that a scan fits this map at the believed place."""
-        self._map_to_odom, self._fitted = None, grid
+        self._distant.forget()
+        self._fitted = grid
 
     def is_new(self, grid: object) -> bool:
         """Return whether no scan has fitted this map yet."""
@@ -172,10 +172,5 @@ class Elsewhere:
         return self.is_certain(found, odometry, belief) or near
 
     def is_certain(self, found: Match, odometry: Pose, belief: Belief) -> bool:
-        """Return whether a distant place may be believed: on a map that fitted, an earlier search has found it, too.
-
-        While others leave a bare corridor, its mirror image may fit better for a moment.
-        """
-        before, self._map_to_odom = self._map_to_odom, found.pose.compose(odometry.inverse())
-        again = before is not None and before.compose(odometry).is_near(found.pose, SAME, SAME_YAW)
-        return again or self.is_new(belief.map)
+        """Return whether a distant place may be believed: on a map that fitted, an earlier search has found it, too."""
+        return self._distant.add(found.pose, odometry) or self.is_new(belief.map)

@@ -23,6 +23,7 @@ from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
 RECOVER_SECONDS = 30.0  # s, unless the client sets a limit
 TURN = math.radians(60)  # between two searches
+PLACE_SECONDS = 4.0  # to find a place twice
 PAUSE_SECONDS = 0.5  # between two searches from the same place, and while it is being pushed
 
 
@@ -60,7 +61,7 @@ def manual_relocalization(context: Context, _: NoOptions) -> Action:
         robot = errand.robot
         while not _docked(context) or (dock := home_dock(robot)) is None:
             try:
-                await errand.do(robot[Localization].relocalize(source=PART), within=PAUSE_SECONDS * 4)
+                await errand.do(robot[Localization].relocalize(source=PART), within=PLACE_SECONDS)
                 return
             except (NotLocalized, Expired):
                 await robot.clock.sleep(PAUSE_SECONDS)
