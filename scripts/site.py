@@ -66,10 +66,10 @@ def rewritten(text: str, source: str) -> str:
         if new is None:
             return words
         if file == twin or (not chinese and new.endswith(CHINESE)):  # the site's own switch leads to the other language
-            if not anchor:
+            if not anchor and not chinese:
                 return words
             up = "../" * (here.count("/") + 1)  # out of the Chinese pages' folder
-            return f'<a href="{up}{new.removesuffix(".md")}.html#{anchor}">{words}</a>'
+            return f'<a href="{up}{new.removesuffix(".md")}.html{"#" + anchor if anchor else ""}">{words}</a>'
         relative = os.path.relpath(new.replace(CHINESE, ".md"), PurePosixPath(here).parent)
         return f"{mark}[{words}]({relative}{'#' + anchor if anchor else ''})"
 

@@ -53,7 +53,10 @@ def test_sections_of_the_navigation_have_chinese_names() -> None:
 def test_no_line_is_left_of_links_between_languages(pages: Path) -> None:
     """The site leads to the other language itself; the links' words stood alone on top of its pages."""
     texts = {page.name: page.read_text("utf-8") for page in pages.rglob("*.md")}
-    assert [name for name, text in texts.items() if re.search("^(中文|English)$", text, re.MULTILINE)] == []
+    assert [name for name, text in texts.items() if re.search("^(中文|English)(（|$)", text, re.MULTILINE)] == []
+    assert '<a href="../../protocols/slamware.html">English</a>（' in (pages / "protocols/slamware.zh.md").read_text(
+        "utf-8"
+    )
 
 
 def test_links_lead_somewhere_in_both_languages(site: ModuleType, pages: Path) -> None:
