@@ -10,6 +10,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import Future
+from contextlib import nullcontext
 from functools import partialmethod
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,6 +35,8 @@ from roboglot.shards.states import State
 from roboglot.storage.homes import Home, Homes
 from roboglot.storage.opening import open_registry
 from roboglot.testing.addresses import free_addresses
+from roboglot.testing.campaign import cluster as campaigns
+from roboglot.testing.campaign.trials import Trial
 
 STORE = 80 << 20
 PATIENCE = 300.0  # s
@@ -242,7 +245,7 @@ async def test_a_lost_ray_ends_the_fleet(part: str, tmp_path: Path, monkeypatch:
 
 
 def test_ray_that_was_never_started_has_lost_nothing() -> None:
-    assert cluster_module.lost_part() == ""
+    assert cluster_module.why_lost() == ""
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -291,3 +294,14 @@ async def test_a_failed_look_is_not_the_last(
     assert len([record for record in caplog.records if record.levelname == "WARNING"]) == 1
     await fleet.close()
     assert fake.names == []
+
+
+def test_a_lost_ray_ends_a_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = SimpleNamespace(options=lambda **_: SimpleNamespace(remote=lambda *_, **__: object()))
+    fake = SimpleNamespace(remote=lambda _: task, cluster_resources=lambda: {"CPU": 1}, put=lambda _: None)
+    monkeypatch.setattr(campaigns, "ray", fake)
+    monkeypatch.setattr(campaigns, "joined", lambda _: nullcontext())
+    monkeypatch.setattr(campaigns, "why_lost", lambda: "raylet has ended")
+    trials = iter([Trial("/", "a.yaml", "a", 1, "f")])
+    with pytest.raises(OSError, match=r"^raylet has ended$"):
+        campaigns.play_on("local", trials, [], 1, 60.0, lambda _: None, lambda *_: None)

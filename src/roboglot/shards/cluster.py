@@ -111,11 +111,12 @@ def _undisturbed() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def lost_part() -> str:
-    """Return the part without which a Ray started by this program is of no use, if it has ended; else ""."""
+def why_lost() -> str:
+    """Return why a Ray that this program started is of no use any more; "" if it is, or was not started here."""
     node = ray._private.worker._global_node  # only Ray's own health checks are public, which take a minute
     ended = node.dead_processes() if node is not None else []
-    return next((kind for kind, _ in ended if kind in PARTS), "")
+    lost = [kind for kind, _ in ended if kind in PARTS]
+    return f"{lost[0]}, a process of Ray, has ended, and Ray with it; start again" if lost else ""
 
 
 class Reference(Protocol):
@@ -275,8 +276,8 @@ class ClusterFleet:
     async def _look_always(self) -> None:
         seldom = LogLimiter(log)
         while True:
-            if self._local and (part := lost_part()) and not self.ended.done():
-                self.ended.set_exception(OSError(f"{part}, a process of Ray, has ended, and Ray with it; start again"))
+            if self._local and (why := why_lost()) and not self.ended.done():
+                self.ended.set_exception(OSError(why))
             ends = await asyncio.gather(*map(self._look, self.shards.values()), return_exceptions=True)
             for shard, error in zip(self.shards.values(), ends, strict=True):
                 if isinstance(error, Exception):  # of Ray, whose client raises bare ones, too; of a full disk

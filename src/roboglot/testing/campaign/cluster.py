@@ -15,7 +15,7 @@ from typing import Protocol
 import msgspec
 
 from roboglot.extras import explaining
-from roboglot.shards.cluster import LOCAL, joined
+from roboglot.shards.cluster import LOCAL, joined, why_lost
 from roboglot.testing.campaign.local import ATTEMPTS_MAX, Ended, Leave, interruptions, play_here
 from roboglot.testing.campaign.trials import Outcome, Result, Trial
 from roboglot.testing.scenarios.files import shown_below
@@ -51,7 +51,7 @@ def play_on(
     """Play ``trials`` on the cluster ``where``, ``workers`` at a time; 0: one per processor.
 
     ``paths``: files and folders that they need. Raises KeyboardInterrupt at SIGINT, once running trials are
-    cancelled; OSError if there is no such cluster; TooLarge.
+    cancelled; OSError if there is no such cluster, or not any more; TooLarge.
     """
     waiting: dict[Reference, tuple[Trial, Path | None]] = {}
     with joined(where), interruptions() as interrupted:
@@ -65,6 +65,8 @@ def play_on(
                 waiting[task.remote(trial, files, seconds_max, keep=place is not None)] = trial, place
             if not waiting:
                 return
+            if where == LOCAL and (why := why_lost()):
+                raise OSError(why)
             done, _ = ray.wait(list(waiting), timeout=LOOK_SECONDS)
             for reference in done:
                 trial, place = waiting.pop(reference)
