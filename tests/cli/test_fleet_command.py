@@ -67,6 +67,34 @@ class Unfinished(Hopeless):
         return 0.0
 
 
+class Late(Unfinished):
+    """A fleet whose addresses are another's at first."""
+
+    async def start(self) -> float:
+        for shard in self.shards.values():
+            shard.reason = "127.0.0.1:1448 is in use"
+            self.shards.turn_to(shard, State.FAILED)
+        return 0.0
+
+
+async def test_a_fleet_is_ready_with_its_first_world(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    host, said = Late(tmp_path), list[str]()
+    serving_it = asyncio.ensure_future(
+        serving.serve(lambda: cast("FleetHost", host), tmp_path, said.append, 0.0, lasting=False)
+    )
+    async with asyncio.timeout(10.0):
+        while "no world is up yet: 127.0.0.1:1448 is in use" not in caplog.text:  # noqa: ASYNC110 - there is no event of it
+            await asyncio.sleep(0.001)
+        assert said == []
+        host.shards.turn_to(host.shards["w2"], State.READY)
+        while not said:  # noqa: ASYNC110 - there is no event of it
+            await asyncio.sleep(0.001)
+        host.ended.set_result(None)
+        await serving_it
+    assert said[0].startswith("1 of 2 worlds with 1 robot are up")
+    assert said[1:] == ["ready"]
+
+
 @pytest.mark.parametrize("known", [False, True])
 @pytest.mark.parametrize("lasting", [False, True])
 async def test_an_interrupted_start_keeps_no_new_plan(known: bool, lasting: bool, tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ class Interrupted(Exception):
 async def serve(
     fleet_host: Callable[[], FleetHost], folder: Path, say: Callable[[str], None], began: float, *, lasting: bool
 ) -> None:
-    """Keep the fleet up until a signal; ``say`` that it is. Raises NoWorld, Interrupted, OSError.
+    """Keep the fleet up until a signal; ``say`` once a world is. Raises NoWorld, Interrupted, OSError.
 
     A new plan is kept once the worlds are up, or when shards outlive this program (``lasting``).
     """
@@ -42,17 +42,15 @@ async def serve(
     page = Overview(host, _first_address(host))
     earlier, keep = EarlierPlan(folder), lasting
     await classes.open()  # shards look for this socket when they start
-    starting = asyncio.ensure_future(host.start())
+    starting = asyncio.ensure_future(_until_up(host))
     try:
         await commands.open()
         await _either(host.ended, starting)
         if not starting.done():
             host.ended.result()
             raise Interrupted("interrupted before all worlds were up")
-        seconds = starting.result()
-        keep = not _all_hopeless(host)
-        if not keep:
-            raise NoWorld(f"no world can start: {next(iter(host.shards.values())).reason}")
+        keep = keep and not isinstance(starting.exception(), NoWorld)
+        seconds, keep = starting.result(), True
         page.open()
         say(up_text(host, time.monotonic() - began, seconds, page.address))
         say("ready")
@@ -80,8 +78,23 @@ def _end(ended: asyncio.Future[None]) -> None:
         ended.set_result(None)
 
 
-def _all_hopeless(fleet_host: FleetHost) -> bool:
-    return all(shard.hopeless for shard in fleet_host.shards.values())
+async def _until_up(fleet_host: FleetHost) -> float:
+    """Start all shards; return the time to load, s, once each is up or has failed, and one is up. Raises NoWorld."""
+    seconds, shards = await fleet_host.start(), fleet_host.shards.values()
+
+    def is_decided() -> bool:
+        return any(shard.state is State.READY for shard in shards) or all(shard.hopeless for shard in shards)
+
+    if not is_decided():
+        log.warning("no world is up yet: %s", _reason(fleet_host) or "none has answered")
+    await fleet_host.shards.until(is_decided)
+    if all(shard.hopeless for shard in shards):
+        raise NoWorld(f"no world can start: {_reason(fleet_host)}")
+    return seconds
+
+
+def _reason(fleet_host: FleetHost) -> str:
+    return next((shard.reason for shard in fleet_host.shards.values() if shard.reason), "")
 
 
 def _restore(earlier: EarlierPlan) -> None:
@@ -105,7 +118,8 @@ def up_text(fleet_host: FleetHost, seconds: float, warm: float, page: str) -> st
     where = f"; all on one page: {page}" if page else ""
     loading = f" ({warm:.1f} s of it to load)" if warm else ""
     return (
-        f"{len(ready)} of {len(shards)} worlds with {robots} robots are up after {seconds:.1f} s{loading};"
+        f"{len(ready)} of {len(shards)} worlds with {robots} robot{'s' * (robots != 1)} are up"
+        f" after {seconds:.1f} s{loading};"
         f" robots on {_first_address(fleet_host)} and up{where}."
         " `roboglot fleet list` shows them."
     )
