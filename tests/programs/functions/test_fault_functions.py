@@ -17,6 +17,28 @@ async def test_a_cliff_ahead_lets_no_walk_get_on(caller: Caller, world: World) -
     assert (field(walked, "state.code"), field(walked, "response.code")) == (1, 3029)
 
 
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("go_straight", (0.2, 0.5)),
+        ("go_straight", (0.2, 0.0, 1.0)),
+        ("trot_walking", (0.2, 0.0, 20.0, 0.03, 0.03, 0.5)),
+        ("turn", (45.0,)),
+    ],
+)
+async def test_a_robot_held_up_walks_nowhere(
+    caller: Caller, world: World, name: str, values: tuple[float, ...]
+) -> None:
+    world.hands.lift("a")
+    await caller.clock.advance(0.5)
+    walked = await caller(f"cyberdog.motion.{name}", *values)
+    assert (field(walked, "state.code"), field(walked, "response.code")) == (1, 3003)
+    assert field(walked, "state.describe") == "the robot is held up: it has no floor under it"
+    world.hands.let_go("a")
+    await caller.clock.advance(1.0)
+    assert field(await caller("cyberdog.motion.go_straight", 0.2, 0.2), "state.code") == 0
+
+
 async def test_lidar_that_is_gone_has_no_new_scan(caller: Caller, world: World) -> None:
     await caller.clock.advance(0.5)
     assert field(await caller("cyberdog.lidar.get_data"), "ranges")

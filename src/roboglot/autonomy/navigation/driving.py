@@ -16,6 +16,7 @@ from roboglot.autonomy.slam.displacement import Carried
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.motion.base import Base, WheelSpeeds
 from roboglot.model.components.motion.driving import Driving, check_command, check_offset, top_speed
+from roboglot.model.components.motion.motion_status import check_on_floor
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Blocked
 from roboglot.model.geometry import STILL, Pose, Twist, wrap_angle
@@ -238,7 +239,7 @@ class OdometryDriving(Driving):
             await carried.check()
 
     async def _approach(self, action: Action, move: _Move) -> None:
-        """Drive until close enough to brake. Raises Blocked without progress."""
+        """Drive until close enough to brake. Raises Blocked without progress, Refused off the floor."""
         base, odometry, clock = self._robot[Base], self._robot[Odometry], self._robot.clock
         foresight = Foresight(base, clock)
         # A correction after overshooting must be able to move, however slow the plan was.
@@ -250,6 +251,7 @@ class OdometryDriving(Driving):
             if await action.hold(self._brake):
                 best_at = clock.time()
                 move.straight.speed = move.turn.speed = 0.0
+            check_on_floor(self._robot)
             pose = foresight.ahead(odometry.reading.pose)
             distance, angle = move.remaining(pose)
             if distance <= CLOSE and abs(angle) <= CLOSE_YAW:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from roboglot.model.components.component import Component
+from roboglot.model.errors import Refused
+from roboglot.model.robot import Robot
 from roboglot.values import dataclass
 
 
@@ -32,3 +34,12 @@ class MotionStatus(Component):
     @abstractmethod
     def flags(self) -> MotionFlags:
         """Current state."""
+
+
+def check_on_floor(robot: Robot) -> None:
+    """Raise Refused if the robot senses that it is held up or overturned: walking or driving takes it nowhere."""
+    flags = robot[MotionStatus].flags if MotionStatus in robot else None
+    if flags is not None and flags.rolled_over:
+        raise Refused("the robot lies on its side")
+    if flags is not None and flags.picked_up:
+        raise Refused("the robot is held up: it has no floor under it")

@@ -12,6 +12,7 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.gaits import Gait
 from roboglot.model.components.motion.legs import FootLift, Legs
+from roboglot.model.components.motion.motion_status import check_on_floor
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import Busy, InvalidGoal, RobotError
 from roboglot.model.geometry import Pose, Twist
@@ -141,6 +142,7 @@ async def _walk(
 ) -> None:
     """Walk for a distance (m, by odometry), else for a time (s), else for one command."""
     driving = session.robot[Driving]
+    check_on_floor(session.robot)
     if distance > 0 and not twist.speed:
         raise InvalidGoal("a distance needs a velocity other than 0")
     if Legs in session.robot:
@@ -153,6 +155,7 @@ async def _walk(
         await _walk_along(session, twist, distance)
     elif duration > 0:
         await session.hold(driving.drive(twist, source=session.source), duration)
+        check_on_floor(session.robot)  # it may have been taken up meanwhile
     else:
         driving.drive(twist, lifetime=SINGLE_COMMAND, source=session.source)
 
@@ -172,6 +175,7 @@ async def _walk_along(session: Session, twist: Twist, distance: float) -> None:
             best, waited = (gone, 0.0) if gone - best > 0.01 else (best, waited + LOOK_EVERY)
             if waited > patience:
                 raise RobotError(f"stuck {distance - gone + start:.2f} m before the end")
+            check_on_floor(session.robot)
             await session.sleep(LOOK_EVERY)
     finally:
         action.cancel()
