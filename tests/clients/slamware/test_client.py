@@ -157,6 +157,13 @@ async def test_bad_answers_are_reported_and_nothing_hangs(
         await client.get_pose()
 
 
+async def test_unlisted_flags_of_a_robot_are_read(fake: Callable[[Reply], Awaitable[SlamwareClient]]) -> None:
+    data = b'{"mode": 0, "flags": ["with_yaw", "fast", null], "yaw": 1.5}'
+    client = await fake(answering(JSON % (len(data), data)))
+    options = await client.get_move_options()
+    assert (options.flags, options.yaw) == (["with_yaw", "fast", None], 1.5)
+
+
 async def test_an_answer_is_no_longer_than_map(
     fake: Callable[[Reply], Awaitable[SlamwareClient]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -34,6 +34,17 @@ class Scan(msgspec.Struct):
         return angles, np.fromiter(there, np.float64, len(self.laser_points))
 
 
+class TaskMoveOptions(msgspec.Struct):
+    """Drive settings of tasks, as ``MoveOptions``; a robot may have flags and modes that its manual does not list."""
+
+    mode: int = 0
+    flags: list[str | None] | int | None = None
+    yaw: float | None = None
+    acceptable_precision: float | None = None
+    fail_retry_count: int | None = None
+    speed_ratio: float | None = None
+
+
 class NetworkStatus(msgspec.Struct):
     """State of the network; ``quality`` in percent."""
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import httpx
 import pytest
 
 from roboglot.model.components.energy.battery import Battery, DockContact
+from roboglot.model.components.logistics.delivery import Delivery
 from roboglot.model.components.logistics.industry import CallKind, Industry
 from roboglot.model.components.motion.base import Base
 from roboglot.model.robot import Robot
@@ -100,6 +102,17 @@ async def test_move_options_are_merged_and_act(screen: Screen, robot: Robot) -> 
     assert (await put(screen, "admin/move_options", {"mode": 7})).status_code == 400
     assert (await screen.client.put(f"{API}/admin/move_options")).status_code == 200
     assert await get(screen, "admin/move_options") == default
+
+
+async def test_stored_flags_act_as_they_are_shown(screen: Screen, robot: Robot) -> None:
+    """An earlier version took unlisted flags."""
+    await put(screen, "admin/move_options", {"flags": ["with_yaw"], "yaw": 1.57})
+    policy = robot[Delivery].policy
+    await robot[Delivery].set_policy(replace(policy, words={**policy.words, "flags": ["with_yaw", "fast", None]}))
+    options = await get(screen, "admin/move_options")
+    assert (options["flags"], options["yaw"], robot[Delivery].policy.yaw) == (["with_yaw"], 1.57, 1.57)
+    await put(screen, "admin/move_options", {"speed_ratio": 0.5})
+    assert (robot[Delivery].policy.yaw, robot[Delivery].policy.words["flags"]) == (1.57, ["with_yaw"])
 
 
 async def test_the_time_for_food_can_be_set(screen: Screen) -> None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from roboglot.clients.slamware.calls import Chapter, call
+from roboglot.clients.slamware.values import TaskMoveOptions
 from roboglot.wire.slamware.chapters.delivery import (
     AdminPassword,
     Configuration,
@@ -19,7 +20,6 @@ from roboglot.wire.slamware.chapters.delivery import (
     WorkModeEntry,
     WrappedSettings,
 )
-from roboglot.wire.slamware.chapters.motion import MoveOptions
 
 
 class Admin(Chapter):
@@ -58,7 +58,7 @@ class Admin(Chapter):
         """Set the hours (UTC) outside of which the robot rests on its dock and tasks wait."""
 
     @call("GET /api/delivery/v1/admin/move_options")
-    async def get_move_options(self) -> MoveOptions:
+    async def get_move_options(self) -> TaskMoveOptions:
         """Return the drive settings of tasks."""
 
     @call("PUT /api/delivery/v1/admin/move_options")

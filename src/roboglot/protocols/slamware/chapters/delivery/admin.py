@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 import msgspec
 
@@ -146,12 +147,10 @@ async def set_move_options(context: Context, body: dict[str, object] | None = No
 
 
 def _stored(policy: Policy) -> dict[str, object]:
-    """Return the settings; without flags from before this program refused unknown ones."""
+    """Return the settings; without unlisted flags from before this program refused them."""
     words = dict(policy.words)
-    try:
-        msgspec.convert(words, MoveOptions)
-    except msgspec.ValidationError:
-        words["flags"] = []
+    if isinstance(flags := words.get("flags"), list):
+        words["flags"] = [flag for flag in flags if flag in get_args(MoveFlag)]
     return words
 
 
