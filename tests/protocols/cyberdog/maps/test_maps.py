@@ -53,6 +53,22 @@ async def test_mapping_is_pushed_saved_and_read_again(
     await localized(client, passing)
 
 
+@pytest.mark.parametrize("seconds", [0, 2])
+async def test_a_replaced_map_is_not_saved(client, robot, forward, passing: Passing, seconds: int) -> None:
+    """Another client's map is no success of this one's mapping, also before the task has noticed."""
+    stream = Stream(client, 6004, {"type": 5})
+    await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)
+    grid = robot[Mapping].grid
+    robot[Mapping].move_origin(Point(1.0, 0.0))  # still its map
+    robot[Mapping].load(grid, Pose())
+    await forward(seconds=seconds)
+    assert await client.ask(6009, {"type": 5, "map_name": "mine"}) == {"result": 1}
+    await passing(lambda: stream.ended)
+    assert (stream.codes[-1], stream.answers[-1]) == (7, {"result": 3})
+    assert await client.ask(6009, {"type": 5, "map_name": "mine"}) == {"result": 1}
+    assert (await robot[MapLibrary].names(), robot[Mapping].grid.width > 50) == ([], True)
+
+
 async def test_a_map_without_a_name_is_thrown_away(client, robot, passing: Passing) -> None:
     stream = Stream(client, 6004, {"type": 5})
     await passing(lambda: 6 in stream.codes and robot[Mapping].grid.width > 50)

@@ -6,7 +6,8 @@ import logging
 
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
-from roboglot.model.errors import RobotError
+from roboglot.model.errors import Refused, RobotError
+from roboglot.model.events import MapReplaced
 from roboglot.model.map_loading import known_dock
 from roboglot.protocols.cyberdog.chapters.mapping.labels import NAME_MAX
 from roboglot.protocols.cyberdog.chapters.mapping.survey import Survey
@@ -21,25 +22,35 @@ FIX_PERIOD = 1.0  # s between two checks for satellites
 async def build_map(context: Context, task: Task, *, outdoor: bool) -> TaskResult:
     """Start an empty map where the robot stands and add scans until the task is stopped.
 
-    Outdoors, satellite fixes on the way are kept with it, to georeference it.
+    Outdoors, satellite fixes on the way are kept with it, to georeference it. Fails if the map is replaced meanwhile.
     """
-    mapping = context.robot[Mapping]
+    robot, mapping, survey = context.robot, context.robot[Mapping], Survey(outdoor)
     enabled = mapping.enabled
     mapping.clear()
     mapping.enable(True)
-    context.stored_map, context.survey = "", Survey(outdoor)
+    context.stored_map, context.survey = "", survey
     task.feedback(Feedback.MAPPING_STARTED)
+
+    def note(event: MapReplaced) -> None:
+        if event.origin is None or not mapping.grid.width:  # otherwise the same map continues at another origin
+            survey.replaced = True
+
+    forget = robot.events.listen(MapReplaced, note)
     try:
-        while True:  # only 6009 ends it
-            context.survey.look(context.robot)
-            await context.robot.clock.sleep(FIX_PERIOD)
+        while not survey.replaced:  # only 6009 ends it otherwise
+            survey.look(robot)
+            await robot.clock.sleep(FIX_PERIOD)
     finally:
+        forget()
         mapping.enable(enabled)
+    return task.fail(Feedback.MAPPING_FAILED, Refused("another client replaced the map"))
 
 
 async def keep_map(context: Context, name: str) -> bool:
     """Save the map under ``name`` (on disk on return), or discard it without one. False on failure."""
     mapping = context.robot[Mapping]
+    if context.survey.replaced:
+        return not name
     if not name:
         mapping.clear()
         return True

@@ -17,6 +17,7 @@ class Survey:
     """Kind of a map being built, and satellite fixes on the way."""
 
     def __init__(self, outdoor: bool = False) -> None:
+        self.replaced = False  # by another client's map
         self.outdoor = outdoor
         self._samples: deque[tuple[Point, GpsReading]] = deque(maxlen=SAMPLES_MAX)
 

@@ -176,6 +176,8 @@ async def _stop(context: Context, type: int, map_name: str) -> StopResult:
             if not await _keep_map(context, map_name):
                 return StopResult.FAILED
             await tasks.stop()
+        case TaskType.MAPPING if map_name:
+            return StopResult.FAILED  # there is no map to be saved
         case TaskType.LOCALIZATION if running is None and tasks.state in NAVIGATION_STATES:
             tasks.leave()
         case _ if running == type:
