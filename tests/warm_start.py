@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import gc
 import importlib
 import inspect
 import json
@@ -255,6 +256,7 @@ REWRITTEN = ("roboglot.cli.", "roboglot.demo.", "roboglot.testing.")  # by pytes
 def _work() -> None:
     """Be a worker of xdist, as if Python had just been started for it."""
     global _parent
+    gc.disable()  # conftest.py enables it when all tests are collected
     ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     if os.fork() == 0:
         ours.close()

@@ -152,6 +152,7 @@ def test_a_plan_is_kept(tmp_path: Path) -> None:
         load(tmp_path)
 
 
+@pytest.mark.slow  # a start of its own: the nursery of test_fleet_served warms itself, too
 def test_warming_starts_no_thread() -> None:
     """Raises Threaded otherwise; a fork would copy the thread's locks without the thread."""
     code = "from roboglot.shards.warm_up import warm; warm()"

@@ -9,14 +9,13 @@ PROJECT = Path(__file__).parents[2]
 SECONDS = 12  # the lift that is called after three has arrived by then
 
 
-async def digests(seed: int, hash_seed: str, seconds: int) -> list[bytes]:
-    """Return what the robots sensed until each second."""
+async def digests(hash_seed: str, *worlds: str) -> list[list[bytes]]:
+    """Return what the robots sensed until each second, in each of the worlds of a process."""
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
         "tests.simulation.trace",
-        str(seed),
-        str(seconds),
+        *worlds,
         stdout=asyncio.subprocess.PIPE,
         cwd=PROJECT,
         env={**os.environ, "PYTHONHASHSEED": hash_seed},
@@ -27,11 +26,12 @@ async def digests(seed: int, hash_seed: str, seconds: int) -> list[bytes]:
         if process.returncode is None:
             process.kill()
     assert process.returncode == 0
-    return output.split()
+    return [line.split() for line in output.splitlines()]
 
 
 async def test_processes_sense_the_same_other_seeds_differ():
-    first, second, other = await asyncio.gather(digests(7, "1", SECONDS), digests(7, "2", SECONDS), digests(8, "1", 1))
+    long = f"7:{SECONDS}"
+    (first, other), (second,) = await asyncio.gather(digests("1", long, "8:1"), digests("2", long))
     assert [len(digest) for digest in first] == [64] * SECONDS
     assert first == second
     assert first[0] != other[0]

@@ -65,4 +65,6 @@ def pose(value: Pose) -> tuple[float, float, float]:
 
 
 if __name__ == "__main__":
-    print("\n".join(asyncio.run(trace(int(sys.argv[1]), int(sys.argv[2])))))
+    for argument in sys.argv[1:]:
+        seed, seconds = map(int, argument.split(":"))
+        print(*asyncio.run(trace(seed, seconds)))

@@ -218,7 +218,8 @@ class Autonomy:
             if not wait:
                 self._report(FaultLevel.WARNING, str(course.unavailable))
         try:
-            await compile_beside(NAVIGATION, _log_progress)
+            if lacking:
+                await compile_beside(NAVIGATION, _log_progress)
             slam_class, planner_class = await load(_estimator_and_planner)
         except Exception as error:
             reason = str(error) or type(error).__name__

@@ -189,7 +189,7 @@ async def test_lost_robot_keeps_saying_that_places_look_alike(tour: Tour) -> Non
 
 
 @pytest.mark.world("office")
-@pytest.mark.parametrize("along", [0.8, -1.0])
+@pytest.mark.parametrize("along", [0.8, pytest.param(-1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("x", [16.0, pytest.param(25.0, marks=pytest.mark.slow)])
 async def test_place_a_metre_along_corridors_is_found(tour: Tour, x: float, along: float) -> None:
     await tour.go((26.0, 10.0))

@@ -104,7 +104,7 @@ CARRIED = [Pose(0.0, -1.0), Pose(0.0, 0.0, 0.6), Pose(0.0, -2.0, 1.5), Pose(0.2,
 
 @pytest.mark.world("office")
 @pytest.mark.parametrize("carried", CARRIED, ids=["aside", "turned", "far", "little"])
-@pytest.mark.parametrize("before", [0.06, pytest.param(0.3, marks=pytest.mark.slow), 1.0])
+@pytest.mark.parametrize("before", [0.06, *(pytest.param(before, marks=pytest.mark.slow) for before in (0.3, 1.0))])
 async def test_move_with_a_carry_at_its_end_fails(tour: Tour, carried: Pose, before: float) -> None:
     await tour.go((20.0, 10.0), deg=180)
     goal = tour.truth.compose(Pose(1.0))
