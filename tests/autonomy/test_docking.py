@@ -158,7 +158,9 @@ async def test_docked_robot_knows_its_dock_after_a_restart(tour: Tour) -> None:
 
 @pytest.mark.world("office")
 async def test_wrong_pose_keeps_dock_and_docking_corrects_it(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])  # scans alone do not determine the place
+    monkeypatch.setattr(
+        "roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: []
+    )  # scans alone do not determine the place
     await tour.clock.advance(1.0)
     for wrong in (Pose(40.0, 40.0), Pose(3.0, 1.0, 0.5)):
         tour.robot[Localization].set_pose(wrong)
@@ -170,7 +172,7 @@ async def test_wrong_pose_keeps_dock_and_docking_corrects_it(tour: Tour, monkeyp
 
 @pytest.mark.world("office")
 async def test_dock_of_loaded_map_is_learnt_when_localized(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])
+    monkeypatch.setattr("roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: [])
     mapping, docking = tour.robot[Mapping], tour.robot[Docking]
     await tour.clock.advance(1.0)
     mapping.load(mapping.grid, Pose(40.0, 40.0))  # away from its true place
@@ -186,7 +188,7 @@ async def test_dock_of_loaded_map_is_learnt_when_localized(tour: Tour, monkeypat
 
 @pytest.mark.world("office")
 async def test_lost_robot_put_on_its_dock_is_localized(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [])
+    monkeypatch.setattr("roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: [])
     await tour.end_of(tour.robot[Docking].undock())
     tour.robot[Localization].set_pose(Pose(40.0, 40.0))
     await tour.clock.advance(3.0)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from roboglot.autonomy.slam.matcher import Match
-from roboglot.autonomy.slam.whereabouts import Elsewhere
+from roboglot.autonomy.slam.recovery.whole_map_search import Elsewhere
 from roboglot.model.geometry import Pose
 
 BELIEVED, MIRRORED, NEARBY = Pose(2.9, 2.6), Pose(4.5, 3.4, math.pi), Pose(3.5, 2.6)

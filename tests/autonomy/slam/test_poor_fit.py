@@ -8,14 +8,15 @@ import pytest
 
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import Support
-from roboglot.autonomy.slam.whereabouts import POOR_SECONDS, Whereabouts
+from roboglot.autonomy.slam.recovery.whereabouts import POOR_SECONDS, Whereabouts
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.events import EventStream, LostReason
 
-DENIED, POOR, FAIR, NEW = (
+DENIED, POOR, FAIR, GOOD, NEW = (
     Support(100, 5, 50, 45),
     Support(100, 63, 5, 32),
     Support(100, 75, 5, 20),
+    Support(100, 95, 1, 4),
     Support(100, 5, 1, 4),
 )
 
@@ -53,3 +54,14 @@ def test_a_poor_fit_alone_is_none(whereabouts: Whereabouts) -> None:
 def test_a_better_fit_ends_it(whereabouts: Whereabouts, between: Support) -> None:
     assert lost_at(whereabouts, DENIED, POOR, between, POOR) is None
     assert whereabouts._belief.is_certain
+
+
+@pytest.mark.parametrize(
+    ("seen", "reason"),
+    [(GOOD, LostReason.NO_SCANS), (POOR, LostReason.NO_FIT), (NEW, LostReason.NO_GROUND)],
+    ids=["good", "poor", "new ground"],
+)
+def test_a_lidar_that_returns_is_not_silent(whereabouts: Whereabouts, seen: Support, reason: LostReason) -> None:
+    whereabouts.lose(LostReason.NO_SCANS, 10.0)
+    whereabouts.judge(seen, 20.0)
+    assert whereabouts._belief.lost is reason

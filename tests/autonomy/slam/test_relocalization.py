@@ -111,7 +111,7 @@ async def test_place_found_everywhere_replaces_a_half_fitting_one(tour: Tour, mo
     await tour.go((2.0, 5.0))  # its dock would tell it the place
     estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
     found = Match(Pose(3.0, 2.0, 1.0), np.diag(SURE), 0.0, 100, 100, 100)
-    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: [found])
+    monkeypatch.setattr("roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: [found])
     estimator.whereabouts.lose(LostReason.NO_FIT, tour.clock.time())  # the believed place still fits
     news: list[LocalizationRecovered] = []
     tour.robot.events.listen(LocalizationRecovered, news.append)
@@ -129,7 +129,9 @@ async def test_a_place_found_once_replaces_none(tour: Tour, monkeypatch: pytest.
     estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
     here = tour.robot[Localization].pose
     found = [[Match(Pose(3.0, 2.0, 1.0), np.diag(SURE), 0.0, 100, 100, 100)]]  # as in a mirror, for a moment
-    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: found.pop() if found else [])
+    monkeypatch.setattr(
+        "roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: found.pop() if found else []
+    )
     estimator.whereabouts.lose(LostReason.NO_FIT, tour.clock.time())
     await tour.clock.advance(3.0)
     assert not found
@@ -153,7 +155,7 @@ async def test_search_succeeds_at_no_place_found_once(
     here = tour.robot[Localization].pose
     found = [[Match(pose, np.diag(SURE), 0.0, 100, 100, 100)] for pose in (*others, Pose(3.0, 2.0, 1.0))]
     monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_, **__: found.pop() if found else [])
-    monkeypatch.setattr("roboglot.autonomy.slam.look_around.settle", confirmed)
+    monkeypatch.setattr("roboglot.autonomy.slam.recovery.look_around.settle", confirmed)
     action = await tour.end_of(tour.robot[Localization].relocalize(may_move=may_move))
     assert not found
     assert (action.status, type(action.error)) == (ActionStatus.ABORTED, NotLocalized)
@@ -169,7 +171,7 @@ async def test_robot_stays_lost_while_only_other_places_fit(
     estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
     here = tour.robot[Localization].pose
     found = [Match(Pose(here.x + away, here.y, 0.0), np.diag(SURE), 0.0, 100, 100, 100) for away in (x, 4.0)]
-    monkeypatch.setattr("roboglot.autonomy.slam.slam.places", lambda *_: found)
+    monkeypatch.setattr("roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: found)
     estimator.whereabouts.lose(LostReason.NO_FIT, tour.clock.time())  # the believed place still fits
     await tour.clock.advance(3.0)
     assert tour.robot[Localization].lost is lost
@@ -267,8 +269,8 @@ async def test_robot_looks_around_until_one_place_is_left(tour: Tour) -> None:
 
 
 def test_places_are_ruled_out_by_expected_positions() -> None:
-    from roboglot.autonomy.slam.look_around import Hypotheses
     from roboglot.autonomy.slam.matcher import Match
+    from roboglot.autonomy.slam.recovery.look_around import Hypotheses
 
     def at(x: float, y: float) -> Match:
         return Match(Pose(x, y), np.eye(3), 0.0, 100, 100, 100)

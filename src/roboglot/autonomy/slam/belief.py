@@ -19,8 +19,6 @@ from roboglot.values import dataclass
 SURE = (0.003**2, 0.003**2, 0.002**2)  # m2, m2, rad2: lower bounds of the variances
 HALF_SURE = 0.5  # m: a place known no better counts half
 SET_BY_CLIENT = (0.15**2, 0.15**2, 0.1**2)  # variances of a pose set by a client
-NEAR = 1.5  # m from the believed place up to which a place is not distant
-SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad between two searches' places up to which they are one
 
 Disc = tuple[float, float, float]  # x, y of the middle (map), radius: m
 
@@ -120,22 +118,3 @@ class Belief:
         self.covariance, self.doubt = _sure(), _sure()
         self.search, self.map, self.frame = False, EvidenceGrid(), ""
         self.revision += 1
-
-
-class DistantPlaces:
-    """Places far from the believed one, each found by a search; certain once the next search has found it, too.
-
-    While others leave a bare corridor, its mirror image may fit better for a moment.
-    """
-
-    def __init__(self) -> None:
-        self._map_to_odom: Pose | None = None  # by the place that the last search found
-
-    def forget(self) -> None:
-        """Forget what was found."""
-        self._map_to_odom = None
-
-    def add(self, found: Pose, odometry: Pose) -> bool:
-        """Note a place that was found; return whether the search before had found it, too."""
-        before, self._map_to_odom = self._map_to_odom, found.compose(odometry.inverse())
-        return before is not None and before.compose(odometry).is_near(found, SAME, SAME_YAW)

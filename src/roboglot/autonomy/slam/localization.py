@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from roboglot.autonomy.computing import computed
-from roboglot.autonomy.slam.belief import NEAR, Belief, DistantPlaces
+from roboglot.autonomy.slam.belief import Belief
+from roboglot.autonomy.slam.recovery.distant_places import NEAR, DistantPlaces
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.errors import InvalidGoal, NotLocalized, NotReady
@@ -102,7 +103,8 @@ class LidarLocalization(Localization):
             if self._robot.clock.time() > deadline:
                 raise NotReady("localization is warming up: no scan has been compared with the map yet")
             await self._robot.clock.sleep(SEARCH_PERIOD)
-        from roboglot.autonomy.slam.look_around import Hypotheses, go_on  # needs the kernels, which are loaded by now
+        # needs the kernels, which are loaded by now
+        from roboglot.autonomy.slam.recovery.look_around import Hypotheses, go_on
 
         hypotheses, distant = Hypotheses(), DistantPlaces()
         while self._robot.clock.time() <= deadline:
@@ -136,7 +138,7 @@ class LidarLocalization(Localization):
 
     async def _settle(self, place: Match, odometry: Pose) -> bool:
         """Believe ``place`` and match newer scans there; return whether they confirm it."""
-        from roboglot.autonomy.slam.look_around import settle  # needs the kernels, which are loaded by now
+        from roboglot.autonomy.slam.recovery.look_around import settle  # needs the kernels, which are loaded by now
 
         assert self.estimator is not None
         self.estimator.believe(place, odometry)

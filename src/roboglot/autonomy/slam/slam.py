@@ -5,7 +5,6 @@ Needs the kernels, so it is imported once they are loaded. Uses scans and odomet
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import math
 from collections.abc import Callable
@@ -13,11 +12,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.computing import compute_soon
 from roboglot.autonomy.slam.adding import Adding
-from roboglot.autonomy.slam.belief import NEAR, Belief
+from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import ALL_POINTS, Support, is_well_painted, supported
-from roboglot.autonomy.slam.contradictions import STOOD, WheelWitness, is_long
+from roboglot.autonomy.slam.contradictions import WheelWitness, is_long
 from roboglot.autonomy.slam.displacement import DisplacementWatch
 from roboglot.autonomy.slam.excursion import Excursions
 from roboglot.autonomy.slam.loops import LoopCloser
@@ -34,11 +32,12 @@ from roboglot.autonomy.slam.matcher import (
     start_of_match,
 )
 from roboglot.autonomy.slam.odometry.learner import Correction, OdometryLearner
+from roboglot.autonomy.slam.recovery.whereabouts import Whereabouts
+from roboglot.autonomy.slam.recovery.whole_map_search import DOUBT_SHARE, KNOWN_SURE, LOST_PERIOD, WholeMapSearch
 from roboglot.autonomy.slam.scan_points import ScanPoints, is_covered
 from roboglot.autonomy.slam.slip import SlipWatch
 from roboglot.autonomy.slam.trajectory import Trajectory, TrajectoryPoint
 from roboglot.autonomy.slam.turns import Turns
-from roboglot.autonomy.slam.whereabouts import Elsewhere, Whereabouts
 from roboglot.model.components.mapping.localization import Region
 from roboglot.model.events import (
     LoopClosed,
@@ -51,6 +50,7 @@ from roboglot.model.events import (
 )
 from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.robot import Robot
+from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
 
@@ -58,8 +58,6 @@ AGREEMENT_MIN = 0.5  # share of the points on known ground that must fit for the
 AGREEMENT_TO_MAP = 0.6  # … for the scan to be added to the map
 QUALITY_GAIN = 0.3  # weight of the newest scan in the quality
 TRUSTED = 0.75  # agreement from which a match is used to judge odometry
-KNOWN_SURE = 0.6  # share of known points from which agreement alone suffices
-PROBATION = 3.0  # m to drive without contradiction after a distant relocalization, before scans are added there
 NEW_GROUND = 0.3  # share of known points below which the scan counts as new ground
 GAP_MAX = 0.35  # s between two scans up to which odometry's constant errors are learnt
 BLIND = np.diag((0.5**2, 0.5**2, 0.3**2))  # variances after a gap in the scans
@@ -67,12 +65,42 @@ SURE_QUALITY = 0.85  # agreement from which contradictions of the map need not b
 SILENCE_PERIOD = 0.5  # s between two checks for silence of the lidar
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less motion than this between scans is standing
 STILL_PERIOD = 0.5  # s between two matches while standing
-LOST_QUALITY, LOST_PERIOD = 0.4, 1.0  # quality below which to search around, and s between searches
-FELL_PERIOD_MAX = 16.0  # s between searches, which become rarer, while the fit stays worse than it was
+LOST_QUALITY = 0.4  # quality below which to search around
 NARROW = (0.2, math.radians(5.0))  # m, rad searched around the believed pose after a doubtful step
-DOUBT_SHARE, DOUBT_SIGMAS = 0.85, 3.0  # a fit worse than usual, or a pose far from odometry's: match without it
+DOUBT_SIGMAS = 3.0  # a pose this far from odometry's: match without it
 DISPLACED_QUALITY = 0.15  # of a displaced robot, until the next scans
 JUMP, JUMP_YAW = 0.2, math.radians(10.0)  # larger corrections are reported as a jump
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Motion by odometry from one matched scan to the next.
+
+    ``step``: in base_link at the first; ``way`` in m and ``turn`` in rad, both 0 while the wheels slip; ``seconds``
+    between the two, 0 if the robot stood.
+    """
+
+    step: Pose = ORIGIN
+    way: float = 0.0
+    turn: float = 0.0
+    seconds: float = 0.0
+
+    @property
+    def drives(self) -> bool:
+        """True if the robot moved."""
+        return self.way >= STILL or self.turn >= STILL_YAW
+
+    @property
+    def usable(self) -> Pose | None:
+        """The step, if it says something about odometry's constant errors."""
+        return self.step if 0.0 < self.seconds < GAP_MAX else None
+
+
+def motion_between(last: Pose, odometry: Pose, seconds: float) -> Motion:
+    """Return the motion between two poses (odom)."""
+    way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
+    motion = Motion(odometry.relative_to(last), way, turn, seconds)
+    return motion if motion.drives else Motion(motion.step, way, turn)
 
 
 class Slam:
@@ -82,20 +110,14 @@ class Slam:
         self._robot = robot
         self._belief = belief
         self._matched_odometry: Pose | None = None
-        self._step = Pose()  # motion by odometry since the last match, in base_link at that time
+        self._motion = Motion()  # at the last match
         self._matched_at = self._searched_at = -math.inf
         self._agreement = self._known = 1.0
         self._newest: ScanTaken | None = None
         self.odometry = OdometryLearner(belief.odometry.noise)
         self._witness = WheelWitness(self.odometry)
         self.whereabouts = Whereabouts(belief, robot.events)
-        self._looked_at, self._looking, self._given_at = -math.inf, False, -math.inf
-        self._pause = LOST_PERIOD  # s from a search of the whole map to the next
-        self._missed, self._fell_at = 0.0, 0.0  # agreement before it fell, and m driven then; 0: it did not fall
-        self._elsewhere = Elsewhere()
-        self._unseen = False  # whether a pose was given, and not yet compared with the whole map
-        self._mapped_from = 0.0  # m driven from which scans are added to the map again
-        self._search: asyncio.Task[None] | None = None
+        self._everywhere = WholeMapSearch(robot, belief, self.whereabouts, self.believe, lambda: self._way)
         self._slip, self._displacement = SlipWatch(robot.description.radius), DisplacementWatch()
         self._trajectory = Trajectory(belief)
         self._loops, self._way = LoopCloser(belief), 0.0  # m driven
@@ -158,7 +180,7 @@ class Slam:
         self._displacement.forget(event.stamp)
         if event.given:
             self._turns.forget()
-            self._given_at, self._missed, self._unseen = event.stamp, 0.0, True
+            self._everywhere.note_given(event.stamp)
             self._witness.forget()
             self.whereabouts.note_given(event.stamp)
 
@@ -192,9 +214,8 @@ class Slam:
             belief.widen(belief.covariance + BLIND)
             self._excursions.forget()
             self.whereabouts.lose(LostReason.NO_SCANS, event.stamp)
-        last = self._matched_odometry or odometry
-        way, turn = odometry.distance_to(last), abs(wrap_angle(odometry.yaw - last.yaw))
-        stands = way < STILL and turn < STILL_YAW and event.stamp - self._matched_at < STILL_PERIOD
+        motion = motion_between(self._matched_odometry or odometry, odometry, event.stamp - self._matched_at)
+        stands = not motion.drives and event.stamp - self._matched_at < STILL_PERIOD
         if stands and not (self._is_unsure or belief.asked):
             return
         # Objects known to stand there are no evidence on the map, nor on a loaded one the dock that the robot touches.
@@ -203,41 +224,41 @@ class Slam:
         if len(scan.points) < POINTS_MIN:
             belief.quality *= 1.0 - QUALITY_GAIN
             return
-        if self._matched_odometry and self._slip.holds(belief, event.scan, odometry, last):
-            way = turn = 0.0
-        seconds = event.stamp - self._matched_at if way >= STILL or turn >= STILL_YAW else 0.0
-        self._step = odometry.relative_to(last)
-        moved = self._step if 0.0 < seconds < GAP_MAX else None
-        self._matched_odometry, self._matched_at = odometry, event.stamp
+        last = self._matched_odometry
+        if last and self._slip.holds(belief, event.scan, odometry, last):
+            motion = Motion(motion.step)
+        self._matched_odometry, self._matched_at, self._motion = odometry, event.stamp, motion
         belief.compared_at, belief.asked = event.scan.stamp, False
-        self._way += way
-        belief.widen(self.odometry.spread(belief.covariance, way, turn, moved, seconds))
-        searches = False
+        self._way += motion.way
+        spread = self.odometry.spread(belief.covariance, motion.way, motion.turn, motion.usable, motion.seconds)
+        belief.widen(spread)
+        self._use(scan, odometry, event.stamp)
+
+    def _use(self, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
+        """Localize by the scan, add it to the map, and search the whole map if it does not fit."""
+        belief, motion, searches = self._belief, self._motion, False
         if belief.map.scans:
-            searches = self._correct(scan, odometry, event.stamp, moved, seconds)
+            searches = self._correct(scan, odometry, stamp)
         else:
             belief.quality = self._agreement = self._known = 1.0  # the first scan defines the map
             self.whereabouts.begin()
         pose = belief.map_to_odom.compose(odometry)
-        self._witness.note(event.stamp, pose, self._way)
-        if belief.mapping and self._may_add and self._adding.is_due(pose, event.stamp):
-            self._adding.add(scan, pose, event.stamp, self._way)
+        self._witness.note(stamp, pose, self._way)
+        if belief.mapping and self._may_add and self._adding.is_due(pose, stamp):
+            self._adding.add(scan, pose, stamp, self._way)
         sure = self._may_add and self._agreement >= TRUSTED and self._known > NEW_GROUND
-        self._excursions.take(scan, odometry, self._step, turn, sure=sure)
-        self._trajectory.follow(event.stamp, odometry, self._loops.anchor, drives=way >= STILL or turn >= STILL_YAW)
+        self._excursions.take(scan, odometry, motion.step, motion.turn, sure=sure)
+        self._trajectory.follow(stamp, odometry, self._loops.anchor, drives=motion.drives)
         if searches:  # last: in lockstep its pose comes at once, and must stay
-            self._look_everywhere(scan, odometry, event.stamp)
+            self._everywhere.start(scan, odometry, stamp, self._agreement)
 
     @property
     def _is_unsure(self) -> bool:
         return self._belief.search or self._belief.lost is not None or not self.whereabouts.sure
 
-    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float, moved: Pose | None, seconds: float) -> bool:
-        """Match the scan, judge the fit, and move the belief if it localizes. Return whether to search the whole map.
-
-        ``moved``: odometry's step (in the last base_link) in the ``seconds`` since the last match; None if unusable.
-        """
-        belief = self._belief
+    def _correct(self, scan: ScanPoints, odometry: Pose, stamp: float) -> bool:
+        """Match the scan, judge the fit, and move the belief if it localizes. Return whether to search everywhere."""
+        belief, moved, seconds = self._belief, self._motion.usable, self._motion.seconds
         if belief.localizing and moved:
             missing = self.odometry.bias.missing(moved, seconds)
             belief.move_to(belief.map_to_odom.compose(odometry).compose(missing), odometry)
@@ -264,7 +285,7 @@ class Slam:
         shoved = self._check_displaced(before, best, prior, stamp)
         if shoved is None and driven is None and _is_sure(best):
             moved = moved if belief.lost is None else None
-            step, pose = self._step, best.pose
+            step, pose = self._motion.step, best.pose
             correction = Correction(before, best, prior, step, moved, seconds)
             self.odometry.learn(correction, self._way, lambda: is_long(step) or is_well_painted(belief.map, scan, pose))
         if driven is None:
@@ -283,7 +304,7 @@ class Slam:
         if self._belief.search or self._belief.in_doubt:  # badly fitting scans alone do not justify consulting it less
             self._witness.forget()
             return None
-        driven = self._witness.contest(self._belief.map, scan, before, best, prior, self._step)
+        driven = self._witness.contest(self._belief.map, scan, before, best, prior, self._motion.step)
         if driven is not None:
             self.odometry.contradict(self._way)
         return driven
@@ -293,7 +314,7 @@ class Slam:
         if self._belief.in_doubt or not _is_sure(best):
             self._displacement.forget(stamp)
             return None
-        return self._displacement.check(stamp, before, best.pose, prior, self._step)
+        return self._displacement.check(stamp, before, best.pose, prior, self._motion.step)
 
     def _doubt(self, shoved: float, stamp: float) -> None:
         """Report a displacement, search around, and doubt the pose until scans confirm it."""
@@ -309,50 +330,11 @@ class Slam:
             self.whereabouts.judge(supported(belief.map, scan, best.pose), stamp)
         else:
             self.whereabouts.judge(Support(best.points, best.fit, 0, 0), stamp)
-        if belief.lost is None and not self._unseen:
-            self._fell_at = self._fell_at if self._missed else self._way - math.hypot(self._step.x, self._step.y)
-            self._missed = max(self._missed, usual)
-            if best.agreement >= DOUBT_SHARE * self._missed or best.known < KNOWN_SURE * best.points:
-                self._pause, self._missed = LOST_PERIOD, 0.0
-                self._elsewhere.note_fit(belief.map)
-                return False
-        return not self._looking and stamp - self._looked_at >= (LOST_PERIOD if belief.lost else self._pause)
-
-    def _look_everywhere(self, scan: ScanPoints, odometry: Pose, stamp: float) -> None:
-        """Search the whole map for the place of ``scan``; a known one is given up only for a much better."""
-        belief, grid, agreement = self._belief, self._belief.map, self._agreement
-        given, self._unseen = self._unseen and self._belief.lost is None, False
-        anywhere = self._elsewhere.is_new(grid)  # on a map just loaded
-        self._looked_at, self._looking, self._pause = stamp, True, min(2.0 * self._pause, FELL_PERIOD_MAX)
-
-        def then(found: list[Match]) -> None:
-            self._looking = False
-            self.whereabouts.forget_places()
-            if not found or belief.map is not grid or not belief.localizing or self._given_at > stamp:
-                return
-            pose = belief.map_to_odom.compose(odometry)
-            if given:  # of places that look alike, it is at the one that was meant
-                found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
-            near, lost = found[0].pose.distance_to(pose) < NEAR, belief.lost is not None
-            if not lost:
-                stood, meant = anywhere or self._way - self._fell_at <= STOOD, given and not anywhere
-                if not self._elsewhere.replaces(found[0], odometry, belief, agreement, given=meant, stood=stood):
-                    return
-                if not given or len(found) > 1:
-                    self.whereabouts.lose(LostReason.NO_FIT, stamp)
-            doubtful = lost and not near and not self._elsewhere.is_certain(found[0], odometry, belief)
-            if len(found) > 1 or doubtful:
-                self.whereabouts.be_ambiguous(found, pose)
-                return
-            self._mapped_from = self._way + (0.0 if near else PROBATION)
-            self.believe(found[0], odometry, RecoveryMeans.NEARBY if near else RecoveryMeans.WHOLE_MAP)
-            self._robot.events.publish(PoseJumped(stamp=self._robot.clock.time(), pose=belief.pose))
-
-        self._search = compute_soon(self._robot.clock, lambda: places(grid, scan, None), then)
+        return self._everywhere.is_due(best, usual, self._motion.step, stamp)
 
     def _coarse(self, scan: ScanPoints, before: Pose, stamp: float) -> Pose:
         """Return the start pose of the match, by a search if odometry may be too far off."""
-        if self._belief.lost is not None and stamp - self._looked_at < LOST_PERIOD:
+        if self._belief.lost is not None and self._everywhere.was_recent(stamp):
             return before
         return start_of_match(self._belief.map, scan, before, self._belief.covariance)
 
@@ -378,7 +360,8 @@ class Slam:
         if not self._belief.map.scans or not self._belief.localizing:
             return True
         fits = self._agreement >= AGREEMENT_TO_MAP or self._known <= NEW_GROUND
-        return self.whereabouts.sure and not self._belief.contradicted and self._way >= self._mapped_from and fits
+        proven = self.whereabouts.sure and self._way >= self._everywhere.mapped_from
+        return fits and proven and not self._belief.contradicted
 
     def _straighten(self, odometry: Pose, stamp: float) -> None:
         """Continue straightening after a closed loop; at the end, move the belief to the corrected pose."""

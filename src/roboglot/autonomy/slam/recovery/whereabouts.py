@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from roboglot.autonomy.slam.belief import NEAR, Belief, DistantPlaces
+from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.certainty import Support
 from roboglot.autonomy.slam.matcher import Match
+from roboglot.autonomy.slam.recovery.distant_places import NEAR
 from roboglot.model.events import (
     EventStream,
     LocalizationLost,
@@ -26,7 +27,6 @@ POOR_AGREEMENT, POOR_SECONDS = 0.7, 5.0  # after a contradiction, a fit that sta
 CONFIRMED = 5  # confirmations in a row before the pose is known again
 BLIND_SECONDS, BLIND_INTERVALS = 2.0, 5.0  # s without a scan, and in usual intervals, from which the pose is uncertain
 INTERVAL_GAIN = 0.1
-BETTER = 0.08  # the gain in agreement that another place needs over the believed one
 
 
 class Whereabouts:
@@ -88,14 +88,20 @@ class Whereabouts:
             self._belief.confirmed = True
             self._events.publish(PoseConfirmed(stamp=stamp, pose=self._belief.pose))
         if self._belief.lost is not None:
-            if self._good >= CONFIRMED and not self._elsewhere:
-                self.find(RecoveryMeans.NEARBY, stamp)
+            self._look_again(stamp, good=good, new_ground=new_ground)
         elif not self._belief.confirmed and stamp - self._given_at >= DOUBT_SECONDS:
             self.lose(LostReason.NO_GROUND if new_ground else LostReason.NO_FIT, stamp)
         elif stamp - self._poor_since >= POOR_SECONDS:
             self.lose(LostReason.NO_FIT, stamp)
         elif not self.sure and self._belief.confirmed and (new_ground or self._good >= CONFIRMED):
             self.sure = True
+
+    def _look_again(self, stamp: float, *, good: bool, new_ground: bool) -> None:
+        """End the loss once scans confirm the pose; a lidar that is back is its reason no longer."""
+        if self._good >= CONFIRMED and not self._elsewhere:
+            self.find(RecoveryMeans.NEARBY, stamp)
+        elif self._belief.lost is LostReason.NO_SCANS and not good:
+            self._belief.lost = LostReason.NO_GROUND if new_ground else LostReason.NO_FIT
 
     def lose(self, reason: LostReason, stamp: float) -> None:
         """Note that the pose is lost; publish it once until it is found."""
@@ -140,37 +146,3 @@ class Whereabouts:
         self._doubts, self.sure, self._belief.confirmed = 0, True, True
         self._doubted_at = self._poor_since = math.inf
         self._elsewhere = False
-
-
-class Elsewhere:
-    """Decides whether another place, found by a search, replaces the believed one of a robot that is not lost."""
-
-    def __init__(self) -> None:
-        self._distant = DistantPlaces()
-        self._fitted: object = None  # the map that fitted where the robot believes to be
-
-    def note_fit(self, grid: object) -> None:
-        """Note that a scan fits this map at the believed place."""
-        self._distant.forget()
-        self._fitted = grid
-
-    def is_new(self, grid: object) -> bool:
-        """Return whether no scan has fitted this map yet."""
-        return grid is not self._fitted
-
-    def replaces(
-        self, found: Match, odometry: Pose, belief: Belief, agreement: float, *, given: bool, stood: bool
-    ) -> bool:
-        """Return whether to believe ``found`` instead of the believed place, whose ``agreement`` is given.
-
-        A robot on its way amid others that move along fits best where it was: nearby places do not count.
-        """
-        believed = belief.map_to_odom.compose(odometry)
-        near = found.pose.distance_to(believed) < NEAR
-        if not (near if given else not near or stood) or found.agreement < agreement + BETTER:
-            return False
-        return self.is_certain(found, odometry, belief) or near
-
-    def is_certain(self, found: Match, odometry: Pose, belief: Belief) -> bool:
-        """Return whether a distant place may be believed: on a map that fitted, an earlier search has found it, too."""
-        return self._distant.add(found.pose, odometry) or self.is_new(belief.map)

@@ -1,0 +1,1 @@
+"""Loss of the pose in the map, and its recovery."""
