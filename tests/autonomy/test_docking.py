@@ -158,9 +158,8 @@ async def test_docked_robot_knows_its_dock_after_a_restart(tour: Tour) -> None:
 
 @pytest.mark.world("office")
 async def test_wrong_pose_keeps_dock_and_docking_corrects_it(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: []
-    )  # scans alone do not determine the place
+    # scans alone do not determine the place
+    monkeypatch.setattr("roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: [])
     await tour.clock.advance(1.0)
     for wrong in (Pose(40.0, 40.0), Pose(3.0, 1.0, 0.5)):
         tour.robot[Localization].set_pose(wrong)

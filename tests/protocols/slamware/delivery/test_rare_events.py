@@ -98,9 +98,8 @@ async def test_a_dock_without_current(robot: Robot, client: httpx.AsyncClient, w
 async def test_a_lost_robot_lets_orders_wait(
     screen: Screen, robot: Robot, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch, helped_by: str
 ) -> None:
-    monkeypatch.setattr(
-        "roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: []
-    )  # it does not localize itself
+    # it does not localize itself
+    monkeypatch.setattr("roboglot.autonomy.slam.recovery.whole_map_search.places", lambda *_: [])
     await screen.prepare(R101=(3.0, 0.0, "ROOM"), R102=(0.8, 0.0, "ROOM"))
     await forward(seconds=3)
     first = await screen.create("R101", "RETURN")
