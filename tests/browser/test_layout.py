@@ -33,6 +33,7 @@ LOW = """() => import('/link.js').then((link) => {
     const battery = { ...a.battery, remaining: 1380 }, faults = [{ id: 1, name, level, message: name }];
     link.states.value = { a: { ...a, battery, faults } };
 })"""
+DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))"
 TALLER = "document.scrollingElement.scrollHeight - innerHeight"  # px
 COVERED_OR_CUT = """() => {
     const pen = document.createElement('canvas').getContext('2d');
@@ -56,14 +57,17 @@ COVERED_OR_CUT = """() => {
 }"""
 
 
-@pytest.mark.parametrize("size", [(844, 390), (640, 400)], ids=["phone on its side", "twice as large"])
-async def test_low_screens_show_everything(size: tuple[int, int], served: Served, open_console: OpenConsole) -> None:
-    page = await open_console(viewport={"width": size[0], "height": size[1]})
+async def test_low_screens_show_everything(served: Served, open_console: OpenConsole) -> None:
+    """A phone on its side, and a small screen with everything twice as large."""
+    page = await open_console()
     for view in ("live", "wire", "world", "robots", "class"):
         await page.evaluate(f"location.hash = '#/{view}'")
         await page.wait_for_selector(f"nav a[href='#/{view}'][aria-current=page]")
         await page.wait_for_selector("main > :not(.empty)")
-        assert await page.evaluate(COVERED_OR_CUT) == [], view
+        for width, height in ((844, 390), (640, 400)):
+            await page.set_viewport_size({"width": width, "height": height})
+            await page.evaluate(DRAWN)
+            assert await page.evaluate(COVERED_OR_CUT) == [], (view, width)
 
 
 async def test_phone_shows_and_can_touch_everything(served: Served, open_console: OpenConsole) -> None:

@@ -123,6 +123,7 @@ async def test_two_tabs_show_one_program(studio: Open) -> None:
     assert page.errors == other.errors == []
 
 
+@pytest.mark.slow  # the same pulse: test_console_link.py; a lost link: test_studio.py
 async def test_silent_server_counts_as_lost(studio: Open, monkeypatch: pytest.MonkeyPatch) -> None:
     page = await studio()
     with monkeypatch.context() as patch:
