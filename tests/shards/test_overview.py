@@ -16,6 +16,7 @@ from urllib.request import Request
 import pytest
 
 from roboglot.agents.console import ConsoleClient, Refused
+from roboglot.shards import snapshots
 from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.overview import PAGE, SEEN_MAX, Overview
 from roboglot.shards.plan import plan_fleet
@@ -70,6 +71,26 @@ async def test_worlds_that_do_not_answer_say_why(fleet_host) -> None:
     assert await glances.state("a3") == {"error": "this world has no console"}
     with pytest.raises(Refused, match="sign in first"):
         await glances.picture("a2")
+
+
+async def test_a_hung_world_holds_up_no_other(fleet_host, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Hung(Console):
+        async def fetch(self, *path: str, body: bytes | None = None) -> bytes:
+            if path[1] == "a1":
+                await answers.wait()
+            return await super().fetch(*path, body=body)
+
+    answers = asyncio.Event()
+    monkeypatch.setattr(snapshots, "ANSWER_MAX", 0.01)
+    page = Overview(fleet_host, "127.16.3.1")
+    page._snapshots = Snapshots(fleet_host, Hung)
+    found = await page.look(["a1", "a3"])
+    assert found["robots"] == {
+        "a1": {"error": "its console does not answer"},
+        "a3": {"error": "this world has no console"},
+    }
+    answers.set()
+    assert await page._snapshots.state("a1") == {"battery": {"charge": 0.5}}
 
 
 async def test_worlds_that_ask_for_a_log_in(fleet_host) -> None:

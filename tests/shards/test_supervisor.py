@@ -17,7 +17,7 @@ from roboglot.shards.messages import Beat, News, Ready, Refusal, encode, pair
 from roboglot.shards.plan import PLAN, plan_fleet
 from roboglot.shards.shard import SETTINGS
 from roboglot.shards.states import FleetEnds, Shard, State
-from roboglot.shards.supervisor import REPORT_MAX, STARTING_MAX, Supervisor
+from roboglot.shards.supervisor import REPORT_MAX, STALE, STARTING_MAX, Supervisor
 
 
 class FakeNursery:
@@ -145,6 +145,16 @@ async def test_one_that_grows_too_large_is_restarted_orderly(supervisor: Supervi
     nursery_of(supervisor).die(1, 0)
     await supervisor.shards.until(lambda: nursery_of(supervisor).forked.count(1) == 2)
     assert "200 MB of 100" in first(supervisor).reason
+
+
+async def test_one_that_is_silent_is_not_called_fast(supervisor: Supervisor) -> None:
+    shard = first(supervisor)
+    supervisor.shards.turn_to(shard, State.READY)
+    shard.beat = Beat(1.0, 1 << 20, 1.0)
+    for silent, factor in ((STALE - 1.0, 1.0), (STALE + 1.0, 0.0)):
+        shard.heard = shard.since = asyncio.get_running_loop().time() - silent
+        supervisor._look_after()
+        assert shard.beat == Beat(factor, 1 << 20, 1.0)
 
 
 async def test_one_that_is_silent_is_killed(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:

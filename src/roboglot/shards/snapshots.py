@@ -11,6 +11,7 @@ from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.states import Shard, State
 
 PERIOD = 1.0  # s for which an answer is reused
+ANSWER_MAX = 2.0  # s for which a page with many robots waits for one of them
 AT_ONCE_MAX = 8  # requests to consoles in progress
 SHOWN = ("about", "battery", "actions", "faults", "safety", "control", "parts", "pose")
 T = TypeVar("T")
@@ -42,7 +43,7 @@ class Snapshots:
         self._turns = asyncio.Semaphore(AT_ONCE_MAX)
 
     async def state(self, robot: str) -> dict[str, object]:
-        """Return a robot's state from its console; ``{"error": why}`` if that fails. Raises LookupError."""
+        """Return a robot's state from its console; ``{"error": why}`` if there is none soon. Raises LookupError."""
         console = self._console(self._home(robot))
 
         async def look() -> dict[str, object]:
@@ -56,7 +57,11 @@ class Snapshots:
                 return {"error": why if refused.status == 401 else str(refused)}
             return {name: found[name] for name in SHOWN if name in found}
 
-        return await self._states.get(robot, look)
+        try:
+            return await asyncio.wait_for(self._states.get(robot, look), ANSWER_MAX)
+        except TimeoutError:
+            why = "its console does not answer"
+            return {"error": why}
 
     async def picture(self, robot: str) -> bytes:
         """Return the small picture of a robot's map, a PNG. Raises LookupError, Refused."""
