@@ -61,7 +61,8 @@ class MixedWalk:
 
     async def end(self) -> None:
         """Let all clients go, and assert that the doors agree about the robot at rest."""
-        if self._witness.robot[Firmware].restarting:  # programs go on until then
+        robot = self._witness.robot
+        if Firmware in robot and robot[Firmware].restarting:  # programs go on until then
             await self._witness.pass_time(max(RESTART_SECONDS.values()))
         await self.screen.end()
         self._speaker.leave()
