@@ -1,4 +1,4 @@
-"""Divides the Chinese of the site's search index into words, so that a search finds them within sentences.
+"""A hook of mkdocs that divides the Chinese of the search index into words, so that they are found within sentences.
 
 Chinese has no spaces: undivided, each sentence is one word to the search and found by its beginning alone. Words are
 those of the project: docs/reference/terms.md, and what the console's and the studio's pages say in short. Other text is
@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 
+from mkdocs.plugins import event_priority
+
 ROOT = Path(__file__).resolve().parent.parent
-INDEX = ROOT / "build/site/search"
 GAP = "\u200b"  # has no width; a separator of the search in mkdocs.yml
 LONGEST = 5  # characters of a word
 HAN = re.compile(r"[\u4e00-\u9fff]+")
@@ -44,15 +46,18 @@ def divided(text: str, known: AbstractSet[str]) -> str:
     return HAN.sub(lambda run: GAP + GAP.join(parts(run[0])) + GAP, text)
 
 
-def divide_index() -> None:
-    """Divide the index in both of its forms: for a server, and for pages from a folder."""
-    index, known = json.loads((INDEX / "search_index.json").read_text("utf-8")), words()
+def divide_index(site: Path) -> None:
+    """Divide a site's index in both of its forms: for a server, and for pages from a folder."""
+    folder = site / "search"
+    index, known = json.loads((folder / "search_index.json").read_text("utf-8")), words()
     for page in index["docs"]:
         page["title"], page["text"] = divided(page["title"], known), divided(page["text"], known)
     text = json.dumps(index)
-    (INDEX / "search_index.json").write_text(text, "utf-8")
-    (INDEX / "search_index.js").write_text(f"var __index = {text}", "utf-8")
+    (folder / "search_index.json").write_text(text, "utf-8")
+    (folder / "search_index.js").write_text(f"var __index = {text}", "utf-8")
 
 
-if __name__ == "__main__":
-    divide_index()
+@event_priority(-1000)  # once the other languages are built
+def on_post_build(config: Mapping[str, str]) -> None:
+    """Divide the index of the site that mkdocs has made."""
+    divide_index(Path(config["site_dir"]))

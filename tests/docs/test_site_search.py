@@ -35,17 +35,16 @@ def test_words_are_those_of_the_project(search: ModuleType) -> None:
     assert {"录制", "比较", "课堂", "充电桩", "控制权"} <= search.words()
 
 
-def test_both_forms_of_the_index_are_divided(
-    search: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(search, "INDEX", tmp_path)
+def test_both_forms_of_the_index_are_divided(search: ModuleType, tmp_path: Path) -> None:
+    folder = tmp_path / "search"
+    folder.mkdir()
     page = {"location": "zh/x.html", "title": "录制文件", "text": "比较录制"}
-    (tmp_path / "search_index.json").write_text(json.dumps({"config": {}, "docs": [page]}))
-    search.divide_index()
-    index = json.loads((tmp_path / "search_index.json").read_text())
+    (folder / "search_index.json").write_text(json.dumps({"config": {}, "docs": [page]}))
+    search.on_post_build({"site_dir": str(tmp_path)})
+    index = json.loads((folder / "search_index.json").read_text())
     separator = re.search(r"separator: '([^']+)'", (ROOT / "mkdocs.yml").read_text("utf-8"))
     assert separator is not None
     found = [word for word in re.split(separator[1], index["docs"][0]["text"]) if word]
     assert found == ["比较", "录制"]
-    script = (tmp_path / "search_index.js").read_text()
+    script = (folder / "search_index.js").read_text()
     assert json.loads(script.removeprefix("var __index = ")) == index
