@@ -118,7 +118,7 @@ async def test_escape_stops_the_robot_without_a_program(studio: Open, served: Se
     served.robot[Driving].move_by(Pose(1.0, 0.0, 0.0), source="somebody else")
     await served.clock.advance(0.5)
     await until(page, "studio.runner.phase.value === 'idle' && document.querySelector('header .stop')")
-    await page.keyboard.press("Escape")
+    await page.keyboard.press("Escape")  # whether or not the page knows already that the robot moves
     await becomes(lambda: asyncio.sleep(0, is_driven(served.robot)), False)
     await served.clock.advance(1.0)
     assert served.robot.actions.running() == []

@@ -157,9 +157,7 @@ CASES = {
     "light_show": Case(
         "red orange yellow green blue violet \n" * 2, then=lambda _scene, played: played.colours > RAINBOW
     ),
-    "follow_me": Case(
-        "coming\nstopped by a touch\nI am 4.0 m further\n", anna_leads, "playground", ends_at=(5.55, 5.0)
-    ),
+    "follow_me": Case("coming\nstopped by a touch\nI am 4.0 m further\n", anna_leads, "playground", ends_at=(5.9, 5.0)),
     "measure_room": Case("length 9.9 m, width 10.0 m, area 99 m2\n"),
     "parking_aid": Case(
         "0.66 m\n0.49 m\n0.39 m\n0.34 m\nparked after 3 steps\n", a_box_nearby, said=("bark 4000",), ends_at=(2.35, 5.0)

@@ -124,7 +124,7 @@ function Side() {
     <div id="panel" class="panel" role="tabpanel" aria-labelledby=${`tab-${tab.value}`} tabindex="0"><h2 class="unseen">${t(`studio.tab.${tab.value in TABS ? tab.value : "python"}`)}</h2><${Shown} /></div></aside>`;
 }
 
-/** Whether there is something to stop: the program, or what anybody else has the robot do. */
+/** Whether the page knows of something to stop: the program, or what anybody else has the robot do. */
 const moves = () => runner.phase.value !== "idle" || Boolean(state.value?.actions?.length);
 
 const WINDOWS = { library: Library, schedule: Schedule, keys: Keys, help: Help };
@@ -133,7 +133,7 @@ function App() {
     const keys = { F5: () => runner.run(), F6: () => runner.pause(), F8: (e) => runner.step(e.shiftKey ? "out" : "step"), F10: () => runner.step("over"),
       F9: () => { if (program.value.kind === "blocks") editor.toggleBreak(); } };
     const key = (event) => {
-      if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && moves()) { runner.halt(); return; }
+      if (event.key === "Escape" && !event.repeat && !shown.value && !event.defaultPrevented && (moves() || !lacks("stop"))) { runner.halt(); return; }
       if (/^s$/i.test(event.key) && (event.ctrlKey || event.metaKey)) { event.preventDefault(); keepNow(); return; }
       if (event.key === "F5" && event.shiftKey) { event.preventDefault(); runner.stop(); return; }
       if (/^[zy]$/i.test(event.key) && (event.ctrlKey || event.metaKey) && !event.defaultPrevented && program.value.kind === "blocks" && !shown.value
