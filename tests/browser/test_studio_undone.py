@@ -115,7 +115,7 @@ async def test_walk_stopped_before_its_program_is_no_refusal(studio: Open, serve
 
 async def test_escape_stops_the_robot_without_a_program(studio: Open, served: Served) -> None:
     page = await studio()
-    served.robot[Driving].move_by(Pose(1.0, 0.0, 0.0), source="somebody else")
+    served.robot[Driving].move_by(Pose(1.0, 0.0, 0.0), source="another client")
     await served.clock.advance(0.5)
     await until(page, "studio.runner.phase.value === 'idle' && document.querySelector('header .stop')")
     await page.keyboard.press("Escape")  # whether or not the page knows already that the robot moves

@@ -30,7 +30,7 @@ REPORT = b"default-src 'none'; style-src 'unsafe-inline'"  # what the page of a 
 
 
 class Part(msgspec.Struct, frozen=True):
-    """One file of a recording; ``seconds`` is None if it has no end."""
+    """One file of a recording; ``first`` and ``last``: times of its messages, Unix s, None if it has no end."""
 
     file: str
     bytes: int
@@ -148,8 +148,8 @@ class Shelf:
         async with self._comparing:
             with TemporaryDirectory(prefix="roboglot-compare-") as folder:
                 page = Path(folder) / "page.html"
-                arguments = ["compare", self.path(one).name, self.path(other).name, "--html", str(page)]
-                await self._run([*arguments, "--robot", robot] if robot else arguments)
+                options = ["--html", str(page), *(["--robot", robot] if robot else [])]
+                await self._run(["compare", *options, "--", self.path(one).name, self.path(other).name])
                 body = await asyncio.to_thread(page.read_bytes)
         more = [(b"content-security-policy", REPORT), (b"cache-control", b"no-store")]
         await answer(send, 200, b"text/html; charset=utf-8", body, more)
