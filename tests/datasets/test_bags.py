@@ -124,7 +124,7 @@ def test_hanging_lasers_turn_the_other_way(tmp_path: Path) -> None:
         # The plate turns with the laser: what was to the left is to the right.
         assert scan.mount.yaw == pytest.approx(way * MOUNT.yaw)
         assert scan.angles[[0, -1]] == pytest.approx([-way, way])
-    with pytest.raises(BadDriveLog, match="leans"):
+    with pytest.raises(BadDriveLog, match="tilted"):
         read_drive_log(bag(tmp_path / "leaning", StoragePlugin.SQLITE3, roll=0.5))
 
 

@@ -17,7 +17,7 @@ from roboglot.model.sensing import LaserScan
 from roboglot.values import dataclass
 
 RANGE_MIN, LEAST_NO_ECHO = 0.03, 5.0  # m
-OFFSET_SAME = 0.01  # m, rad: apparent motion of a fixed laser by rounding
+OFFSET_SAME = 0.01  # m, rad: apparent motion of a fixed laser, caused by rounding
 LINE_MAX = 200_000  # characters
 
 
@@ -82,7 +82,7 @@ def _scans(log: _Log) -> Sequence[RecordedScan]:
     for line in lines:
         ranges = echoes(line.ranges, nothing_from, RANGE_MIN)
         scan = LaserScan(line.stamp, ranges, line.angle_min, line.increment, RANGE_MIN, reach, mount=mount)
-        # Corrected logs have the corrected pose in place of the laser's.
+        # Logs corrected by a SLAM program have the corrected pose in place of the laser's.
         reference = None if rigid else line.laser.compose(mount.inverse())
         result.append(RecordedScan(scan, line.robot, reference))
     return result
@@ -127,7 +127,7 @@ def _robotlaser(log: _Log, words: list[str]) -> None:
 
 
 def _rawlaser(log: _Log, words: list[str]) -> None:
-    """Read a scan without a pose, which the newest ODOM line gives."""
+    """Read a scan without a pose: the newest ODOM line has it."""
     if log.odometry is None:
         raise ValueError("a scan before odometry")
     angle_min, increment = float(words[2]), float(words[4])

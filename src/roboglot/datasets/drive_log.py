@@ -1,4 +1,4 @@
-"""One recorded drive, from a file of every format. SI units, REP-103/105 frames."""
+"""A recorded drive, whatever the format of its file. SI units, REP-103/105 frames."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SICK_NO_ECHO = 80.0  # m from which these scanners report codes instead of dista
 
 
 class BadDriveLog(ValueError):
-    """The file is no readable recording; the message says why."""
+    """The file cannot be read as a recorded drive; the message gives the reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class RecordedScan:
 
 @dataclass(frozen=True, slots=True)
 class DriveLog:
-    """A drive in order of time; ``unread``: counts of skipped records, by reason."""
+    """A drive: its ``scans`` in order of time, and the counts of skipped records by reason (``unread``)."""
 
     name: str
     scans: Sequence[RecordedScan]
@@ -43,7 +43,7 @@ class DriveLog:
 def no_echo(ranges: NDArray[np.float64], *, least: float) -> float:
     """Return the reading (m) from which rays have no echo: the largest if it recurs and exceeds ``least``, else inf.
 
-    Scanners report it as one large number, which depends on the make.
+    Scanners report a missing echo as one large number, which depends on the model.
     """
     readings = ranges[np.isfinite(ranges)]
     if not readings.size:

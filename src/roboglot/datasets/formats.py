@@ -22,7 +22,10 @@ CARMEN_WORDS = ("FLASER", "ROBOTLASER", "RAWLASER", "ODOM", "PARAM", "# message_
 
 
 def read_drive_log(path: Path) -> DriveLog:
-    """Read the recording at ``path``. Raises BadDriveLog, MissingExtra, OSError."""
+    """Read the recording at ``path``, without scans from impossible times or places.
+
+    Raises BadDriveLog, MissingExtra, OSError.
+    """
     log = _read(path)
     places = [(taken.odometry.x, taken.odometry.y) for taken in log.scans]
     middle = Pose(*np.median(places or [(0.0, 0.0)], axis=0))

@@ -1,4 +1,4 @@
-"""Poses of scanners on their robots: upright, or upside down as below a shelf."""
+"""Poses of scanners on their robots: upright, or mounted upside down."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from roboglot.model.geometry import Pose
 
-LEVEL = math.radians(5.0)  # a scanner tilted further sees no floor plan
+LEVEL = math.radians(5.0)  # the scans of a scanner tilted further show no floor plan
 
 
 def rotation(w: float, x: float, y: float, z: float) -> NDArray[np.float64]:
@@ -24,10 +24,11 @@ def rotation(w: float, x: float, y: float, z: float) -> NDArray[np.float64]:
 
 
 def level_mount(turned: NDArray[np.float64], x: float, y: float) -> tuple[Pose, bool]:
-    """Return the pose in the plane of what is ``turned`` (3, 3) at ``x``, ``y`` (m), and True if it is upside down.
+    """Return a scanner's pose in the plane, and True if it is upside down.
 
-    Raises ValueError if it leans.
+    ``turned``: its rotation matrix (3, 3); ``x``, ``y``: its position in base_link, m. Raises ValueError if it is
+    tilted.
     """
     if abs(turned[2, 2]) < math.cos(LEVEL):
-        raise ValueError("the scanner leans")
+        raise ValueError("the scanner is tilted")
     return Pose(x, y, math.atan2(turned[1, 0], turned[0, 0])), bool(turned[2, 2] < 0)

@@ -1,6 +1,7 @@
 """Our own recordings (``roboglot up --record``): scans and odometry of one robot from the MCAP file.
 
-Of several robots, the one with most scans is read. In a file without the lidar's limits, the farthest echo counts.
+If it has several robots, the one with the most scans is read. In a file without the lidar's limits, the farthest echo
+is its range.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ RANGE_MIN = 0.05  # m
 
 
 class _Limits(msgspec.Struct, frozen=True):
-    """Limits that a scan's own message has no fields for; see ``LaserScan``."""
+    """Properties of the lidar for which the scan's message has no fields; see ``LaserScan``."""
 
     range_max: float
     range_min: float = RANGE_MIN
@@ -64,7 +65,7 @@ def read_own_recording(path: Path) -> DriveLog:
         except (decoding.DecodeError, msgspec.MsgspecError):
             unread["damaged messages"] += 1
     if not scans:
-        raise BadDriveLog(f"{path.name}: no scans; a folder of rosbag2 is read by its folder")
+        raise BadDriveLog(f"{path.name}: no scans; to read a rosbag2 recording, name its folder")
     robot = max(sorted(scans), key=lambda name: len(scans[name]))
     unread.update({f"scans of {name}": len(found) for name, found in scans.items() if name != robot})
     track, mount = tracks.get(robot, Track()), mounts.get(robot, ORIGIN)
@@ -99,7 +100,7 @@ def _messages(path: Path) -> Iterator[tuple[str, str, bytes]]:
                 elif isinstance(record, Message) and record.channel_id in channels:
                     yield *channels[record.channel_id], record.data
         except DAMAGE:
-            return  # the program was killed; the complete records count
+            return  # the program that wrote it was killed: only the complete records are read
 
 
 def _keep(found: list[ScanMessage], message: ScanMessage, path: Path) -> None:

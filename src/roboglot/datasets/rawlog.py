@@ -1,6 +1,6 @@
 """MRPT ``.rawlog`` files: laser scans with odometry of actions or observations, in every version of the classes.
 
-Objects are found by their headers, so classes without use for maps (images, satellites, gas) need not be known.
+Objects are found by their headers, so classes that are of no use for maps (images, satellites, gas) need no reader.
 """
 
 from __future__ import annotations
@@ -62,13 +62,13 @@ class _Reader:
     def matrix(self, kind: str) -> NDArray[np.float64]:
         rows, columns = (int(size) for size in self.take("II"))
         if rows * columns > 100:
-            raise ValueError("no matrix of a pose")
+            raise ValueError("the matrix is too large for a pose")
         return self.array(kind, rows * columns).reshape(rows, columns).astype(np.float64)
 
     def end(self) -> None:
         """Read the mark at the end of an object, which old files lack."""
         if not self._old and self.take("B") != (0x88,):
-            raise ValueError("no object ends here")
+            raise ValueError("the object is longer than expected")
 
 
 @dataclass(slots=True)
@@ -191,7 +191,7 @@ def _mount(reader: _Reader) -> tuple[Pose, bool]:
         matrix = reader.matrix("<f4" if version == 0 else "<f8")
         reader.end()
         if matrix.shape[0] < 3 or matrix.shape[1] < 4:
-            raise ValueError("no matrix of a pose")
+            raise ValueError("the matrix is too small for a pose")
         turned, x, y = matrix[:3, :3], float(matrix[0, 3]), float(matrix[1, 3])
     reader.end()
     return level_mount(turned, x, y)

@@ -1,4 +1,4 @@
-"""Feeds an estimator from a recording in place of a robot: odometry and lidar components with recorded readings."""
+"""Feeds an estimator from a recording instead of a robot: odometry and lidar components with recorded readings."""
 
 from __future__ import annotations
 

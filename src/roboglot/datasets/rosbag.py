@@ -1,7 +1,7 @@
 """ROS bags: rosbag2 (a folder with SQLite or MCAP files) and ROS 1's ``.bag``; needs ``roboglot[logs]``.
 
-Reads one laser (the topic with most scans), one odometry (``nav_msgs/Odometry``, else tf's odom to base), and the
-laser's mount from tf, else the origin of the base.
+Reads one laser (the topic with the most scans), one odometry (``nav_msgs/Odometry``, else odom -> base_link in tf), and
+the laser's mount from tf. Without one, the laser is taken to be at the origin of base_link.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def _assembled(name: str, messages: Iterator[tuple[str, int, Any]]) -> DriveLog:
 
 
 def _take(transform: TransformStamped, fixed: Frames, wheels: Track) -> None:
-    """Store a transform of tf: the base in odom, or a part on the robot."""
+    """Keep a transform of tf: base_link in odom goes to ``wheels``, frames on the robot to ``fixed``."""
     above, frame = (name.strip("/") for name in (transform.header.frame_id, transform.child_frame_id))
     place, turned = transform.transform.translation, transform.transform.rotation
     if above in ODOM_FRAMES and frame in BASE_FRAMES:
@@ -163,7 +163,7 @@ def _take(transform: TransformStamped, fixed: Frames, wheels: Track) -> None:
 
 
 def _mount(fixed: Frames, frame: str) -> tuple[Pose, bool]:
-    """Return the laser's pose on the robot, composed up tf's tree as far as it reaches; True if it is upside down."""
+    """Return the laser's pose on the robot, and True if it is upside down; follows the parents in tf up to the base."""
     mount, below = np.eye(4), frame.strip("/")
     for _ in range(CHAIN_MAX):
         if below in BASE_FRAMES or below not in fixed:
@@ -171,7 +171,7 @@ def _mount(fixed: Frames, frame: str) -> tuple[Pose, bool]:
         below, moved = fixed[below]
         mount = moved @ mount
     if not np.isfinite(mount).all():
-        raise BadDriveLog(f"the pose of {frame} is no number")
+        raise BadDriveLog(f"the pose of {frame} is not finite")
     return level_mount(mount[:3, :3], float(mount[0, 3]), float(mount[1, 3]))
 
 
@@ -183,7 +183,7 @@ def _scan(message: ScanMessage, stamp: float, mount: Pose, flipped: bool) -> Las
     ranges.setflags(write=False)
     least, most = float(message.range_min), float(message.range_max)
     if not (math.isfinite(most) and 0.0 <= least < most and math.isfinite(message.angle_increment)):
-        raise BadDriveLog("a scan without limits or angles")
+        raise BadDriveLog("a scan has no valid range limits or angles")
     increment = float(message.time_increment)
     increment = increment if 0.0 < increment < RAY_SECONDS_MAX else 0.0
     way = -1.0 if flipped else 1.0  # seen from above
@@ -204,5 +204,5 @@ def _pose(position: Vector, q: Quaternion) -> Pose:
     yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
     x, y = float(position.x), float(position.y)
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
-        raise BadDriveLog("a pose is no number")
+        raise BadDriveLog("a pose is not finite")
     return Pose(x, y, wrap_angle(yaw))

@@ -1,4 +1,4 @@
-"""Poses over time, from messages with other stamps than the scans."""
+"""Poses over time, interpolated at the stamps of the scans."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Track:
             self._poses.append(pose)
 
     def at(self, stamp: float) -> Pose | None:
-        """Return the pose at ``stamp`` (s); None if none is near."""
+        """Return the interpolated pose at ``stamp`` (s); None without a pose within ``APART_MAX``."""
         index = bisect_left(self._stamps, stamp)
         if index == len(self._stamps):
             return self._poses[-1] if self._stamps and stamp - self._stamps[-1] < APART_MAX else None
@@ -48,7 +48,7 @@ class Track:
 def with_odometry(
     messages: Iterable[T], stamp_of: Callable[[T], float], track: Track, unread: Counter[str]
 ) -> Iterator[tuple[T, float, Pose]]:
-    """Yield scans with their stamp (s) and odometry; those without are counted in ``unread``."""
+    """Yield scans with their stamp (s) and odometry; scans without odometry are counted in ``unread``."""
     for message in messages:
         stamp = stamp_of(message)
         odometry = track.at(stamp)
