@@ -1,4 +1,4 @@
-"""A dock that people moved with the robot on it: the scan shows where it is now, and the dock itself is no evidence."""
+"""A dock that people moved with the robot on it: the scan shows where it is now; the dock itself is not evidence."""
 
 from __future__ import annotations
 

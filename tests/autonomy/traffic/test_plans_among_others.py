@@ -1,4 +1,4 @@
-"""Plans among others: bodies that left are no obstacles, others' ways make routes longer but not slower."""
+"""Plans among others: bodies that left are not obstacles, others' ways make routes longer but not slower."""
 
 from __future__ import annotations
 

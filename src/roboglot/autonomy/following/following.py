@@ -32,7 +32,7 @@ AHEAD = 1.0  # m of free room straight ahead that suffice for the moment
 ROUND_THE_CORNER = 0.3  # m from the last sighting at which the robot turns to where the person went
 TOO_NEAR = 1.8  # m within which a person may stand unrecognized
 UNSEEN = 0.3  # s without sight of a person after which the lidar tracks one who is TOO_NEAR
-BY_LIDAR_MAX = 15.0  # s for which it does: then the camera has to see the person again
+BY_LIDAR_MAX = 15.0  # s for which the lidar alone may do so; after that, the camera has to see the person again
 BACK, BACK_BEARING = 0.2, 0.5  # m/s, rad
 CLOSE = 0.08  # m from its place within which the robot stands still
 BESIDE = math.radians(130.0)  # from the person's course, at which the robot's place beside them lies: a little behind
@@ -42,7 +42,7 @@ GAP, BRAKING = 0.15, 0.8  # m kept in front of the hull; m/s2 of braking
 
 
 @dataclass(slots=True)
-class _Quarry:
+class _Followed:
     """The followed person or thing, with place (odom, m) and time (robot time, s) of the last sighting."""
 
     number: int | None
@@ -71,13 +71,13 @@ class SightFollowing(Following):
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._reader = ScanReader()
-        self._quarry: _Quarry | None = None
+        self._followed: _Followed | None = None
 
     @property
     def place(self) -> Point | None:
-        if self._quarry is None or self._quarry.place is None:
+        if self._followed is None or self._followed.place is None:
             return None
-        place = self._quarry.place
+        place = self._followed.place
         return Pose(place.x, place.y).relative_to(self._robot[Odometry].reading.pose).point
 
     def follow(
@@ -93,15 +93,15 @@ class SightFollowing(Following):
         vision = self._robot[Vision]
 
         async def run(action: Action) -> None:
-            quarry = _Quarry(person, seen_at=self._robot.clock.time())
+            followed = _Followed(person, seen_at=self._robot.clock.time())
             with vision.people.subscribe() as viewer:
 
                 def look() -> None:
                     for sighting in viewer.drain():
-                        self._spot(quarry, sighting)
-                    self._see_near(quarry)
+                        self._spot(followed, sighting)
+                    self._see_near(followed)
 
-                await self._run(action, quarry, look, side, distance)
+                await self._run(action, followed, look, side, distance)
 
         goal = (person, side, distance)
         return start_on_base(self._robot, "follow", run, goal=goal, source=source)
@@ -111,13 +111,13 @@ class SightFollowing(Following):
         radio = self._robot[UltraWideband]
 
         async def run(action: Action) -> None:
-            quarry = _Quarry(None, seen_at=self._robot.clock.time())
+            followed = _Followed(None, seen_at=self._robot.clock.time())
 
             def range_it() -> None:
-                if (tag := radio.tag) is not None and tag.stamp > quarry.ranged_at:
-                    self._range(quarry, tag)
+                if (tag := radio.tag) is not None and tag.stamp > followed.ranged_at:
+                    self._range(followed, tag)
 
-            await self._run(action, quarry, range_it, side, distance)
+            await self._run(action, followed, range_it, side, distance)
 
         return start_on_base(self._robot, "follow tag", run, goal=(side, distance), source=source)
 
@@ -132,96 +132,96 @@ class SightFollowing(Following):
             thing = thing_at(self._reader.read(lidar.scan).points, place) if lidar.scan else None
             if thing is None:
                 raise NotFound("there is no thing to follow")
-            quarry = _Quarry(None)
-            quarry.spot(here.compose(Pose(thing.x, thing.y)).point, self._robot.clock.time(), here)
-            await self._run(action, quarry, lambda: self._see(quarry, lidar.scan), side, distance)
+            followed = _Followed(None)
+            followed.spot(here.compose(Pose(thing.x, thing.y)).point, self._robot.clock.time(), here)
+            await self._run(action, followed, lambda: self._see(followed, lidar.scan), side, distance)
 
         goal = (place, side, distance)
         return start_on_base(self._robot, "follow thing", run, goal=goal, source=source)
 
-    def _see_near(self, quarry: _Quarry) -> None:
-        """Track by the lidar a person who stands too near for the camera."""
-        unseen = self._robot.clock.time() - quarry.recognized_at
+    def _see_near(self, followed: _Followed) -> None:
+        """Track a person who is too near for the camera by the lidar."""
+        unseen = self._robot.clock.time() - followed.recognized_at
         scan = self._robot[Lidar].scan
-        if quarry.place is None or scan is None or not UNSEEN < unseen <= BY_LIDAR_MAX:
+        if followed.place is None or scan is None or not UNSEEN < unseen <= BY_LIDAR_MAX:
             return
         here = self._robot[Odometry].reading.pose
-        if scan.stamp <= quarry.ranged_at or here.point.distance_to(quarry.place) > TOO_NEAR:
+        if scan.stamp <= followed.ranged_at or here.point.distance_to(followed.place) > TOO_NEAR:
             return
-        quarry.ranged_at = scan.stamp
-        last = Pose(quarry.place.x, quarry.place.y).relative_to(here).point
+        followed.ranged_at = scan.stamp
+        last = Pose(followed.place.x, followed.place.y).relative_to(here).point
         if (now := thing_at(self._reader.read(scan).points, last)) is not None:
-            quarry.spot(here.compose(Pose(now.x, now.y)).point, scan.stamp, here)
+            followed.spot(here.compose(Pose(now.x, now.y)).point, scan.stamp, here)
 
-    def _see(self, quarry: _Quarry, scan: LaserScan | None) -> None:
+    def _see(self, followed: _Followed, scan: LaserScan | None) -> None:
         """Update the place of the followed thing by a new scan."""
-        if scan is None or scan.stamp <= quarry.ranged_at or quarry.place is None:
+        if scan is None or scan.stamp <= followed.ranged_at or followed.place is None:
             return
-        quarry.ranged_at = scan.stamp
+        followed.ranged_at = scan.stamp
         here = self._robot[Odometry].reading.pose
-        last = Pose(quarry.place.x, quarry.place.y).relative_to(here).point
+        last = Pose(followed.place.x, followed.place.y).relative_to(here).point
         if (now := moved_thing(self._reader.read(scan).points, last)) is not None:
-            quarry.spot(here.compose(Pose(now.x, now.y)).point, scan.stamp, here)
+            followed.spot(here.compose(Pose(now.x, now.y)).point, scan.stamp, here)
 
     async def _run(
-        self, action: Action, quarry: _Quarry, look: Callable[[], None], side: FollowSide, distance: float
+        self, action: Action, followed: _Followed, look: Callable[[], None], side: FollowSide, distance: float
     ) -> None:
-        robot, base, self._quarry = self._robot, self._robot[Base], quarry
+        robot, base, self._followed = self._robot, self._robot[Base], followed
         while True:
             if await action.hold(lambda: base.set_velocity(STILL)):
-                quarry.seen_at = robot.clock.time()
+                followed.seen_at = robot.clock.time()
             look()
-            age = robot.clock.time() - quarry.seen_at
+            age = robot.clock.time() - followed.seen_at
             if age > GIVE_UP_AFTER:
                 raise NotFound(f"no person to follow was seen for {GIVE_UP_AFTER:g} s")
-            if quarry.place is None:
+            if followed.place is None:
                 action.report("searching")
                 base.set_velocity(STILL)
             else:
                 hidden = age > OUT_OF_SIGHT
-                twist, free = self._keep(quarry, side, distance, hidden=hidden)
+                twist, free = self._keep(followed, side, distance, hidden=hidden)
                 action.report("searching" if hidden else "following" if free else "waiting")
                 base.set_velocity(twist)
             await robot.clock.sleep(PERIOD)
 
-    def _spot(self, quarry: _Quarry, sighting: Sighting[PersonSeen]) -> None:
+    def _spot(self, followed: _Followed, sighting: Sighting[PersonSeen]) -> None:
         for person in sighting.seen:
-            if quarry.number in (None, person.number):
-                quarry.number = person.number
+            if followed.number in (None, person.number):
+                followed.number = person.number
                 seen_from = self._robot[Odometry].reading.pose
                 place = seen_from.compose(Pose(person.place.x, person.place.y)).point
-                quarry.spot(place, sighting.stamp, seen_from)
-                quarry.recognized_at = sighting.stamp
+                followed.spot(place, sighting.stamp, seen_from)
+                followed.recognized_at = sighting.stamp
                 return
 
-    def _range(self, quarry: _Quarry, tag: TagReading) -> None:
+    def _range(self, followed: _Followed, tag: TagReading) -> None:
         """Move the estimated place part of the way to a new ranging, which is inaccurate."""
-        here, quarry.ranged_at = self._robot[Odometry].reading.pose, tag.stamp
+        here, followed.ranged_at = self._robot[Odometry].reading.pose, tag.stamp
         heard = here.compose(Pose(tag.distance * math.cos(tag.azimuth), tag.distance * math.sin(tag.azimuth)))
         share = TAG_FRESH if tag.line_of_sight else TAG_FRESH / 3
-        old = quarry.place or heard.point
+        old = followed.place or heard.point
         place = Point(old.x + share * (heard.x - old.x), old.y + share * (heard.y - old.y))
-        quarry.spot(place, tag.stamp, here)
+        followed.spot(place, tag.stamp, here)
 
-    def _keep(self, quarry: _Quarry, side: FollowSide, distance: float, *, hidden: bool) -> tuple[Twist, bool]:
+    def _keep(self, followed: _Followed, side: FollowSide, distance: float, *, hidden: bool) -> tuple[Twist, bool]:
         """Return the velocity to the robot's place near the person, and whether the way is free.
 
         ``hidden``: to the last sighting, and there turn to the person's course.
         """
-        assert quarry.place is not None
+        assert followed.place is not None
         here = self._robot[Odometry].reading.pose
-        bearing = math.remainder(here.point.bearing_to(quarry.place) - here.yaw, math.tau)
+        bearing = math.remainder(here.point.bearing_to(followed.place) - here.yaw, math.tau)
         if hidden:
-            goal = quarry.place
+            goal = followed.place
         else:
-            out = here.point.bearing_to(quarry.place) + math.pi
+            out = here.point.bearing_to(followed.place) + math.pi
             if side is not FollowSide.BEHIND:
-                out = quarry.course + (BESIDE if side is FollowSide.LEFT else -BESIDE)
-            goal = Point(quarry.place.x + distance * math.cos(out), quarry.place.y + distance * math.sin(out))
+                out = followed.course + (BESIDE if side is FollowSide.LEFT else -BESIDE)
+            goal = Point(followed.place.x + distance * math.cos(out), followed.place.y + distance * math.sin(out))
         left = here.point.distance_to(goal)
         if hidden and left < ROUND_THE_CORNER:
-            return Twist(yaw=bounded(TURN_GAIN * math.remainder(quarry.course - here.yaw, math.tau), TURN_RATE)), True
-        if left < CLOSE or (side is FollowSide.BEHIND and here.point.distance_to(quarry.place) < distance):
+            return Twist(yaw=bounded(TURN_GAIN * math.remainder(followed.course - here.yaw, math.tau), TURN_RATE)), True
+        if left < CLOSE or (side is FollowSide.BEHIND and here.point.distance_to(followed.place) < distance):
             return Twist(yaw=bounded(TURN_GAIN * bearing, TURN_RATE)), True
         scan = self._robot[Lidar].scan
         heading = math.remainder(here.point.bearing_to(goal) - here.yaw, math.tau)
@@ -230,7 +230,7 @@ class SightFollowing(Following):
         seen = self._reader.read(scan).points
         if hidden and left < TOO_NEAR and room(seen, self._robot.description.radius, heading) < left:
             return self._step_back(bearing, seen), True
-        heading, left, straight = self._way(quarry, here, seen, heading, left)
+        heading, left, straight = self._way(followed, here, seen, heading, left)
         return self._towards(heading, left, bearing if straight else heading, seen)
 
     def _step_back(self, bearing: float, seen: Points) -> Twist:
@@ -239,20 +239,22 @@ class SightFollowing(Following):
         turn = bounded(TURN_GAIN * bearing, TURN_RATE)
         return Twist(-BACK if behind > GAP + BACK and abs(bearing) < BACK_BEARING else 0.0, 0.0, turn)
 
-    def _way(self, quarry: _Quarry, here: Pose, seen: Points, heading: float, left: float) -> tuple[float, float, bool]:
+    def _way(
+        self, followed: _Followed, here: Pose, seen: Points, heading: float, left: float
+    ) -> tuple[float, float, bool]:
         """Return direction (base_link, rad) and distance (m) to drive, and whether it is the straight way."""
         radius = self._robot.description.radius
         if room(seen, radius, heading) > min(left, AHEAD):
-            quarry.around = None
+            followed.around = None
             return heading, left, True
-        if (point := quarry.trail.aim(here, seen, radius)) is not None:
+        if (point := followed.trail.aim(here, seen, radius)) is not None:
             ahead = Pose(point.x, point.y).relative_to(here)
-            quarry.around = None
+            followed.around = None
             return math.atan2(ahead.y, ahead.x), max(CLOSE, math.hypot(ahead.x, ahead.y)), False
-        last = None if quarry.around is None else quarry.around - here.yaw
+        last = None if followed.around is None else followed.around - here.yaw
         if (free := gap(seen, radius, heading, last)) is None:
             return heading, left, True
-        quarry.around = free + here.yaw
+        followed.around = free + here.yaw
         return free, left, False
 
     def _towards(self, heading: float, left: float, facing: float, seen: Points) -> tuple[Twist, bool]:

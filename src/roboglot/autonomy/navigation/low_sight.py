@@ -1,6 +1,6 @@
 """Obstacles below or above the lidar's plane, by depth camera, time-of-flight sensors and bumper.
 
-Floors and ramps are no obstacles: only surfaces too steep for wheels and too high for feet are.
+Floors and ramps are not obstacles: only surfaces too steep for wheels and too high for feet are.
 """
 
 from __future__ import annotations

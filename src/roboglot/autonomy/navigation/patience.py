@@ -28,7 +28,7 @@ class Patience:
         self._closest_at = self._free_at = self._clock.time()
 
     def take(self, left: float) -> None:
-        """Note another route with ``left`` m to drive; the change alone is no progress."""
+        """Note another route with ``left`` m to drive; the change alone is not progress."""
         self._closest = left
 
     @property

@@ -2,7 +2,7 @@
 
 In a static world, all points that distinguish both poses agree. If they disagree, some are on moving things, and the
 wheels are believed: their pose, matched to walls alone. The wheels are also believed if only surfaces that were painted
-a moment ago, and are no walls, support the scan's pose, unless wheels may well be as far off as that: on new floor all
+a moment ago, and are not walls, support the scan's pose, unless wheels may well be as far off as that: on new floor all
 surfaces are new. Robots driving ahead drag matches back by millimetres per step, too little for a single step: so the
 last seconds are judged too. Needs the kernels.
 """

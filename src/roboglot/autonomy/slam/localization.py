@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SEARCH_SECONDS = 10.0  # to search for a place that fits
 AROUND_SECONDS = 60.0  # … including driving around, if allowed
 SEARCH_PERIOD = 0.5  # s between two scans that are tried
-AGAIN_SECONDS = 1.0  # s until a distant place is searched again: those that hide walls move
+AGAIN_SECONDS = 1.0  # s between two searches for a distant place: people who hide walls move on meanwhile
 
 
 class LidarLocalization(Localization):
@@ -132,7 +132,7 @@ class LidarLocalization(Localization):
         return found if self._belief.map is grid else [], odometry
 
     def _is_certain(self, place: Match, odometry: Pose, distant: DistantPlaces) -> bool:
-        """Return whether to believe a place: one ``distant`` from the believed one has to be found twice in a row."""
+        """Return whether to believe ``place``: far from the believed one, it must be found twice in a row."""
         believed = self._belief.map_to_odom.compose(odometry)
         return place.pose.distance_to(believed) < NEAR or distant.add(place.pose, odometry)
 

@@ -92,7 +92,7 @@ class Motion:
 
     @property
     def usable(self) -> Pose | None:
-        """The step, if it says something about odometry's constant errors."""
+        """The step, if odometry's constant errors can be learnt from it."""
         return self.step if 0.0 < self.seconds < GAP_MAX else None
 
 
@@ -249,7 +249,7 @@ class Slam:
         sure = self._may_add and self._agreement >= TRUSTED and self._known > NEW_GROUND
         self._excursions.take(scan, odometry, motion.step, motion.turn, sure=sure)
         self._trajectory.follow(stamp, odometry, self._loops.anchor, drives=motion.drives)
-        if searches:  # last: in lockstep its pose comes at once, and must stay
+        if searches:  # last: in lockstep the found pose is set at once, and nothing may change it
             self._everywhere.start(scan, odometry, stamp, self._agreement)
 
     @property

@@ -1,4 +1,4 @@
-"""Places that a search found far from where the robot believes to be."""
+"""Confirmation of places that a search found far from the believed pose."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ SAME, SAME_YAW = 0.3, math.radians(10.0)  # m, rad between two searches' places 
 
 
 class DistantPlaces:
-    """Places far from the believed one, each found by a search; certain once the next search has found it, too.
+    """Places far from the believed one: each is certain once two searches in a row have found it.
 
-    While others leave a bare corridor, its mirror image may fit better for a moment.
+    One search is not enough: while people leave a bare corridor, its mirror image may fit better for a moment.
     """
 
     def __init__(self) -> None:
-        self._map_to_odom: Pose | None = None  # by the place that the last search found
+        self._map_to_odom: Pose | None = None  # according to the last search
 
     def forget(self) -> None:
-        """Forget what was found."""
+        """Forget the place that the last search found."""
         self._map_to_odom = None
 
     def add(self, found: Pose, odometry: Pose) -> bool:
-        """Note a place that was found; return whether the search before had found it, too."""
+        """Add the place that a search ``found`` (map) at ``odometry`` (odom); return whether the last one agrees."""
         before, self._map_to_odom = self._map_to_odom, found.compose(odometry.inverse())
         return before is not None and before.compose(odometry).is_near(found, SAME, SAME_YAW)

@@ -97,7 +97,7 @@ class Whereabouts:
             self.sure = True
 
     def _look_again(self, stamp: float, *, good: bool, new_ground: bool) -> None:
-        """End the loss once scans confirm the pose; a lidar that is back is its reason no longer."""
+        """End the loss once scans confirm the pose; replace NO_SCANS as its reason, as the lidar is back."""
         if self._good >= CONFIRMED and not self._elsewhere:
             self.find(RecoveryMeans.NEARBY, stamp)
         elif self._belief.lost is LostReason.NO_SCANS and not good:

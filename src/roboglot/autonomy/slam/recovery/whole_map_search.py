@@ -25,12 +25,12 @@ KNOWN_SURE = 0.6  # share of known points from which agreement alone suffices
 PROBATION = 3.0  # m to drive without contradiction after a distant relocalization, before scans are added there
 
 
-class Elsewhere:
+class PlaceReplacement:
     """Decides whether another place, found by a search, replaces the believed one of a robot that is not lost."""
 
     def __init__(self) -> None:
         self._distant = DistantPlaces()
-        self._fitted: object = None  # the map that fitted where the robot believes to be
+        self._fitted: object = None  # the last map that a scan fitted at the believed pose
 
     def note_fit(self, grid: object) -> None:
         """Note that a scan fits this map at the believed place."""
@@ -46,7 +46,8 @@ class Elsewhere:
     ) -> bool:
         """Return whether to believe ``found`` instead of the believed place, whose ``agreement`` is given.
 
-        A robot on its way amid others that move along fits best where it was: nearby places do not count.
+        In a crowd that moves along with the robot, scans fit best where it was before: while it drives, nearby places
+        are ignored.
         """
         believed = belief.map_to_odom.compose(odometry)
         near = found.pose.distance_to(believed) < NEAR
@@ -55,7 +56,7 @@ class Elsewhere:
         return self.is_certain(found, odometry, belief) or near
 
     def is_certain(self, found: Match, odometry: Pose, belief: Belief) -> bool:
-        """Return whether a distant place may be believed: on a map that fitted, an earlier search has found it, too."""
+        """Return whether to believe a distant place: if this map has fitted before, two searches must find it."""
         return self._distant.add(found.pose, odometry) or self.is_new(belief.map)
 
 
@@ -77,9 +78,9 @@ class WholeMapSearch:
         self._believe, self._way = believe, way
         self._searched_at, self._searching, self._given_at = -math.inf, False, -math.inf
         self._pause = LOST_PERIOD  # s from a search to the next
-        self._missed, self._fell_at = 0.0, 0.0  # agreement before it fell, and m driven then; 0: it did not fall
-        self._elsewhere = Elsewhere()
-        self._unseen = False  # whether a pose was given, and not yet compared with the whole map
+        self._missed, self._fell_at = 0.0, 0.0  # agreement before it fell (0: it has not), and m driven at that time
+        self._replacement = PlaceReplacement()
+        self._unseen = False  # whether a client gave a pose that was not compared with the whole map yet
         self._search: asyncio.Task[None] | None = None
         self.mapped_from = 0.0  # m driven from which scans are added to the map again
 
@@ -102,15 +103,18 @@ class WholeMapSearch:
             self._missed = max(self._missed, usual)
             if best.agreement >= DOUBT_SHARE * self._missed or best.known < KNOWN_SURE * best.points:
                 self._pause, self._missed = LOST_PERIOD, 0.0
-                self._elsewhere.note_fit(belief.map)
+                self._replacement.note_fit(belief.map)
                 return False
         return not self._searching and stamp - self._searched_at >= (LOST_PERIOD if belief.lost else self._pause)
 
     def start(self, scan: ScanPoints, odometry: Pose, stamp: float, agreement: float) -> None:
-        """Search for the place of ``scan``; a known one, of this ``agreement``, is given up only for a much better."""
+        """Search the whole map for the place of ``scan``.
+
+        A believed place, which the scan fits with this ``agreement``, is only given up for a much better one.
+        """
         belief, grid = self._belief, self._belief.map
         given, self._unseen = self._unseen and belief.lost is None, False
-        anywhere = self._elsewhere.is_new(grid)  # on a map just loaded
+        anywhere = self._replacement.is_new(grid)  # on a map just loaded
         self._searched_at, self._searching = stamp, True
         self._pause = min(2.0 * self._pause, FELL_PERIOD_MAX)
 
@@ -131,16 +135,16 @@ class WholeMapSearch:
         """
         belief = self._belief
         pose = belief.map_to_odom.compose(odometry)
-        if given:  # of places that look alike, it is at the one that was meant
+        if given:  # the client's pose decides between places that look alike
             found = [match for match in found if match.pose.distance_to(pose) < NEAR] or found
         near, lost = found[0].pose.distance_to(pose) < NEAR, belief.lost is not None
         if not lost:
             stood, meant = anywhere or self._way() - self._fell_at <= STOOD, given and not anywhere
-            if not self._elsewhere.replaces(found[0], odometry, belief, agreement, given=meant, stood=stood):
+            if not self._replacement.replaces(found[0], odometry, belief, agreement, given=meant, stood=stood):
                 return
             if not given or len(found) > 1:
                 self._whereabouts.lose(LostReason.NO_FIT, stamp)
-        doubtful = lost and not near and not self._elsewhere.is_certain(found[0], odometry, belief)
+        doubtful = lost and not near and not self._replacement.is_certain(found[0], odometry, belief)
         if len(found) > 1 or doubtful:
             self._whereabouts.be_ambiguous(found, pose)
             return
