@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.console.recordings.kept import Shelf
+from roboglot.console.recordings.kept import RecordingFolder
 from roboglot.model.errors import Busy, NotFound, Refused
 from roboglot.recording.entries import NANO, Entry
 from roboglot.recording.files import Files, Limits, Origin
@@ -31,7 +31,7 @@ def test_recordings_are_listed_with_what_people_look_for(tmp_path: Path) -> None
         written(tmp_path / f"{name}.mcap", 5 + number)
         os.utime(tmp_path / f"{name}.mcap", (1e9 + number, 1e9 + number))
     (tmp_path / "notes.txt").write_text("no recording")
-    new, old = Shelf(tmp_path).look(None)
+    new, old = RecordingFolder(tmp_path).look(None)
     assert (new.file, new.seconds, new.robots, new.world, new.at) == ("new.mcap", 6.0, ["a", "b"], "office", 1e9 + 1)
     assert (old.file, old.seconds, old.bytes) == ("old.mcap", 5.0, (tmp_path / "old.mcap").stat().st_size)
     assert f"--robot 'a=recording:{tmp_path / 'new.mcap'}#a'" in new.play
@@ -40,10 +40,10 @@ def test_recordings_are_listed_with_what_people_look_for(tmp_path: Path) -> None
 def test_parts_are_one_recording(tmp_path: Path) -> None:
     written(tmp_path / "long.mcap", 20, Limits(part_seconds=5.0))
     written(tmp_path / "walk-002.mcap", 3)  # a name that looks like that of a part
-    long, walk = sorted(Shelf(tmp_path).look(None), key=lambda one: one.file)
+    long, walk = sorted(RecordingFolder(tmp_path).look(None), key=lambda one: one.file)
     assert [part.file for part in long.parts] == ["long.mcap", *(f"long-00{n}.mcap" for n in (2, 3, 4))]
     assert (long.seconds, len(walk.parts), walk.seconds) == (20.0, 1, 3.0)
-    Shelf(tmp_path).remove("long.mcap", None)
+    RecordingFolder(tmp_path).remove("long.mcap", None)
     assert [path.name for path in tmp_path.iterdir()] == ["walk-002.mcap"]
 
 
@@ -52,7 +52,7 @@ def test_files_without_an_end_have_no_length(tmp_path: Path) -> None:
     os.truncate(tmp_path / "killed.mcap", (tmp_path / "killed.mcap").stat().st_size - 100)
     (tmp_path / "other.mcap").write_bytes(b"no MCAP at all")
     (tmp_path / "empty.mcap").touch()
-    assert {one.file: one.seconds for one in Shelf(tmp_path).look(None)} == dict.fromkeys(
+    assert {one.file: one.seconds for one in RecordingFolder(tmp_path).look(None)} == dict.fromkeys(
         ("killed.mcap", "other.mcap", "empty.mcap")
     )
 
@@ -63,7 +63,7 @@ def test_nothing_outside_of_the_folder_is_touched(tmp_path: Path) -> None:
     written(tmp_path / "outside.mcap", 1)
     (folder / "link.mcap").symlink_to(tmp_path / "outside.mcap")
     (folder / ".hidden.mcap").touch()
-    shelf = Shelf(folder)
+    kept = RecordingFolder(folder)
     for name in (
         "../outside.mcap",
         "link.mcap",
@@ -74,26 +74,26 @@ def test_nothing_outside_of_the_folder_is_touched(tmp_path: Path) -> None:
         str(tmp_path / "outside.mcap"),
     ):
         with pytest.raises(NotFound):
-            shelf.path(name)
+            kept.path(name)
         with pytest.raises(NotFound):
-            shelf.remove(name, None)
+            kept.remove(name, None)
     assert (tmp_path / "outside.mcap").exists()
 
 
 def test_running_recording_is_not_deleted(tmp_path: Path) -> None:
     written(tmp_path / "now.mcap", 1)
-    shelf = Shelf(tmp_path)
-    assert shelf.look(tmp_path / "now.mcap")[0].running
+    kept = RecordingFolder(tmp_path)
+    assert kept.look(tmp_path / "now.mcap")[0].running
     with pytest.raises(Refused, match="end the recording first"):
-        shelf.remove("now.mcap", tmp_path / "now.mcap")
-    assert not shelf.look(tmp_path.parent / "now.mcap")[0].running
+        kept.remove("now.mcap", tmp_path / "now.mcap")
+    assert not kept.look(tmp_path.parent / "now.mcap")[0].running
 
 
 async def test_one_comparison_at_a_time(tmp_path: Path) -> None:
-    shelf = Shelf(tmp_path)
-    async with shelf._comparing:
+    kept = RecordingFolder(tmp_path)
+    async with kept._comparing:
         with pytest.raises(Busy):
-            await shelf.send_comparison("a.mcap", "b.mcap", "", lambda _message: pytest.fail("sent"))
+            await kept.send_comparison("a.mcap", "b.mcap", "", lambda _message: pytest.fail("sent"))
 
 
 async def test_recording_is_fetched_and_deleted(shown: Shown) -> None:

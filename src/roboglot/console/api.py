@@ -153,9 +153,9 @@ class Api:
             case "GET", ["recordings"]:
                 await answer_json(send, await recordings.all())
             case "GET", ["recordings", file]:
-                await recordings.shelf.send(file, send)
+                await recordings.kept.send(file, send)
             case "GET", ["recordings", one, "compared", other, *robot] if len(robot) < 2:
-                await recordings.shelf.send_comparison(one, other, "".join(robot), send)
+                await recordings.kept.send_comparison(one, other, "".join(robot), send)
             case _:
                 raise _nothing_here()
 

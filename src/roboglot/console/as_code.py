@@ -38,7 +38,7 @@ class Request:
 def copy(exchange: Exchange, form: str, endpoint: Endpoint) -> str:
     """Return ``exchange`` in ``form`` for a client of the door at ``endpoint``.
 
-    Raises InvalidGoal for an exchange that is no request, and for a form that the door lacks.
+    Raises InvalidGoal for an exchange that is not a request, and for a form that the door lacks.
     """
     if exchange.direction is not Direction.REQUEST:
         raise InvalidGoal("only a request can be sent again")

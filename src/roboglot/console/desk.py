@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 CLIENT = "console"
 COMMAND = "command"  # the kind of recorded inputs for commands
 TAKE = "take_control"  # handled separately because it concerns the caller
-# They hold although the robot is off or restarts; what others set would be lost at its start.
+# Commands that also work while the robot is off or restarts. What others set would be lost when it starts.
 HOLD = frozenset({"stop", "cancel", "emergency_stop", "give_control", "release_control", "dismiss_fault"})
 assert map_verbs  # importing it registers its verbs
 
@@ -88,7 +88,7 @@ class Desk:
 
     @property
     def may_teach(self) -> bool:
-        """True if the current client has ADMIN on every robot and is no pupil."""
+        """True if the current client has ADMIN on every robot and is not a pupil."""
         return identity() not in self.pupils and self.may_change_world
 
     @property

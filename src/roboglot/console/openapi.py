@@ -17,9 +17,9 @@ assert map_verbs  # importing it registers its verbs
 NAME = {"name": "name", "in": "path", "required": True, "schema": {"type": "string"}}
 NUMBER = NAME | {"name": "number"}
 READS = {
-    "/api/me": "Who asks, and whether names are asked for here",
+    "/api/me": "The caller, and whether this program has access control",
     "/api/class": "The class that is open, for its teacher; POST {do: open, lock, unlock, reset, give_back, close}",
-    "/api/recording": "How the recording of all robots goes; POST {do: start, stop, mark, delete}",
+    "/api/recording": "State of the recording of all robots; POST {do: start, stop, mark, delete}",
     "/api/recordings": "The recordings in the data folder",
     "/api/recordings/{file}": "A file of a recording",
     "/api/recordings/{file}/compared/{other}": "A page that compares two recordings; with /{name}, of one robot",

@@ -23,7 +23,7 @@ from roboglot.console.settings import COMPARE_SECONDS, DOWNLOAD_BYTES
 from roboglot.model.errors import Busy, NotFound, Refused
 
 SUFFIX = ".mcap"
-REPLAY_ADDRESS = "127.0.0.100"  # rarely that of another robot
+REPLAY_ADDRESS = "127.0.0.100"  # hardly ever another robot's
 HEAD_RECORDS = 3  # among which the metadata is
 _numbered = re.compile(r"(.+)-(\d{3,})")
 REPORT = b"default-src 'none'; style-src 'unsafe-inline'"  # what the page of a comparison may load
@@ -56,7 +56,7 @@ class Kept(msgspec.Struct, frozen=True):
     play: str
 
 
-class Shelf:
+class RecordingFolder:
     """Recordings of one folder. Methods read files: call those that are not async in a thread."""
 
     def __init__(self, folder: Path) -> None:
@@ -142,7 +142,7 @@ class Shelf:
                 await send({"type": "http.response.body", "body": data, "more_body": size > 0})
 
     async def send_comparison(self, one: str, other: str, robot: str, send: Send) -> None:
-        """Send a page with a comparison of two recordings, made in a process of its own. Raises RobotError, Problem."""
+        """Send a page that compares two recordings, made by a separate process. Raises RobotError, Problem."""
         if self._comparing.locked():
             raise Busy("another comparison is being made")
         async with self._comparing:
@@ -155,7 +155,7 @@ class Shelf:
         await answer(send, 200, b"text/html; charset=utf-8", body, more)
 
     async def _run(self, arguments: Sequence[str]) -> None:
-        """Run ``roboglot`` in the folder: it reads for seconds, in which no robot is to wait. Raises Problem."""
+        """Run ``roboglot`` in the folder, as reading takes seconds and no robot may wait for it. Raises Problem."""
         process = await asyncio.create_subprocess_exec(
             *("nice", sys.executable, "-m", "roboglot", *arguments),
             cwd=self._folder,
@@ -178,7 +178,7 @@ class Shelf:
 
 
 def _piece(source: IO[bytes], size: int) -> bytes:
-    """Return the next bytes of a file; zeros where it became shorter, since its length was announced."""
+    """Return the next bytes of a file; zeros if it has become shorter since its length was announced."""
     return source.read(size).ljust(size, b"\0")
 
 
@@ -190,7 +190,7 @@ def _base(part: Part) -> str:
 
 
 def _outline(path: Path, size: int) -> tuple[Part, dict[str, str]]:
-    """Return what the head and the end of a file say. Raises OSError."""
+    """Return a file as a part of a recording, and its metadata; reads only its head and its end. Raises OSError."""
     from roboglot.recording.reader import summary_of
 
     with path.open("rb") as file:
@@ -204,7 +204,7 @@ def _outline(path: Path, size: int) -> tuple[Part, dict[str, str]]:
 
 
 def _facts(path: Path) -> dict[str, str]:
-    """Return the metadata at the head of a file; none if it is no recording of ours. Raises OSError."""
+    """Return the metadata at the head of a file; none if it is not a recording of ours. Raises OSError."""
     from mcap.records import Metadata
 
     from roboglot.recording.reader import BadRecording, records

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from roboglot.console.recordings.kept import Kept, Shelf
+from roboglot.console.recordings.kept import Kept, RecordingFolder
 from roboglot.model.errors import Refused
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Recordings:
 
     def __init__(self, data: Path, recorder: Callable[[], Recorder]) -> None:
         self._folder, self._recorder = data / FOLDER, recorder
-        self.shelf = Shelf(self._folder)
+        self.kept = RecordingFolder(self._folder)
 
     @property
     def on(self) -> bool:
@@ -52,7 +52,7 @@ class Recordings:
 
     async def all(self) -> list[Kept]:
         """Return the recordings in the data folder, the newest first."""
-        return await asyncio.to_thread(self.shelf.look, self._running)
+        return await asyncio.to_thread(self.kept.look, self._running)
 
     @property
     def _running(self) -> Path | None:
@@ -71,7 +71,7 @@ class Recordings:
                     raise Refused("a mark needs text")
                 recorder.mark(request.text.strip())
             case "delete":
-                await asyncio.to_thread(self.shelf.remove, request.file, self._running)
+                await asyncio.to_thread(self.kept.remove, request.file, self._running)
             case "stop":
                 ended = await recorder.stop()
                 return self.look() | {"file": Path(ended.path).name, "bytes": ended.bytes}

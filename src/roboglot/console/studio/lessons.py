@@ -123,7 +123,7 @@ def grade(lesson: Lesson, source: str, played: Played) -> Grade:
 
 
 def no_program(problems: Sequence[Problem]) -> Grade:
-    """Return the grade of a text that is no program."""
+    """Return the grade of a text that is not a program."""
     first = problems[0]
     words = f"line {first.line}: {first.english}", f"第 {first.line} 行：{first.chinese}"
     return Grade(0, [Row("ends", False, False, *words)])
