@@ -20,7 +20,8 @@ EMPHASIS = re.compile(r"(?<![*\w])\*([^*\n]+(?:\n[^*\n]+)?)\*(?![*\w])")
 # One word for one thing, as on the console's pages.
 TERMS = {"扇门": "接口", "门上": "接口", "机体": "机身", "逐步时钟": "锁步", "充电座": "充电桩"}
 TERMS |= {"摄像头": "相机", "真狗": "真机", "映像": "镜像", "数据目录": "数据文件夹", "设置文件": "配置文件"}
-TERMS |= {"附加包": "附加组件", "登记库": "登记处", "MQTT 代理": "MQTT 服务器", "您": "你", "班级": "课堂"}
+TERMS |= {"附加包": "附加组件", "登记库": "注册中心", "登记处": "注册中心", "MQTT 代理": "MQTT 服务器"}
+TERMS |= {"您": "你", "班级": "课堂", "野外": "现场"}
 # Pages of the studio and the console, whose buttons the pages of the documentation quote in italics.
 PAGES = ("console", "programs/studio")
 RIGHTS = {"admin"}
