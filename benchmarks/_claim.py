@@ -20,7 +20,7 @@ class Claims:
         self._print(name, value, limit, unit, value / limit if limit > 0 else float("inf"), ">=")
 
     def _print(self, name: str, value: float, limit: float, unit: str, ratio: float, sign: str) -> None:
-        holds = ratio >= 1  # not so if a figure is no number
+        holds = ratio >= 1  # not so if a figure is not a number
         verdict = "holds" if holds else "MISSED"
         print(f"{name:36} {value:9.2f} {unit:12} claim {sign} {limit:<8g} ratio {ratio:5.2f}  {verdict}", flush=True)
         if not holds:

@@ -63,7 +63,7 @@ class Hands:
 
 
 def example() -> ModuleType:
-    """The example, which is no package."""
+    """The example, which is not a package."""
     spec = importlib.util.spec_from_file_location("slamware_operations", EXAMPLE)
     assert spec is not None
     assert spec.loader is not None
@@ -112,7 +112,7 @@ def _lines(pairs: dict[str, Pair]) -> Iterator[str]:
 
 
 def _shown(body: bytes) -> list[str]:
-    """A body in lines that fit the page; how long it is where it is no text."""
+    """A body in lines that fit the page; how long it is where it is not text."""
     if not body:
         return []
     try:

@@ -1,6 +1,6 @@
 """Gathers the pages of the site in build/pages: docs/, the README as its start, and the project's own files.
 
-Links between them are made to fit; links to files of the clone that are no pages become plain text.
+Links between them are made to fit; links to files of the clone that are not pages become plain text.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Settings for all tests: examples are the same in every run, and a slow machine is no failure."""
+"""Settings for all tests: examples are the same in every run, and a slow machine is not a failure."""
 
 from __future__ import annotations
 

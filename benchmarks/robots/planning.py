@@ -1,8 +1,8 @@
 """Claim: on 2000x2000 cells a path is planned no slower than by pyastar2d, at equal or better cost.
 
-pyastar2d is no dependency: ``pip install pyastar2d`` to see the ratio, otherwise only our figures are printed. Both get
-the same grid; cost is the length of the steps times what their cells cost. pyastar2d itself counts a diagonal step like
-a straight one.
+pyastar2d is not a dependency: ``pip install pyastar2d`` to see the ratio, otherwise only our figures are printed. Both
+get the same grid; cost is the length of the steps times what their cells cost. pyastar2d itself counts a diagonal step
+like a straight one.
 """
 
 from __future__ import annotations

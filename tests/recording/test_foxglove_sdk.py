@@ -1,6 +1,6 @@
 """The messages of recordings are those of Foxglove's own SDK, field by field.
 
-The SDK (54 MB) is no dependency: ``pip install foxglove-sdk`` has this test run.
+The SDK (54 MB) is not a dependency: ``pip install foxglove-sdk`` has this test run.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ EXCHANGES_MAX = 2_000_000
 
 
 class BadRecording(ValueError):
-    """The file is no recording of roboglot's; the message says why."""
+    """The file is not a recording of roboglot's; the message says why."""
 
 
 @dataclass(slots=True)

@@ -196,7 +196,7 @@ def _is_refused(exchange: Exchange) -> bool:
 
 
 def _people_by_structure(payload: bytes, count: int) -> list[bool] | None:
-    """Return True for each of ``count`` descriptions that is a person's, in their order; None if that is no JSON."""
+    """Return True for each of ``count`` descriptions that is a person's, in their order; None if that is not JSON."""
     found: list[bool] = []
     try:
         _walk(_parse(split(payload)[1]), found)

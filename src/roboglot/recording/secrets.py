@@ -23,7 +23,7 @@ ESCAPES = (b"\\n", b"\\r", b"\\t")  # end in a letter that belongs to no word
 
 
 class Secrets:
-    """Values that were redacted so far; ``fields``: names of fields, which are no secrets."""
+    """Values that were redacted so far; ``fields``: names of fields, which are not secrets."""
 
     def __init__(self, fields: frozenset[str] = frozenset()) -> None:
         self._public = ORDINARY | fields

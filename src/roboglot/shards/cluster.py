@@ -50,7 +50,7 @@ with explaining("--on", "fleet"):
 
 log = logging.getLogger(__name__)
 LOCAL = "local"
-PARTS = "raylet", "gcs_server"  # processes of Ray that it does not start again
+PARTS = "raylet", "gcs_server"  # processes that Ray does not start again
 NAMESPACE = "roboglot"
 CLIENT_PORT = 10001  # default port of ray://HOST
 STORE_BYTES = 80 << 20  # of a cluster that we start: actors share no objects
@@ -102,7 +102,7 @@ def joined(where: str) -> Iterator[None]:
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Context that ignores further signals to end: a second Ctrl-C would leave processes of Ray behind."""
+    """Context that ignores SIGINT and SIGTERM: a second Ctrl-C would leave processes of Ray behind."""
     before = [(number, signal.signal(number, signal.SIG_IGN)) for number in (signal.SIGINT, signal.SIGTERM)]
     try:
         yield
@@ -112,7 +112,7 @@ def _undisturbed() -> Iterator[None]:
 
 
 def why_lost() -> str:
-    """Return why a Ray that this program started is of no use any more; "" if it is, or was not started here."""
+    """Return why the Ray that this program started no longer works; "" if it works, or was started elsewhere."""
     node = ray._private.worker._global_node  # only Ray's own health checks are public, which take a minute
     ended = node.dead_processes() if node is not None else []
     lost = [kind for kind, _ in ended if kind in PARTS]

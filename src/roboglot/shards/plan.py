@@ -158,13 +158,13 @@ def _store(text: bytes, folder: Path) -> None:
 
 
 class EarlierPlan:
-    """The plan that a folder has, or that it has none, to go back to after another one was tried."""
+    """Copy of a folder's plan, or the fact that it has none, to be restored if a new plan fails."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._text = folder, _text_in(folder)
 
     def restore(self) -> bool:
-        """Store it again; return False if it is there still. Raises OSError."""
+        """Put the earlier plan back; return False if it has not been replaced. Raises OSError."""
         if _text_in(self._folder) == self._text:
             return False
         if self._text is None:

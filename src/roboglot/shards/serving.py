@@ -58,7 +58,7 @@ async def serve(
     finally:
         starting.cancel()
         await page.close()
-        await commands.close()  # first, as a move must be over before the folder is released
+        await commands.close()  # before the host: a move must be over before the folder is released
         if not keep:
             _restore(earlier)
         await host.close()

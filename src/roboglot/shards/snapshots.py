@@ -43,7 +43,10 @@ class Snapshots:
         self._turns = asyncio.Semaphore(AT_ONCE_MAX)
 
     async def state(self, robot: str) -> dict[str, object]:
-        """Return a robot's state from its console; ``{"error": why}`` if there is none soon. Raises LookupError."""
+        """Return a robot's state from its console, or ``{"error": why}`` without an answer in time.
+
+        Raises LookupError.
+        """
         console = self._console(self._home(robot))
 
         async def look() -> dict[str, object]:

@@ -21,7 +21,7 @@ from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
 log = logging.getLogger(__name__)
 STARTING_MAX = 2 * max(2, os.cpu_count() or 2)  # at the same time; a shard waits for the disk half of its start
 SILENCE_MAX = 10.0  # s without a heartbeat after which a shard counts as hung
-STALE = 3.0  # s without a heartbeat after which the last one's speed is not shown any more
+STALE = 3.0  # s without a heartbeat after which the last reported speed is no longer shown
 START_MAX = 60.0  # s for a shard to become ready
 STOP_MAX = 12.0  # s for it to close
 REPORT_MAX = 5.0  # s for the nursery to report the end of a shard that was killed

@@ -114,8 +114,8 @@ def refuse_threads() -> None:
 def fork(prepare: Callable[[], None]) -> int:
     """Fork; return 0 in the child, which is killed when this process ends. Raises Threaded.
 
-    The child calls ``prepare`` before it hears signals: one sent meanwhile meets the handlers that are set there, not
-    those of this process. If that fails, the child ends.
+    The child calls ``prepare`` while its signals are blocked: one that is sent meanwhile meets the handlers that
+    ``prepare`` sets, not those of this process. If ``prepare`` fails, the child ends.
     """
     refuse_threads()
     parent, heard = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())

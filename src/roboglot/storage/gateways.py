@@ -52,7 +52,7 @@ class Whereabouts:
 
 
 def _gateway(home: Home) -> Gateway:
-    """Return a home's gateway. Raises OSError if its text in the registry is no address."""
+    """Return a home's gateway. Raises OSError if its text in the registry is not an address."""
     host, _, port = home.gateway.rpartition(":")
     if not (host and port.isascii() and port.isdigit() and 0 < int(port) <= PORT_MAX):
         raise OSError(f"the registry has no gateway of robot {home.robot}, but {home.gateway!r}")

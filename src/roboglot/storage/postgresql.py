@@ -300,7 +300,7 @@ def _failed(error: psycopg.Error) -> DatabaseError:
 
 
 def _is_there(connection: Connection) -> None:
-    """Raise DatabaseError if this is no database of ours, or one of an earlier version."""
+    """Raise DatabaseError if this is not a database of ours, or one of an earlier version."""
     connection.execute("SELECT gateway FROM robot_home WHERE robot=''")
 
 

@@ -131,7 +131,7 @@ async def test_log_names_pushes_an_app_does_not_take(phoned, app, passing: Passi
     app.refusing = False
     app.gate.clear()
     link.push(SERVO_RESPONSE, "{}")
-    await passing(lambda: "the app did not end its call for push 1003 within 3.0 s" in caplog.text)
+    await passing(lambda: "the app did not answer push 1003 within 3.0 s" in caplog.text)
     assert link.connected
 
 

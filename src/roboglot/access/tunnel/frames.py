@@ -36,7 +36,7 @@ class TunnelFrame(NamedTuple):
 
 
 class BadFrame(ValueError):
-    """Received bytes are no frame; the tunnel ends."""
+    """Received bytes are not a frame; the tunnel ends."""
 
 
 def encode(kind: FrameKind, stream: int = 0, payload: bytes = b"") -> bytes:

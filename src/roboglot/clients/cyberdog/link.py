@@ -240,7 +240,7 @@ class DogLink:
 
 
 class _Calls:
-    """The robot's calls over one channel; bytes that are no answer become None."""
+    """The robot's calls over one channel; bytes that are not an answer become None."""
 
     def __init__(self, channel: grpc.aio.Channel) -> None:
         written = pb.SendRequest.SerializeToString
@@ -297,7 +297,7 @@ class _App:
 
 
 async def _refuse(rpc: grpc.aio.ServicerContext) -> NoReturn:
-    """End a call of bytes that are no message. Raises what gRPC does."""
+    """End a call of bytes that are not a message. Raises what gRPC does."""
     await rpc.abort(grpc.StatusCode.INTERNAL, "these bytes are no message")
     raise AssertionError
 

@@ -1,2 +1,1 @@
-"""Inputs from outside: those that are no requests at doors, noted and given again; fairness to clients, and the turns
-that other work takes between them."""
+"""Inputs from outside other than requests at doors, recorded and repeated; and fairness between clients and other work."""

@@ -355,7 +355,7 @@ def _shut_down(run: TaskRun) -> str:
 
 
 def _expect_end(runs: Mapping[str, TaskRun], ids: Collection[str], *, ends: bool = True) -> None:
-    """Note that runs are about to end: what is cut short until their turn comes is no fault of the robot's."""
+    """Note that runs are about to end, so that calls interrupted until then are not reported as the robot's faults."""
     for id in ids:
         if id in runs:
             runs[id].is_ending = ends

@@ -106,7 +106,7 @@ class TaskRun:
         self._pace = listeners.pace
         self._answering: asyncio.Task[None] | None = None
         self._ended_itself = self._called_off = False
-        self.is_ending = False  # a person has asked for its end, which waits for its turn
+        self.is_ending = False  # whether its end has been requested, and waits for its turn
         self._journal = journal
         run.calls.answered = journal.answered
         self._replay = Replay(self._session, self.host, replaying)
@@ -302,7 +302,7 @@ class TaskRun:
         elif (
             value is not None
             and not (self._called_off or self.is_ending)
-            and (  # what is cut short is no fault of the robot's
+            and (  # an interrupted call is not the robot's fault
                 (why := refusal(value)[:SHORT_MAX]) or self._insights.listening
             )
         ):

@@ -276,7 +276,7 @@ class AppLink:
         except TimeoutError:
             seldom.warning(
                 f"no end of {key}",
-                "the app did not end its call for push %s within %s s; until it does, it gets one of them in that time",
+                "the app did not answer push %s within %s s; until it does, it gets only one push in that time",
                 key,
                 PUSH_DEADLINE,
             )
@@ -286,7 +286,7 @@ class AppLink:
 
 
 def _note_error(what: str, outcome: str) -> None:
-    """Log an error that the app itself answered with; a line that broke is none."""
+    """Log an error that the app itself returned, not the loss of the connection."""
     if outcome != DONE and outcome not in BROKEN:
         seldom.warning(f"{outcome} of {what}", "the app answers %s with the error %s", what, outcome)
 

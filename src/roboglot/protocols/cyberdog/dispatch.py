@@ -34,7 +34,7 @@ from roboglot.protocols.cyberdog.table import TABLE, unread
 from roboglot.transport.log_limiter import LogLimiter
 from roboglot.wire.contracts import contract
 from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, UNUSED, InBandError
-from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_params, strangers, write
+from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_params, unknown_names, write
 
 log = logging.getLogger(__name__)
 seldom = LogLimiter(log)
@@ -140,11 +140,11 @@ async def _answered(call: Call) -> object | None:
 
 
 def _taken(call: Call, values: Mapping[str, object], fields: type[Struct]) -> tuple[Mapping[str, object], list[str]]:
-    """Return the values that count, and what is wrong with the others, which is logged."""
+    """Return the valid values, and what is wrong with the others; logs the latter and unknown names."""
     taken, wrong = fitting(values, fields), []
     if len(taken) < len(values):
         wrong = mismatches(values, fields)
-        unknown = strangers(values, fields, UNUSED.get(call.code, frozenset()))
+        unknown = unknown_names(values, fields, UNUSED.get(call.code, frozenset()))
         if ignored := "; ".join([*wrong, *unknown]):
             seldom.warning(f"{call.code} {ignored}", "%d: ignored: %s", call.code, ignored)
     return taken, wrong

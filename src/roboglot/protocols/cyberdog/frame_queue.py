@@ -159,7 +159,7 @@ class FrameQueue:
             case Delivery.SILENT:
                 if not self._silent:
                     log.warning(
-                        "the app acknowledges no program frames: programs no longer wait for it, their news comes late"
+                        "the app does not acknowledge program frames: programs go on without it, their frames are late"
                     )
                 self._silent = True
             case Delivery.FAILED:

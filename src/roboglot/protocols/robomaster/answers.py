@@ -15,8 +15,8 @@ Result = str | Sequence[Number | str] | None  # of a handler: a Reply or free te
 class Answer:
     """Bytes for the client and, of a refusal, the reason in plain words for the log.
 
-    ``explain`` is called only when a listener needs it: the search for the intended command is slow. ``warn`` gives
-    what the log says of a command that was carried out.
+    ``explain`` is called only when a listener needs it: the search for the intended command is slow. ``warn`` returns a
+    warning about a command that was carried out.
     """
 
     reply: bytes

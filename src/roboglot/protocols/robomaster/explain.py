@@ -23,7 +23,7 @@ def nearest_command(command: Command, keys: typing.Collection[str]) -> str:
     """Return the most similar known command with the given words, or ""."""
     wanted = " ".join((*command.words[:2], *((QUERY,) if command.query else ())))
     alike = {key for key in keys if key.endswith(QUERY) == command.query}
-    near = nearest(wanted, alike) or nearest(wanted, keys)  # perhaps only the mark is wrong
+    near = nearest(wanted, alike) or nearest(wanted, keys)  # perhaps only the question mark is wrong
     return f"did you mean `{_spelt(near, command.words[2:])}`?" if near else ""
 
 
@@ -54,7 +54,7 @@ def nearest_values(name: str, shape: Shape, values: Mapping[str, Value]) -> str:
 
 
 def without_effect(shape: Shape, ignored: typing.Sequence[str]) -> str:
-    """Return that the ``ignored`` words of a command have no effect, and which parameter was probably meant."""
+    """Return a warning that the ``ignored`` words have no effect, with the parameter that was probably meant."""
     hint = next((near for word in ignored if (near := meant(word, shape.kinds))), "")
     return f"{' '.join(ignored)} {'has' if len(ignored) == 1 else 'have'} no effect{hint}"
 

@@ -74,7 +74,7 @@ class Dispatch:
         await asyncio.shield(self._begin(request, answers))
 
     def _refuse_unreadable(self, text: str, bad: BadFrame) -> None:
-        """Answer a text that is no frame."""
+        """Answer a text that is not a frame."""
         answer = feedback(
             kind=bad.kind or "parse",
             id=bad.id,

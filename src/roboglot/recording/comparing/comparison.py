@@ -51,7 +51,7 @@ class Row:
             self.note(what, one, other)
 
     def note(self, what: str, one: object, other: object) -> None:
-        """Show a difference, up to ``SHOWN_MAX``."""
+        """Keep a difference for the report; at most ``SHOWN_MAX`` are kept."""
         if len(self.differences) < SHOWN_MAX:
             self.differences.append(Difference(what, _short(one), _short(other)))
 
@@ -86,12 +86,12 @@ class Comparison:
 
     @property
     def driven(self) -> float:
-        """The smallest share that agrees of what the robots did; 1.0 if nothing was compared."""
+        """The smallest share that agrees among the rows of ``drive``; 1.0 if nothing was compared."""
         return min((row.share for row in self.drive), default=1.0)
 
     @property
     def fidelity(self) -> float:
-        """The smaller share of messages and drive, so that many equal messages hide no other drive."""
+        """The smaller share of messages and drive, so that many equal messages cannot hide a different drive."""
         return min(self.messages, self.driven)
 
     @property

@@ -25,9 +25,9 @@ SECTION = "drive"
 TRUTH, POSES, ODOMETRY = "ground truth", "estimated poses", "odometry"
 STEP = 0.1  # s between two moments
 SHIFTS = 21  # moments tried within the tolerance of time, at either side
-AROUND = 0.25  # s before and after a moment, in which a robot in motion gets further than by
-STILL = 0.01, np.radians(1.0)  # m and rad
-SET_OFF = 0.05, np.radians(5.0)  # from the first place
+AROUND = 0.25  # s before and after a moment that are compared to tell whether the robot moves
+STILL = 0.01, np.radians(1.0)  # m, rad: less motion than this within them is standing
+SET_OFF = 0.05, np.radians(5.0)  # m, rad from the first place at which the robot has set off
 
 
 class Track:
@@ -50,18 +50,18 @@ class Track:
 
     @property
     def driven(self) -> float:
-        """Length of the way, m, without what is less than a step."""
+        """Distance driven, m; motion below ``STILL`` is left out as noise."""
         x, y, _ = self.at(np.arange(self.span[0], self.span[1] + STEP, 2 * AROUND))
         steps = np.hypot(np.diff(x), np.diff(y))
         return float(steps[steps > STILL[0]].sum())
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return x, y and yaw at these times; before the first and after the last one, those."""
+        """Return x, y (m) and yaw (rad) at ``times`` (s); outside of the track, those of its first or last place."""
         x, y = (np.interp(times, self._times, values) for values in self._places)
         return x, y, np.interp(times, self._times, self._yaws)
 
     def moves(self, times: np.ndarray) -> np.ndarray:
-        """Return at which of these times the robot moved."""
+        """Return a mask of the ``times`` (s) at which the robot moved."""
         apart, turned = self._far(times - AROUND, times + AROUND)
         return np.asarray((apart > STILL[0]) | (turned > STILL[1]))
 
@@ -88,7 +88,7 @@ def _turn(angle: np.ndarray | float) -> np.ndarray:
 
 @dataclass(slots=True)
 class Drive:
-    """Deeds of one robot: its tracks by source, and its actions with their last status, in order."""
+    """Tracks of one robot by source, and its actions in order, with their last status."""
 
     tracks: dict[str, Track] = field(default_factory=dict)
     actions: list[tuple[str, str]] = field(default_factory=list)
@@ -174,7 +174,10 @@ def _compared_places(source: str, one: Track, other: Track, mask: Mask) -> tuple
 
 
 def _near(one: Track, other: Track, times: np.ndarray, mask: Mask) -> tuple[np.ndarray, np.ndarray]:
-    """Return when the other one is at the place of this one, about that time, and how far away it stays (m)."""
+    """Return at which ``times`` (s) the other robot is at the same place, and the least distance between both (m).
+
+    The other one may be there earlier or later, within the mask's tolerance of time.
+    """
     shifts = np.linspace(-mask.seconds, mask.seconds, SHIFTS)
     x, y, yaw = one.at(times)
     apart, turned = far((x[:, None], y[:, None], yaw[:, None]), other.at(times[:, None] + shifts))

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 
 IDS_MAX = 10_000
-DIGITS_MIN = 4  # of a text that is no word
+DIGITS_MIN = 4  # of a text that is not a word
 _uuid = re.compile(r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}", re.IGNORECASE)
 _uuid_bytes = re.compile(rb"(?<![\w-])" + _uuid.pattern.encode() + rb"(?![\w-])", re.IGNORECASE)
 _last = re.compile(r"([^.\[\]]+)$")
@@ -46,7 +46,7 @@ class Names:
         self._ours: dict[Name, Name] = {}
 
     def agree(self, path: str, one: object, other: object) -> bool | None:
-        """Return whether two values are names of the same thing, from now on; None if they are no names."""
+        """Return whether two values are names of the same thing, from now on; None if they are not names."""
         ours, theirs = name_of(path, one), name_of(path, other)
         if NOT_NAMED in (ours, theirs) or type(one) is not type(other):
             return None

@@ -21,7 +21,7 @@ from roboglot.kernels.layouts import (
 )
 from roboglot.model.geometry import Pose
 
-STRIDE_MAX = 0.1  # m per tick: more is no walk
+STRIDE_MAX = 0.1  # m per tick: more is not a walk
 
 
 def blank() -> memoryview[float]:

@@ -37,7 +37,7 @@ HEAD = Row._fields
 
 
 class Table:
-    """An open table, until ``close``. Raises OtherCampaign for a file that is no table or is in use."""
+    """An open table, until ``close``. Raises OtherCampaign for a file that is not a table or is in use."""
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)

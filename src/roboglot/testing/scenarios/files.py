@@ -24,7 +24,7 @@ Count = Annotated[int, msgspec.Meta(ge=0)]
 
 
 class BadScenario(ValueError):
-    """The file is no scenario; the message says where and why."""
+    """The file is not a scenario; the message says where and why."""
 
 
 class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -102,7 +102,7 @@ SILENT_WITHOUT_SERVICE = frozenset(
     {1001, *range(1020, 1025), 3001, 3002, 3011, 3012, 3014, 5001, 5002, 5003, 5004, 5006, 7001, 7002, 9030, 9031}
 )
 
-# Fields without effect on real dogs, either, by the request that may have them.
+# Fields that have no effect on real dogs either, by request.
 UNUSED: Mapping[int, frozenset[str]] = {
     Code.SERVO: frozenset({"cmd_source", "acc_des", "ctrl_point", "foot_pose", "contact", "duration"}),
     Code.MOTION: frozenset({"cmd_source", "cmd_type", "acc_des", "ctrl_point", "foot_pose", "value"}),

@@ -76,7 +76,7 @@ def mismatches(values: Mapping[str, object], fields: type[msgspec.Struct]) -> li
     ]
 
 
-def strangers(values: Mapping[str, object], fields: type[msgspec.Struct], unused: Set[str]) -> list[str]:
+def unknown_names(values: Mapping[str, object], fields: type[msgspec.Struct], unused: Set[str]) -> list[str]:
     """Describe the names in ``values`` that are neither fields nor ``unused``, with the field that was meant."""
     known = fields.__struct_fields__
     return [

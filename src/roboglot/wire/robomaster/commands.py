@@ -114,7 +114,7 @@ def parameters_of(words: Sequence[str], names: Sequence[str], bare: Sequence[str
 
 
 def ignored_words(words: Sequence[str], names: Sequence[str], bare: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the words that have no effect in ``parameters_of``, but the manual's ``leve``."""
+    """Return the words that ``parameters_of`` ignores, except ``leve``, a misspelling in the manual."""
     values, left = _named(words, names)
     taken = sum(name not in values for name in bare)
     return tuple(word for word in left[: max(0, len(left) - taken)] if word != MISSPELT)

@@ -37,7 +37,7 @@ class MotionStatus(Component):
 
 
 def check_on_floor(robot: Robot) -> None:
-    """Raise Refused if the robot senses that it is held up or overturned: walking or driving takes it nowhere."""
+    """Raise Refused if the robot senses that it is held up or overturned, so that it can neither walk nor drive."""
     flags = robot[MotionStatus].flags if MotionStatus in robot else None
     if flags is not None and flags.rolled_over:
         raise Refused("the robot lies on its side")

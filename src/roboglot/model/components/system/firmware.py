@@ -131,4 +131,7 @@ class Firmware(Component):
 
     @abstractmethod
     def restart(self, module: Module, *, source: str = "") -> Action:
-        """Restart one module, until when the robot stands. It cancels motions, the software's restart all actions."""
+        """Restart one module; the robot stands until it is back.
+
+        A restart of the software cancels all actions, one of the base cancels motions.
+        """

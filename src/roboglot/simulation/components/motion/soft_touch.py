@@ -1,4 +1,4 @@
-"""The bumper's feelers: slow the robot ahead of obstacles, so that a touch is no blow.
+"""The bumper's feelers: slow the robot ahead of obstacles, so that a touch is not a blow.
 
 Rays in two level planes: equal distances in both mean an upright obstacle, a shorter lower one means a slope.
 """

@@ -1,6 +1,6 @@
 """The dog's motions by number, as walks, figures and body poses of the model. Knows no robot.
 
-Numbers that are not here are no motions of the dog's.
+Numbers that are not here are not motions of the dog's.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def refusal_of(robot: Robot, motion: int) -> MotionCode | None:
         if Health in robot and robot[Health].has(MOTOR_ALARM):
             return MotionCode.MOTOR_OFFLINE
         if motion in GOING and entered(robot):
-            return MotionCode.STATE  # its feet find no floor
+            return MotionCode.STATE  # it is held up or lies on its back: its feet do not touch the floor
         return _unfit(robot) if motion in FIGURES else None
     return MotionCode.LOW_BATTERY if state is MachineState.PROTECTED else MotionCode.STATE
 

@@ -1,4 +1,4 @@
-"""Reasons of refused motions in plain words, for the log and for viewers of the exchange. Knows no robot."""
+"""Reasons for refused motions in plain words, for the log and for viewers of the exchange. Knows no robot."""
 
 from __future__ import annotations
 

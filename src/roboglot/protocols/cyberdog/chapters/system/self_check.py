@@ -1,6 +1,6 @@
 """The self check of heartbeat and 10001: failed parts of the robot, in the words of ``SelfCheckStatus``.
 
-Warnings (a battery at 10 %, a step ahead) are no failures: the charge and the sensors show them.
+Warnings (a battery at 10 %, a step ahead) are not failures: the charge and the sensors show them.
 """
 
 from __future__ import annotations

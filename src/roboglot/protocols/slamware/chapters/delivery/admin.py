@@ -147,7 +147,7 @@ async def set_move_options(context: Context, body: dict[str, object] | None = No
 
 
 def _stored(policy: Policy) -> dict[str, object]:
-    """Return the settings; without unlisted flags from before this program refused them."""
+    """Return the stored settings, without the unlisted flags that earlier versions of this program accepted."""
     words = dict(policy.words)
     if isinstance(flags := words.get("flags"), list):
         words["flags"] = [flag for flag in flags if flag in get_args(MoveFlag)]

@@ -160,7 +160,7 @@ async def search_path(context: Context, body: PathQuery) -> PathPoints:
 def create(context: Context, request: ActionRequest) -> Action:
     """Start an action in place of the current one. Raises HttpError 400 for a refusal."""
     running = context.robot.actions.running
-    before = [*running(ERRAND), *running(BASE)]  # an errand takes the base as late as its first drive
+    before = [*running(ERRAND), *running(BASE)]  # an errand takes the base only when it first drives
     factory = FACTORIES.get(action_word(request.action_name) or "")
     try:
         if factory is None:

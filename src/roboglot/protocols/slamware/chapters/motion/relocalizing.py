@@ -23,7 +23,7 @@ from roboglot.wire.slamware.chapters.platform import GeneralEvent
 
 RECOVER_SECONDS = 30.0  # s, unless the client sets a limit
 TURN = math.radians(60)  # between two searches
-PLACE_SECONDS = 4.0  # to find a place twice
+PLACE_SECONDS = 4.0  # s to find a place twice
 PAUSE_SECONDS = 0.5  # between two searches from the same place, and while it is being pushed
 
 

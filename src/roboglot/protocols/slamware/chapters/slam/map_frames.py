@@ -66,7 +66,7 @@ def frame_on_disk(robot: Robot) -> tuple[str, str, Sequence[float]] | None:
 def resumed(
     robot: Robot, floors: Sequence[FloorMap], digest: str, last: LastPlace | None
 ) -> tuple[FloorMap, Pose | None] | None:
-    """Return the floor and pose of the ``last`` place, or None for the pose of its dock; None if they are unknown.
+    """Return floor and pose of the ``last`` place (pose None: at its dock); None if the place is unknown.
 
     A robot that has come onto its dock while it was off, or has left it, was moved.
     """

@@ -1,4 +1,4 @@
-"""The loading of the saved map at a start, for which changes of the map wait: it would undo them."""
+"""Loading of the saved map at a start. Changes of the map wait until it has ended, as it would undo them."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Callable, Coroutine
 
 
 class MapStart:
-    """Starts of a map keeper, each a task that runs ``start``."""
+    """Runs a map keeper's ``start`` in a task, and lets changes of the map wait for its end."""
 
     def __init__(self, start: Callable[[], Coroutine[None, None, None]]) -> None:
         self._start = start
         self._task: asyncio.Task[None] | None = None
 
     def begin(self) -> asyncio.Task[None]:
-        """Return a task that starts, for which ``ended`` waits from now on."""
+        """Begin a start, for which ``ended`` waits from now on; return its task."""
         self._task = asyncio.get_running_loop().create_task(self._start(), name="loading the saved map")
         return self._task
 
