@@ -16,7 +16,7 @@ from roboglot.model.robot import Description, Robot
 from roboglot.model.tap import Direction
 from roboglot.recording.entries import Entry
 from roboglot.recording.lines import Target
-from roboglot.recording.proxy.relay import Book
+from roboglot.recording.proxy.relay import ExchangeWriter
 from roboglot.recording.reader import read_recording
 from roboglot.recording.sampler import Sampler
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -90,10 +90,10 @@ async def test_the_proxy_leaves_out_photos_and_named_fields(tmp_path: Path) -> N
     chunk = pb.FileChunk(buffer=b"some face").SerializeToString()
     for photos in (False, True):
         path = tmp_path / f"{photos}.mcap"
-        book = Book(path, Target("cyberdog://127.0.0.1"), "0", redact=["room"], photos=photos)
-        book.note("127.0.0.1:5", Direction.REPLY, "4004", chunk, "ok", None)
-        book.note("127.0.0.1:5", Direction.REQUEST, "6001", b'{"room": "bath", "token": "x"}', "", None)
-        book.close()
+        writer = ExchangeWriter(path, Target("cyberdog://127.0.0.1"), "0", redact=["room"], photos=photos)
+        writer.note("127.0.0.1:5", Direction.REPLY, "4004", chunk, "ok", None)
+        writer.note("127.0.0.1:5", Direction.REQUEST, "6001", b'{"room": "bath", "token": "x"}', "", None)
+        writer.close()
         picture, words = [exchange.payload for exchange in read_recording(path).exchanges]
         assert (b"some face" in picture) is photos
         assert json.loads(words) == {"room": "[redacted]", "token": "[redacted]"}

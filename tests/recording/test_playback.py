@@ -25,7 +25,7 @@ from roboglot.protocols import sections
 from roboglot.protocols.cyberdog.certificates import ensure_certificates, export_client
 from roboglot.recording.lines import Target
 from roboglot.recording.playback import open_playback
-from roboglot.recording.proxy.relay import Book
+from roboglot.recording.proxy.relay import ExchangeWriter
 from roboglot.recording.reader import read_recording
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
@@ -205,11 +205,11 @@ async def test_calls_end_with_the_status_of_the_recording(tmp_path: Path) -> Non
     """A proxy's recording of a dog that was too busy for one call."""
     export_client(tmp_path / "data" / "cyberdog", tmp_path / "certificates")
     path = tmp_path / "dog.mcap"
-    book = Book(path, Target(f"cyberdog://{ADDRESS}"), "0")
+    writer = ExchangeWriter(path, Target(f"cyberdog://{ADDRESS}"), "0")
     for status, payload in (("ok", b'{"gears": 1}'), ("error RESOURCE_EXHAUSTED", b"")):
-        asked = book.note("127.0.0.1:1", Direction.REQUEST, "8013", status.encode(), "", None)
-        book.note("127.0.0.1:1", Direction.REPLY, "8013", payload, status, asked)
-    book.close()
+        asked = writer.note("127.0.0.1:1", Direction.REQUEST, "8013", status.encode(), "", None)
+        writer.note("127.0.0.1:1", Direction.REPLY, "8013", payload, status, asked)
+    writer.close()
 
     async def ask(host: str) -> list[str]:
         line = Target(f"cyberdog://{host}?certs={tmp_path / 'certificates'}").line(RealClock(), lambda *_: None)

@@ -12,7 +12,7 @@ from roboglot.model.robot import Robot
 from roboglot.protocols.ros2.table import Messages
 from roboglot.recording.reader import Record
 from roboglot.recording.readings import READINGS, Reading, readings_of
-from roboglot.recording.ros2.translation import Ros2Words, read_cdr
+from roboglot.recording.ros2.translation import Ros2Translator, read_cdr
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 
@@ -20,7 +20,7 @@ from roboglot.simulation.world.world_files import load_world
 @pytest.mark.parametrize("reading", READINGS, ids=lambda reading: reading.topic)
 def test_reading_becomes_its_ros_message(reading: Reading) -> None:
     data = json.dumps(dict.fromkeys(reading.names, 2.0)).encode()
-    [message] = Ros2Words().translate(Record(f"/a/{reading.topic}", reading.schema, 0, data))
+    [message] = Ros2Translator().translate(Record(f"/a/{reading.topic}", reading.schema, 0, data))
     decoded: Any = read_cdr(message.data, reading.ros)
     assert (message.topic, decoded.header.frame_id) == (f"/a/{reading.topic}", "a/base_link")
     assert reading.topic in Messages.implemented()

@@ -11,8 +11,8 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk, Message
 
+from roboglot.recording.message_index import MessageIndex
 from roboglot.recording.reader import BadRecording, read_recording
-from roboglot.recording.reel import Reel
 from roboglot.wire import mcap_chunks
 from roboglot.wire.mcap_chunks import records_in
 
@@ -82,7 +82,7 @@ def test_swarms_of_records_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         records_in(chunk(10 * MESSAGE, "zstd", 10 * len(MESSAGE)))
 
 
-@pytest.mark.parametrize("read", [read_recording, Reel])
+@pytest.mark.parametrize("read", [read_recording, MessageIndex])
 def test_files_unpack_to_a_bounded_multiple(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, read: type) -> None:
     monkeypatch.setattr(mcap_chunks, "FILE_UNPACKED", 1 << 20)
     body = record(99, bytes(1 << 20))

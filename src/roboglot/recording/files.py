@@ -72,7 +72,7 @@ class Channel:
 class OpenChunk:
     """Messages collected beside the library's writer, which would take five times as long, and their compression.
 
-    New schemas and channels are the library's, and stand before the messages.
+    The library writes new schemas and channels, before the messages.
     """
 
     def __init__(self, writer: Writer, file: IO[bytes], level: int = LEVEL) -> None:

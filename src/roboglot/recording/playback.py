@@ -69,7 +69,8 @@ class Playback(StandIn):
         asked, pushes = pair(exchanges)
         for one in asked:
             door = self._doors[one.request.door]
-            found = normal(one.request.door, self._redaction.exchange(one.request).payload)  # those of older versions
+            # Older versions redacted fewer fields; live requests are redacted as now before they are matched.
+            found = normal(one.request.door, self._redaction.exchange(one.request).payload)
             place = len(door.asked)
             door.asked.append((one, found))
             key = f"{one.request.operation}\n{found.text}"

@@ -32,7 +32,7 @@ EXCHANGES_MAX = 2_000_000
 
 
 class BadRecording(ValueError):
-    """The file is not a recording of roboglot's; the message says why."""
+    """The file is not a recording of roboglot's; the message gives the reason."""
 
 
 @dataclass(slots=True)
@@ -70,7 +70,7 @@ class Recording:
         return sorted({exchange.robot for exchange in self.exchanges})
 
     @property
-    def everyone(self) -> Sequence[str]:
+    def all_robots(self) -> Sequence[str]:
         """Names of all robots in it, also of those without exchanges, sorted."""
         return sorted({topic.split("/")[1] for topic in self.topics if topic.count("/") > 1} - {"truth"})
 

@@ -18,8 +18,8 @@ from mcap.writer import Writer
 from roboglot.config import RecordConfig, load_config
 from roboglot.model.clock import LockstepClock
 from roboglot.protocols import DOORS, sections
+from roboglot.recording.message_index import MessageIndex, TimedMessage
 from roboglot.recording.reader import Recording, read_messages, read_recording, records
-from roboglot.recording.reel import Reel, Shot
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
 from tests.protocols.foxglove.conftest import ADDRESS, Opened, Scene, Viewer
@@ -205,14 +205,14 @@ async def test_many_jumps_at_once_are_one_read(playing: Scene, film: Path, monke
     await ask(viewer, PAUSED, seek=recording.first + NANO)
     there = recorded(film, "/a/pose", lambda at: at < recording.first + NANO)[-1][0]
     await viewer.until(lambda: there in [at for at, _ in viewer.data.get(pose, ())])  # or it comes among those below
-    look, free, looks = Reel.last, threading.Event(), list[int]()
+    look, free, looks = MessageIndex.last, threading.Event(), list[int]()
 
-    def slowly(reel: Reel, at: int, topics: Collection[int]) -> list[Shot]:
+    def slowly(index: MessageIndex, at: int, topics: Collection[int]) -> list[TimedMessage]:
         looks.append(at)
         assert free.wait(60)
-        return look(reel, at, topics)
+        return look(index, at, topics)
 
-    monkeypatch.setattr(Reel, "last", slowly)
+    monkeypatch.setattr(MessageIndex, "last", slowly)
     for number in range(2, 18):
         assert (await ask(viewer, PAUSED, seek=recording.first + number * NANO)).sought
     viewer.data.clear()

@@ -24,7 +24,7 @@ from roboglot.protocols.cyberdog.certificates import ensure_certificates, export
 from roboglot.protocols.robomaster.datagrams import Datagrams
 from roboglot.recording.lines import Target
 from roboglot.recording.proxy.dog import DogRelay, Proof
-from roboglot.recording.proxy.relay import Book, Relay
+from roboglot.recording.proxy.relay import ExchangeWriter, Relay
 from roboglot.recording.proxy.sniffers import rest_operation
 from roboglot.recording.reader import pair, read_recording
 from roboglot.testing.addresses import free_addresses, free_port
@@ -37,14 +37,14 @@ BETWEEN, ROBOT, OTHER = free_addresses(1), free_addresses(1), free_addresses(1)
 
 async def between(url: str, path: Path, script: Any, sums: list[str] | None = None) -> Any:
     """Run a client against the relay, and return its result; ``sums`` gets the summary of delays."""
-    book = Book(path, Target(url), "0")
-    relay = Relay(Target(url), BETWEEN, book)
+    writer = ExchangeWriter(path, Target(url), "0")
+    relay = Relay(Target(url), BETWEEN, writer)
     await relay.open()
     try:
         return await script(BETWEEN)
     finally:
         await relay.close()
-        book.close()
+        writer.close()
         if sums is not None:
             sums.append(relay.watch.summary())
 
@@ -107,8 +107,8 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
     target = Target(f"cyberdog://{ADDRESS}?certs={certificates}&app={called}")
     phone = Phone(BETWEEN, certificates)
     await phone.open()
-    book = Book(passed, target, "0")
-    relay = DogRelay(target, BETWEEN, book, Proof(proof.certificate, proof.key, proof.callers), phone.port)
+    writer = ExchangeWriter(passed, target, "0")
+    relay = DogRelay(target, BETWEEN, writer, Proof(proof.certificate, proof.key, proof.callers), phone.port)
 
     async def through(_: str) -> Any:
         await relay.open()
@@ -116,7 +116,7 @@ async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
             return await phone.run(PROGRAM)  # the frames come as pushes
         finally:
             await relay.close()
-            book.close()
+            writer.close()
 
     try:
         said = await run(tmp_path, "cyberdog2", str(own), through, cyberdog={"app": f"127.0.0.1:{called}"})
@@ -304,9 +304,9 @@ async def test_dog_s_message_that_cannot_be_read_passes(tmp_path: Path) -> None:
         return server
 
     target = Target(f"cyberdog://{ADDRESS}:{robot_port}?certs=none&app={called}")
-    book = Book(path, target, "0")
+    writer = ExchangeWriter(path, target, "0")
     ends = [await serve(f"{ADDRESS}:{robot_port}"), await serve(f"127.0.0.1:{app_port}")]
-    relay = DogRelay(target, BETWEEN, book, None, app_port)
+    relay = DogRelay(target, BETWEEN, writer, None, app_port)
     await relay.open()
     try:
         async with (
@@ -320,7 +320,7 @@ async def test_dog_s_message_that_cannot_be_read_passes(tmp_path: Path) -> None:
             beaten = await dog.unary_unary("/grpcapi.GrpcApp/heartbeat")(UNREADABLE + b" 3")
     finally:
         await relay.close()
-        book.close()
+        writer.close()
         await asyncio.gather(*(end.stop(None) for end in ends))
     assert heard == [UNREADABLE + b" 1", REFUSED, UNREADABLE + b" 2", UNREADABLE + b" 3"]
     refused = pair(read_recording(path).of(door="cyberdog"))[0][1]

@@ -26,7 +26,7 @@ pytest.importorskip("rosbags", reason="needs roboglot[logs]")
 from rosbags.highlevel import AnyReader
 
 from roboglot.recording.ros2.bag import export
-from roboglot.recording.ros2.translation import Ros2Words, read_cdr
+from roboglot.recording.ros2.translation import Ros2Translator, read_cdr
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -108,11 +108,11 @@ async def test_impossible_exports_are_refused(drive: tuple[Path, float], tmp_pat
 
 def test_a_damaged_message_is_an_error() -> None:
     with pytest.raises(ValueError, match="/a/scan"):
-        list(Ros2Words().translate(Record("/a/scan", "foxglove.LaserScan", 0, b"\xff\xff\xff")))
+        list(Ros2Translator().translate(Record("/a/scan", "foxglove.LaserScan", 0, b"\xff\xff\xff")))
 
 
 def test_scan_without_known_limits_fits_its_echoes() -> None:
-    words = Ros2Words()
+    words = Ros2Translator()
     for echoes, farthest in (([1.0, math.inf, 3.0], 3.0), ([2.0, math.nan], 3.0)):
         scan = TYPES["foxglove.LaserScan"](frame_id="a/laser", ranges=echoes).SerializeToString()
         [message] = words.translate(Record("/a/scan", "foxglove.LaserScan", 0, scan))
@@ -121,6 +121,6 @@ def test_scan_without_known_limits_fits_its_echoes() -> None:
 
 
 def test_a_battery_that_says_little_is_translated() -> None:
-    messages = list(Ros2Words().translate(Record("/a/battery", "roboglot.Battery", 5, b'{"percentage": 0.5}')))
+    messages = list(Ros2Translator().translate(Record("/a/battery", "roboglot.Battery", 5, b'{"percentage": 0.5}')))
     assert [message.topic for message in messages] == ["/a/battery_state", "/a/battery/state"]
     assert math.isfinite(messages[0].at)

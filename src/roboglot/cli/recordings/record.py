@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
     from roboglot.recording.lines import Target
     from roboglot.recording.proxy.dog import DogRelay
-    from roboglot.recording.proxy.relay import Book, Relay
+    from roboglot.recording.proxy.relay import ExchangeWriter, Relay
 
 Data = Annotated[Path | None, typer.Option(envvar="ROBOGLOT_DATA", help="The folder that `roboglot up` uses.")]
 
@@ -105,30 +105,30 @@ def proxy(
 ) -> None:
     """Pass every byte between a client and a robot, and record the messages, until Ctrl-C."""
     from roboglot.recording.lines import Target
-    from roboglot.recording.proxy.relay import Book, Relay
+    from roboglot.recording.proxy.relay import ExchangeWriter, Relay
 
     if to.exists():
         sys.exit(f"roboglot record: {to} exists already; --to names a new file")
-    book: Book | None = None
+    writer: ExchangeWriter | None = None
     try:
         target = Target(url)
-        book = Book(to, target, metadata.version("roboglot"), redact=redact or (), photos=photos)
-        relay = _dog_relay(target, listen, book, data) if target.door == "cyberdog" else Relay(target, listen, book)
+        writer = ExchangeWriter(to, target, metadata.version("roboglot"), redact=redact or (), photos=photos)
+        relay = _dog_relay(target, listen, writer, data) if target.door == "cyberdog" else Relay(target, listen, writer)
         run(_pass(relay, f"{listen} passes everything to {url} and back; it is recorded in {to}"))
     except (OSError, ValueError) as error:
-        if book is not None:  # nothing has passed
-            book.close()
+        if writer is not None:  # nothing has passed
+            writer.close()
             to.unlink(missing_ok=True)
         sys.exit(f"roboglot record: {in_words(error)}")
-    book.close()
-    if book.thread.failure:
-        sys.exit(f"roboglot record: the recording ended early: {book.thread.failure}")
-    print(f"{book.files.written} messages are in {to}")
+    writer.close()
+    if writer.thread.failure:
+        sys.exit(f"roboglot record: the recording ended early: {writer.thread.failure}")
+    print(f"{writer.files.written} messages are in {to}")
     if delays := relay.watch.summary():
         print(delays)
 
 
-def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> DogRelay:
+def _dog_relay(target: Target, listen: str, writer: ExchangeWriter, data: Path | None) -> DogRelay:
     """Return a relay that has our certificates of the data folder towards the app. Raises OSError, ValueError."""
     from roboglot.protocols.cyberdog.certificates import ensure_certificates
     from roboglot.protocols.cyberdog.pem_files import FOLDER
@@ -137,9 +137,9 @@ def _dog_relay(target: Target, listen: str, book: Book, data: Path | None) -> Do
     if "certs" not in target.options:
         raise ValueError("a CyberDog requires a certificate: cyberdog://HOST?certs=FOLDER, or none for plain gRPC")
     if target.options["certs"] == "none":
-        return DogRelay(target, listen, book, None)
+        return DogRelay(target, listen, writer, None)
     own = ensure_certificates((data or default_data_folder(os.environ)) / FOLDER)
-    return DogRelay(target, listen, book, Proof(own.certificate, own.key, own.callers))
+    return DogRelay(target, listen, writer, Proof(own.certificate, own.key, own.callers))
 
 
 async def _pass(relay: Relay | DogRelay, words: str) -> None:

@@ -19,9 +19,9 @@ from roboglot.model.errors import NotReady
 from roboglot.model.robot import Robot
 from roboglot.model.stand_in import Recorded
 from roboglot.protocols.foxglove.channels import Channel, Listener, PlaybackCommand
+from roboglot.recording.message_index import MessageIndex, TimedMessage
 from roboglot.recording.reader import BadRecording
 from roboglot.recording.readings import BY_SCHEMA
-from roboglot.recording.reel import Reel, Shot
 from roboglot.wire.foxglove.messages import Playback, PlayStatus
 
 log = logging.getLogger(__name__)
@@ -37,14 +37,14 @@ STATES = frozenset(
 class Player:
     """Player of one file, on the clock's time: a faster or stopped clock plays faster or stops."""
 
-    def __init__(self, robot: Robot, recorded: Recorded, reel: Reel) -> None:
-        self._clock, self._reel, self._recorded = robot.clock, reel, recorded
+    def __init__(self, robot: Robot, recorded: Recorded, index: MessageIndex) -> None:
+        self._clock, self._index, self._recorded = robot.clock, index, recorded
         foreign = tuple(f"{start}/{other}/" for other in recorded.others for start in ("", "/truth"))
-        self._channels: Mapping[int, Channel] = {  # by index in the reel
+        self._channels: Mapping[int, Channel] = {  # by the topic's number in the index
             place: Channel(
                 place + 1, topic.name, topic.encoding, topic.schema, topic.schema_encoding, topic.schema_data
             )
-            for place, topic in enumerate(reel.topics)
+            for place, topic in enumerate(index.topics)
             if not topic.name.startswith(foreign)
         }
         self._listeners: list[Listener] = []
@@ -52,7 +52,7 @@ class Player:
         self._beating: asyncio.Task[None] | None = None
         self._playing: asyncio.Task[None] | None = None
         self._showing: asyncio.Task[None] | None = None
-        self._reading: asyncio.Future[Sequence[Shot]] | None = None
+        self._reading: asyncio.Future[Sequence[TimedMessage]] | None = None
         self._broken = ""  # why the file can no longer be read
         self._rewind()
 
@@ -149,7 +149,7 @@ class Player:
             if sought:
                 await self._show(self._at)
             if self._status is PlayStatus.PLAYING:
-                await self._play_on(self._reel.play(self._next))
+                await self._play_on(self._index.play(self._next))
         except (OSError, BadRecording) as error:
             log.warning("playback of %s ends: %s", self._recorded.path, error)
             self._broken = str(error)
@@ -158,20 +158,20 @@ class Player:
             for listener in tuple(self._listeners):
                 listener.played(self._state())
 
-    async def _play_on(self, batches: Iterator[Sequence[Shot]]) -> None:
+    async def _play_on(self, batches: Iterator[Sequence[TimedMessage]]) -> None:
         while batch := await self._read(batches):
-            for shot in batch:
-                due = self._since + (shot.at - self._at) / NANO / self._speed
+            for message in batch:
+                due = self._since + (message.at - self._at) / NANO / self._speed
                 if due > self._clock.time():
                     await self._clock.sleep_until(due)
-                self._deliver(shot)
-                self._next = shot.at + 1
+                self._deliver(message)
+                self._next = message.at + 1
 
-    async def _read(self, batches: Iterator[Sequence[Shot]]) -> Sequence[Shot]:
+    async def _read(self, batches: Iterator[Sequence[TimedMessage]]) -> Sequence[TimedMessage]:
         """Return the next messages; none at the end."""
         return await self._beside(partial(next, batches, ()))
 
-    async def _beside(self, read: Callable[[], Sequence[Shot]]) -> Sequence[Shot]:
+    async def _beside(self, read: Callable[[], Sequence[TimedMessage]]) -> Sequence[TimedMessage]:
         """Read in a thread after the previous job has ended, which continues even if no longer awaited."""
         with self._clock.holding():
             while self._reading is not None and not self._reading.done():
@@ -187,11 +187,11 @@ class Player:
             for listener in tuple(self._listeners):
                 listener.beat(self._now(), seldom=number % SELDOM == 0)
 
-    def _deliver(self, shot: Shot) -> None:
-        if (channel := self._channels.get(shot.topic)) is not None:
+    def _deliver(self, message: TimedMessage) -> None:
+        if (channel := self._channels.get(message.topic)) is not None:
             for listener in tuple(self._listeners):
                 if (subscription := listener.wants(channel.id)) is not None:
-                    listener.deliver(subscription, shot.at, shot.data)
+                    listener.deliver(subscription, message.at, message.data)
 
     # -- the state at a moment --
 
@@ -202,8 +202,8 @@ class Player:
             for place, channel in self._channels.items()
             if channel.schema in STATES and any(one.wants(channel.id) is not None for one in self._listeners)
         }
-        for shot in await self._last(at - 1, wanted):
-            self._deliver(shot)
+        for message in await self._last(at - 1, wanted):
+            self._deliver(message)
 
     async def _show_newcomers(self) -> None:
         set_client("")
@@ -211,18 +211,18 @@ class Player:
             newcomers, self._newcomers = self._newcomers, []
             wanted = {number - 1 for _, number, _ in newcomers if self._channels[number - 1].schema in STATES}
             try:
-                found = {shot.topic: shot for shot in await self._last(self._next - 1, wanted)}
+                found = {message.topic: message for message in await self._last(self._next - 1, wanted)}
             except (OSError, BadRecording) as error:
                 log.warning("cannot show %s to a new subscriber: %s", self._recorded.path, error)
                 return
             for listener, number, subscription in newcomers:
-                if (shot := found.get(number - 1)) is not None and listener.wants(number) == subscription:
-                    listener.deliver(subscription, shot.at, shot.data)
+                if (message := found.get(number - 1)) is not None and listener.wants(number) == subscription:
+                    listener.deliver(subscription, message.at, message.data)
 
-    async def _last(self, at: int, places: set[int]) -> Sequence[Shot]:
+    async def _last(self, at: int, places: set[int]) -> Sequence[TimedMessage]:
         if not places:
             return ()
-        return await self._beside(partial(self._reel.last, at, places))
+        return await self._beside(partial(self._index.last, at, places))
 
 
 async def open_source(robot: Robot) -> Player:
@@ -230,4 +230,4 @@ async def open_source(robot: Robot) -> Player:
     assert robot.stand_in is not None
     recorded = robot.stand_in.recorded
     assert recorded is not None
-    return Player(robot, recorded, await beside(partial(Reel, recorded.path)))
+    return Player(robot, recorded, await beside(partial(MessageIndex, recorded.path)))

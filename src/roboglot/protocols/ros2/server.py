@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from zenoh.ext import AdvancedPublisher
 
     from roboglot.recording.entries import Entry
-    from roboglot.recording.ros2.translation import Ros2Words, RosMessage
+    from roboglot.recording.ros2.translation import Ros2Translator, RosMessage
     from roboglot.recording.sampler import Sampler
 
 log = logging.getLogger(__name__)
@@ -69,7 +69,7 @@ class Ros2Door:
         self._tasks: set[asyncio.Task[None]] = set()
         self._sampler: Sampler | None = None
         self._battery: Entry | None = None
-        self._translator: Ros2Words | None = None
+        self._translator: Ros2Translator | None = None
 
     @property
     def endpoints(self) -> Sequence[Endpoint]:
@@ -80,7 +80,7 @@ class Ros2Door:
         return [Endpoint("ROS 2", self._locator, listen)]
 
     @property
-    def _words(self) -> Ros2Words:
+    def _words(self) -> Ros2Translator:
         assert self._translator is not None  # set when the door opens
         return self._translator
 
@@ -98,14 +98,14 @@ class Ros2Door:
         with explaining("the ROS 2 door", "ros2"):
             import zenoh
 
-            from roboglot.recording.ros2.translation import Ros2Words
+            from roboglot.recording.ros2.translation import Ros2Translator
             from roboglot.recording.sampler import Sampler
         loop = asyncio.get_running_loop()
         try:
             self._session = await loop.run_in_executor(None, zenoh.open, self._zenoh_config())
         except zenoh.ZError as error:
             raise OSError(f"{self._locator}: {error}") from None
-        self._translator = Ros2Words(self._robot.id)
+        self._translator = Ros2Translator(self._robot.id)
         self._node = Node(self._config.domain, str(self._session.zid()), f"/{self._namespace}", NODE)
         self._tokens.append(self._session.liveliness().declare_token(self._node.token))
         for key, type in TYPES.items():

@@ -32,7 +32,7 @@ def compare_recordings(one: Path, other: Path, mask: Mask, robot: str = "", door
 
 
 def _only_robot(recording: Recording) -> str:
-    names = recording.everyone
+    names = recording.all_robots
     if len(names) > 1:
         raise BadRecording(f"{recording.path} has the robots {', '.join(names)}: choose one with --robot")
     return names[0] if names else ""

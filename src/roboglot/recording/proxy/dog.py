@@ -21,7 +21,7 @@ from roboglot.model.tap import Direction
 from roboglot.recording.lines import Target, status_of
 from roboglot.recording.proxy.calls import Call, both
 from roboglot.recording.proxy.ends import Crossing, End, Place
-from roboglot.recording.proxy.relay import Book
+from roboglot.recording.proxy.relay import ExchangeWriter
 from roboglot.recording.proxy.sniffers import Note, Sniffer
 from roboglot.transport.tls import server_context
 from roboglot.values import dataclass
@@ -51,16 +51,18 @@ class DogRelay:
     URL: port on which the robot calls this machine (8981); the app is called at its own host, port ``called``.
     """
 
-    def __init__(self, target: Target, address: str, book: Book, proof: Proof | None, called: int = APP_PORT) -> None:
+    def __init__(
+        self, target: Target, address: str, writer: ExchangeWriter, proof: Proof | None, called: int = APP_PORT
+    ) -> None:
         """Raises ValueError if the URL's certificates cannot be read."""
-        self._target, self._address, self._book, self._called = target, address, book, called
+        self._target, self._address, self._writer, self._called = target, address, writer, called
         self._app_port = int(target.options.get("app", APP_PORT))
         own = _certificates(target)
         self._as_robot = _context(proof, server=True)
         self._to_app = _context(proof, server=False)
         self._as_app = _context(own, server=True)
         self._to_robot = _context(own, server=False)
-        self._crossing = Crossing(book.clock)
+        self._crossing = Crossing(writer.clock)
         self.watch = self._crossing.watch
         self._app_host = ""
         self._beats = Beats()
@@ -86,7 +88,7 @@ class DogRelay:
         def note(direction: Direction, operation: str, payload: bytes, status: str, began: float | None) -> float:
             if direction is Direction.REQUEST:
                 self._app_host = host
-            return self._book.note(f"{host}:{port}", direction, operation, payload, status, began)
+            return self._writer.note(f"{host}:{port}", direction, operation, payload, status, began)
 
         to = Place(self._target.host, self._target.port, self._to_robot, ROBOT_NAME)
         self._cross(app, to, AppSniffer(note))
@@ -97,7 +99,7 @@ class DogRelay:
             robot.transport.abort()
             return
         to = Place(self._app_host, self._called, self._to_app, APP_NAME)
-        self._cross(robot, to, RobotSniffer(partial(self._book.note, f"{to.host}:{to.port}"), self._beats))
+        self._cross(robot, to, RobotSniffer(partial(self._writer.note, f"{to.host}:{to.port}"), self._beats))
 
     def _cross(self, came: End, to: Place, sniffer: Sniffer) -> None:
         made = End(self.watch)

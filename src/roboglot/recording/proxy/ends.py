@@ -114,7 +114,7 @@ class _TimedPort(TlsPort):
 
 
 class End(asyncio.Protocol):
-    """One end of a connection; ``other`` gets its bytes first, then the sniffer a copy; no bytes are the end."""
+    """One end of a connection; ``other`` gets its bytes first, then the sniffer a copy; empty bytes mean the end."""
 
     transport: asyncio.Transport
 
@@ -186,7 +186,7 @@ class End(asyncio.Protocol):
             self.other.transport.resume_reading()
 
     def eof_received(self) -> bool:
-        """Pass on the end of the peer's data; close both ends where that cannot be said alone, as under TLS."""
+        """Pass on the end of the peer's data; close both ends where a half-close is impossible, as under TLS."""
         self._ended = True
         self._look(b"")
         if self.other is None:

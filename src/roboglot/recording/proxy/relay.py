@@ -27,7 +27,7 @@ SIDE_PORTS = {"robomaster": (40921, 40922, 40925)}  # video, audio, events: forw
 EVENTS, PUSHES = 40925, 40924
 
 
-class Book:
+class ExchangeWriter:
     """Writes exchanges to a recording, with the time of this machine."""
 
     def __init__(
@@ -88,12 +88,12 @@ class Book:
 class Relay:
     """Listens at ``address`` on the ports of the robot's protocol."""
 
-    def __init__(self, target: Target, address: str, book: Book) -> None:
+    def __init__(self, target: Target, address: str, writer: ExchangeWriter) -> None:
         """Raises ValueError for a protocol without a sniffer."""
         if target.door not in SNIFFERS:
             raise ValueError(f"no recording between a client and a robot of {target.door} yet")
-        self._target, self._address, self._book = target, address, book
-        self._crossing = Crossing(book.clock)
+        self._target, self._address, self._writer = target, address, writer
+        self._crossing = Crossing(writer.clock)
         self.watch = self._crossing.watch
         self._hosts: set[str] = set()
         self._datagrams: asyncio.DatagramTransport | None = None
@@ -121,7 +121,7 @@ class Relay:
 
     def _sniffer(self, name: str, port: int) -> Sniffer | None:
         def note(direction: Direction, operation: str, payload: bytes, status: str, began: float | None) -> float:
-            return self._book.note(name, direction, operation, payload, status, began)
+            return self._writer.note(name, direction, operation, payload, status, began)
 
         if port == self._target.port:
             return SNIFFERS[self._target.door](note)
@@ -158,7 +158,7 @@ class Relay:
     def _pushed(self, port: int, data: bytes) -> None:
         """Record a datagram of the robot."""
         words = data.decode("utf-8", "replace").split()[:2]
-        self._book.note(f"*:{port}", Direction.PUSH, f"> {' '.join(words)}", data, "", None)
+        self._writer.note(f"*:{port}", Direction.PUSH, f"> {' '.join(words)}", data, "", None)
 
     async def close(self) -> None:
         """Stop listening and hang up; returns when every connection is gone."""

@@ -11,7 +11,7 @@ from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, Qo
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
 from roboglot.recording.reader import BadRecording, read_messages
-from roboglot.recording.ros2.translation import STORE, Ros2Words, RosMessage
+from roboglot.recording.ros2.translation import STORE, Ros2Translator, RosMessage
 
 VERSION: Literal[8] = 8  # of metadata.yaml
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
@@ -37,7 +37,7 @@ def export(recording: Path, bag: Path, storage: str = "mcap", robot: str = "") -
 
 
 def _write(recording: Path, bag: Path, storage: str, robot: str) -> Counter[str]:
-    words, written = Ros2Words(robot), Counter[str]()
+    words, written = Ros2Translator(robot), Counter[str]()
     with Writer(bag, version=VERSION, storage_plugin=STORAGES[storage]) as writer:
         connections: dict[tuple[str, str], Any] = {}
         for record in read_messages(recording):

@@ -106,7 +106,7 @@ def _robot_of(record: Record) -> str:
     return record.topic.lstrip("/").partition("/")[0]
 
 
-class Ros2Words:
+class Ros2Translator:
     """Translates one recording, in its order, as speeds and ranges depend on earlier messages.
 
     ``robot``: only this robot's messages; empty: all.

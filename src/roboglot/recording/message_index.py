@@ -22,7 +22,7 @@ from roboglot.wire.mcap_damage import DAMAGE
 
 TOPICS_MAX = 4096
 WAITING_MAX = 1 << 30  # bytes of messages read ahead, because their chunks overlap
-SHOT_BYTES = 150  # of a message, beside its data
+MESSAGE_BYTES = 150  # of a message, beside its data
 RECORD_HEAD = 9  # bytes: opcode and length
 
 
@@ -37,8 +37,8 @@ class Topic:
     schema_data: bytes
 
 
-class Shot(NamedTuple):
-    """One message: its time in ns since 1970, the index of its topic in ``Reel.topics``, and its bytes."""
+class TimedMessage(NamedTuple):
+    """One message: its time in ns since 1970, the index of its topic in ``MessageIndex.topics``, and its bytes."""
 
     at: int
     topic: int
@@ -47,7 +47,7 @@ class Shot(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """One file, and the indices of its channels in ``Reel.topics``."""
+    """One file, and the indices of its channels in ``MessageIndex.topics``."""
 
     path: Path
     places: Mapping[int, int]
@@ -64,7 +64,7 @@ class _Chunk:
     topics: frozenset[int]
 
 
-class Reel:
+class MessageIndex:
     """The parts of one recording, each message once, in the order of their times."""
 
     def __init__(self, path: Path) -> None:
@@ -76,17 +76,17 @@ class Reel:
         self._chunks = sorted(found, key=lambda chunk: chunk.first)
         self._ends = list(accumulate((chunk.last for chunk in self._chunks), max))  # of each chunk and all before it
 
-    def play(self, since: int) -> Iterator[Sequence[Shot]]:
+    def play(self, since: int) -> Iterator[Sequence[TimedMessage]]:
         """Yield all messages at or after ``since`` (ns since 1970) in batches, ordered by time.
 
         Messages of the same time come together. Raises BadRecording, OSError.
         """
-        waiting: list[Shot] = []
+        waiting: list[TimedMessage] = []
         held = 0  # bytes in ``waiting``
         start = bisect_left(self._ends, since)
         for number, chunk in enumerate(self._chunks[start:], start + 1):
             if chunk.last >= since:
-                new = [shot for shot in self._read(chunk) if shot.at >= since]
+                new = [message for message in self._read(chunk) if message.at >= since]
                 held += _bytes_of(new)
                 if held > WAITING_MAX:
                     raise BadRecording(f"{chunk.part.path}: more than {WAITING_MAX} bytes in chunks of the same time")
@@ -99,18 +99,18 @@ class Reel:
                 yield waiting[:ready]
                 del waiting[:ready]
 
-    def last(self, at: int, topics: Collection[int]) -> list[Shot]:
+    def last(self, at: int, topics: Collection[int]) -> list[TimedMessage]:
         """Return the last message of each topic at or before ``at`` (ns since 1970). Raises BadRecording, OSError."""
-        found: dict[int, Shot] = {}
+        found: dict[int, TimedMessage] = {}
         for number in range(bisect_right(self._chunks, at, key=lambda chunk: chunk.first) - 1, -1, -1):
             # An entry is final when no earlier chunk reaches beyond it.
             sought = {place for place in topics if place not in found or found[place].at < self._ends[number]}
             if not sought:
                 break
             chunk = self._chunks[number]
-            for shot in self._read(chunk) if sought & chunk.topics else ():
-                if shot.at <= at and shot.topic in sought and shot.at >= found.get(shot.topic, shot).at:
-                    found[shot.topic] = shot
+            for message in self._read(chunk) if sought & chunk.topics else ():
+                if message.at <= at and message.topic in sought and message.at >= found.get(message.topic, message).at:
+                    found[message.topic] = message
         return sorted(found.values(), key=_time)
 
     # -- files --
@@ -165,7 +165,7 @@ class Reel:
         return found
 
     @staticmethod
-    def _read(chunk: _Chunk) -> list[Shot]:
+    def _read(chunk: _Chunk) -> list[TimedMessage]:
         path, places = chunk.part.path, chunk.part.places
         try:
             with path.open("rb") as file:
@@ -174,20 +174,20 @@ class Reel:
         except DAMAGE as error:
             raise BadRecording(f"{path} is damaged: {error}") from None
         return [
-            Shot(message.log_time, places[message.channel_id], message.data)
+            TimedMessage(message.log_time, places[message.channel_id], message.data)
             for message in inside
             if isinstance(message, Message) and message.channel_id in places
         ]
 
 
-def _time(shot: Shot) -> int:
-    return shot.at
+def _time(message: TimedMessage) -> int:
+    return message.at
 
 
-def _bytes_of(shots: Sequence[Shot]) -> int:
-    return sum(len(shot.data) + SHOT_BYTES for shot in shots)
+def _bytes_of(messages: Sequence[TimedMessage]) -> int:
+    return sum(len(message.data) + MESSAGE_BYTES for message in messages)
 
 
-def _before(shots: Sequence[Shot], until: int) -> int:
-    """Return the number of ``shots``, which are in order, before ``until`` (ns since 1970)."""
-    return bisect_right(shots, until - 1, key=_time)
+def _before(messages: Sequence[TimedMessage], until: int) -> int:
+    """Return the number of ``messages``, which are in order, before ``until`` (ns since 1970)."""
+    return bisect_right(messages, until - 1, key=_time)

@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
+from roboglot.recording.message_index import MessageIndex, TimedMessage
 from roboglot.recording.reader import BadRecording
-from roboglot.recording.reel import Reel, Shot
 
 MESSAGES = st.lists(st.tuples(st.integers(0, 2), st.integers(1, 60)), min_size=1, max_size=40)
 FLUSHED = st.sets(st.integers(0, 40))  # messages before which a chunk ends
@@ -42,12 +42,12 @@ def test_all_come_from_any_moment_in_their_order(
 ) -> None:
     path = tmp_path / "r.mcap"
     write(path, messages, flushed, whole=whole)
-    reel = Reel(path)
-    names = [int(topic.name[2:]) for topic in reel.topics]
-    batches = list(reel.play(since))
-    played = [shot for batch in batches for shot in batch]
-    assert [shot.at for shot in played] == sorted(at for _, at in messages if at >= since)
-    found = {(names[shot.topic], shot.at, shot.data) for shot in played}
+    index = MessageIndex(path)
+    names = [int(topic.name[2:]) for topic in index.topics]
+    batches = list(index.play(since))
+    played = [message for batch in batches for message in batch]
+    assert [message.at for message in played] == sorted(at for _, at in messages if at >= since)
+    found = {(names[message.topic], message.at, message.data) for message in played}
     numbered = enumerate(messages)
     assert found == {(topic, at, struct.pack("<I", number)) for number, (topic, at) in numbered if at >= since}
     for before, after in pairwise(batches):  # messages of one instant stay together
@@ -61,31 +61,33 @@ def test_the_last_of_each_topic_is_found(
 ) -> None:
     path = tmp_path / "r.mcap"
     write(path, messages, flushed, whole=whole)
-    reel = Reel(path)
-    places = {int(topic.name[2:]): place for place, topic in enumerate(reel.topics)}
-    found = reel.last(at, {places[topic] for topic in wanted if topic in places})
+    index = MessageIndex(path)
+    places = {int(topic.name[2:]): place for place, topic in enumerate(index.topics)}
+    found = index.last(at, {places[topic] for topic in wanted if topic in places})
     due = {topic: [when for one, when in messages if one == topic and when <= at] for topic in wanted}
-    assert {(shot.topic, shot.at) for shot in found} == {(places[topic], max(at)) for topic, at in due.items() if at}
-    assert all(isinstance(shot, Shot) for shot in found)
+    assert {(message.topic, message.at) for message in found} == {
+        (places[topic], max(at)) for topic, at in due.items() if at
+    }
+    assert all(isinstance(message, TimedMessage) for message in found)
 
 
 def test_parts_are_one_recording(tmp_path: Path) -> None:
     write(tmp_path / "r.mcap", [(0, 1), (1, 2)], set())
     write(tmp_path / "r-002.mcap", [(1, 3), (2, 4)], set(), whole=False)
-    reel = Reel(tmp_path / "r.mcap")
-    assert [shot.at for batch in reel.play(2) for shot in batch] == [2, 3, 4]
-    assert [topic.name for topic in reel.topics] == ["/t0", "/t1", "/t2"]
+    index = MessageIndex(tmp_path / "r.mcap")
+    assert [message.at for batch in index.play(2) for message in batch] == [2, 3, 4]
+    assert [topic.name for topic in index.topics] == ["/t0", "/t1", "/t2"]
 
 
 def test_damaged_chunk_is_no_end_of_program(tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
     write(path, [(0, at) for at in range(1, 40)], {20})
-    reel = Reel(path)
+    index = MessageIndex(path)
     data = bytearray(path.read_bytes())
     data[110:120] = bytes(10)
     path.write_bytes(data)
     with pytest.raises(BadRecording, match="damaged"):
-        list(reel.play(0))
+        list(index.play(0))
     (tmp_path / "no.mcap").write_bytes(b"no recording")
     with pytest.raises(BadRecording):
-        Reel(tmp_path / "no.mcap")
+        MessageIndex(tmp_path / "no.mcap")
