@@ -97,7 +97,7 @@ async def _stream(
 
 
 def _may_watch(robot: Robot) -> bool:
-    """Return whether the client has still the right to see the robot, and has not signed out."""
+    """Return whether the client still has the right to see the robot, and has not signed out."""
     return session_lasts.get()() and robot.admission.may(Right.SEE)
 
 

@@ -162,7 +162,7 @@ class Classes:
         return class_
 
     async def _save(self, changed: OpenClass) -> None:
-        """Write the class of this console's page, if it has changed, or that there is none."""
+        """Write the open class of this console's page, or its absence, if that has changed."""
         if self._file is None or (self._current is not None and changed is not self._current):
             return
         async with self._writing:

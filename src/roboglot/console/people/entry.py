@@ -54,7 +54,7 @@ async def enter(desk: Desk, sessions: Sessions, scope: Scope) -> str:
 
 
 def _vouched(kept: Proof) -> Proof:
-    """Return a session's proof: it is not a guess, as the valid cookie came with it."""
+    """Return a session's proof, of a kind that does not count as a guess: a valid cookie came with it."""
     return Proof(ProofKind.SESSION, kept.value) if kept.kind is ProofKind.HTTP else kept
 
 

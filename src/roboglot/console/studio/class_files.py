@@ -14,10 +14,10 @@ import msgspec
 T = TypeVar("T")
 log = logging.getLogger(__name__)
 CLASS, OPEN_CLASS = "class.json", "open_class.json"
-CLASSES_MAX, BAGS_MAX, FILE_MAX = 20, 60, 4_000_000  # folders; files in each; bytes read of a file
+CLASSES_MAX, WORKS_MAX, FILE_MAX = 20, 60, 4_000_000  # folders; files in each; bytes read of a file
 
 
-class Bag(msgspec.Struct):
+class PupilWork(msgspec.Struct):
     """Stored work of a pupil: the program as last seen and as handed in, and its world."""
 
     name: str = ""
@@ -29,14 +29,14 @@ class Bag(msgspec.Struct):
     all_stars: int = 0
 
 
-class Sheet(msgspec.Struct):
+class ClassRecord(msgspec.Struct):
     """A class. ``until``: Unix time (s) at which its code admits no more pupils."""
 
     code: str
     name: str
     only: str = ""
     until: float = 0.0
-    bags: list[Bag] = []
+    works: list[PupilWork] = []
 
 
 class KeptClass(msgspec.Struct):
@@ -82,41 +82,41 @@ class ClassFiles:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def load(self) -> list[Sheet]:
+    def load(self) -> list[ClassRecord]:
         """Return all classes, the oldest first; unreadable ones are skipped with a warning."""
         try:
             folders = sorted((f for f in self._folder.iterdir() if f.is_dir()), key=lambda f: f.stat().st_mtime)
         except FileNotFoundError:
             return []
-        return [sheet for folder in folders[-CLASSES_MAX:] if (sheet := _read_class(folder)) is not None]
+        return [record for folder in folders[-CLASSES_MAX:] if (record := _read_class(folder)) is not None]
 
     def begin(self, code: str, name: str, only: str, until: float) -> None:
         """Write a class, replacing its former data. Raises OSError."""
         folder = self._folder / code
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        _write(folder / CLASS, msgspec.json.encode(Sheet(code, name, only, until)))
+        _write(folder / CLASS, msgspec.json.encode(ClassRecord(code, name, only, until)))
 
-    def keep(self, code: str, bag: Bag) -> None:
+    def keep(self, code: str, work: PupilWork) -> None:
         """Write a pupil's work, replacing the former. Raises OSError."""
-        name = hashlib.sha256(bag.name.encode("utf-8", "surrogatepass")).hexdigest()[:24]
-        _write(self._folder / code / f"{name}.json", msgspec.json.encode(bag))
+        name = hashlib.sha256(work.name.encode("utf-8", "surrogatepass")).hexdigest()[:24]
+        _write(self._folder / code / f"{name}.json", msgspec.json.encode(work))
 
     def end(self, code: str) -> None:
         """Delete a class."""
         shutil.rmtree(self._folder / code, ignore_errors=True)
 
 
-def _read_class(folder: Path) -> Sheet | None:
+def _read_class(folder: Path) -> ClassRecord | None:
     try:
-        sheet = _read(folder / CLASS, Sheet)
-        if sheet.code != folder.name:
-            raise ValueError(f"it belongs to class {sheet.code!r}")
+        record = _read(folder / CLASS, ClassRecord)
+        if record.code != folder.name:
+            raise ValueError(f"it belongs to class {record.code!r}")
         files = sorted(file for file in folder.glob("*.json") if file.name != CLASS)
-        sheet.bags = [_read(file, Bag) for file in files[:BAGS_MAX]]
+        record.works = [_read(file, PupilWork) for file in files[:WORKS_MAX]]
     except (OSError, ValueError, msgspec.MsgspecError) as error:
         log.warning("left out the class in %s: %s", folder, error)
         return None
-    return sheet
+    return record
 
 
 def _read(file: Path, kind: type[T]) -> T:

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import msgspec
 
-from roboglot.console.studio.class_files import Bag, ClassFiles
+from roboglot.console.studio.class_files import ClassFiles, PupilWork
 from roboglot.console.studio.class_requests import Doing, Member
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.errors import NotFound, Refused
@@ -58,12 +58,12 @@ class Pupil:
     robot: str = ""
     seat: Seat | None = None
     doing: Doing = field(default_factory=Doing)
-    bag: Bag = field(default_factory=Bag)
+    work: PupilWork = field(default_factory=PupilWork)
 
 
 def _idle(pupil: Pupil) -> bool:
     """Return whether a pupil can be dropped without loss: no page, no program, no star."""
-    return pupil.seat is None and not (pupil.bag.style or pupil.bag.handed or pupil.doing.stars)
+    return pupil.seat is None and not (pupil.work.style or pupil.work.handed or pupil.doing.stars)
 
 
 class Class:
@@ -88,7 +88,7 @@ class Class:
                 del self.pupils[idle.name]
             if len(self.pupils) >= PUPILS_MAX:
                 raise Refused(f"the class has {PUPILS_MAX} pupils")
-            self.pupils[name] = Pupil(name, world=NOWHERE, bag=Bag(name))
+            self.pupils[name] = Pupil(name, world=NOWHERE, work=PupilWork(name))
         return self.pupils[name]
 
     def notify_teachers(self) -> None:
@@ -101,7 +101,7 @@ class Class:
         rows = [
             {"name": p.name, "world": p.world, "robot": p.robot, "here": p.seat is not None}
             | msgspec.to_builtins(p.doing)
-            | {"handed": bool(p.bag.handed), "handed_stars": p.bag.stars}
+            | {"handed": bool(p.work.handed), "handed_stars": p.work.stars}
             for p in self.pupils.values()
         ]
         for seat in self.teachers:
@@ -147,12 +147,12 @@ class Classroom:
         self._files, self._writing, self.now = files, asyncio.Lock(), now or SteadyTime()
         self.worlds: dict[str, World] = {}
         self.classes: dict[str, Class] = {}
-        for sheet in files.load() if files else []:
-            kept = self.classes[sheet.code] = Class(sheet.code, sheet.name, sheet.only)
-            kept.until = sheet.until
-            for bag in sheet.bags:
-                doing = Doing(stars=bag.all_stars, program=bag.program)
-                kept.pupils[bag.name] = Pupil(bag.name, bag.world, "", None, doing, bag)
+        for record in files.load() if files else []:
+            kept = self.classes[record.code] = Class(record.code, record.name, record.only)
+            kept.until = record.until
+            for work in record.works:
+                doing = Doing(stars=work.all_stars, program=work.program)
+                kept.pupils[work.name] = Pupil(work.name, work.world, "", None, doing, work)
 
     def seat(self, post: Tell, world: str = "") -> Seat:
         """Return a place for a page of a world."""
@@ -222,11 +222,11 @@ class Classroom:
 
     async def keep(self, code: str, pupil: Pupil) -> None:
         """Save a pupil's data, if there are any. Raises Refused if it cannot be kept."""
-        if self._files is None or not (pupil.bag.style or pupil.bag.handed):
+        if self._files is None or not (pupil.work.style or pupil.work.handed):
             return
         try:
             async with self._writing:  # in order, so that the newest stays
-                await asyncio.to_thread(self._files.keep, code, pupil.bag)
+                await asyncio.to_thread(self._files.keep, code, pupil.work)
         except OSError as error:
             log.error("cannot store the program handed in by %s: %s", pupil.name, error)
             raise Refused("it cannot be saved on the disk of the teacher's machine") from None
@@ -237,7 +237,7 @@ class Classroom:
         if pupil.world not in choices:
             taken = [one.world for one in joined.pupils.values()]
             pupil.world = min(choices, key=lambda name: (taken.count(name), name != at), default=at)
-        pupil.bag.world = pupil.world
+        pupil.work.world = pupil.world
         return None if pupil.world == at else self.worlds[pupil.world]
 
     async def stop_all(self, taught: Class) -> int:
@@ -291,7 +291,7 @@ class Seat:
                 shown = self._taught().pupils.get(request.name)
                 if shown is None:
                     raise NotFound(f"there is no pupil {request.name!r}")
-                style = shown.bag.handed or shown.bag.style
+                style = shown.work.handed or shown.work.style
                 self.post({"type": "looked", "id": request.id, "name": shown.name, "style": style})
 
     async def _open(self, request: Member, may_teach: bool) -> None:
@@ -314,15 +314,15 @@ class Seat:
         pupil = joined.enrol(name)
         if pupil.seat is not None:
             raise Refused(f"{name} is in the class already")
-        pupil.bag.style = request.style or pupil.bag.style
-        before = pupil.bag.world
+        pupil.work.style = request.style or pupil.work.style
+        before = pupil.work.world
         elsewhere = self._room.place(joined, pupil, self._world)
         if elsewhere is not None:
             self.post({"type": "elsewhere", "code": joined.code, "name": name, "page": elsewhere.page})
             joined.notify_teachers()
         else:
-            self._sit(joined, pupil, pupil.bag.style if request.carry else "")
-        if pupil.bag.world != before:
+            self._sit(joined, pupil, pupil.work.style if request.carry else "")
+        if pupil.work.world != before:
             await self._room.keep(joined.code, pupil)
 
     def _sit(self, joined: Class, pupil: Pupil, style: str) -> None:
@@ -337,10 +337,10 @@ class Seat:
         joined, pupil = self._class, self._pupil
         if joined is None or pupil is None:
             return
-        pupil.doing, bag = request.doing, pupil.bag
-        bag.style, bag.program, bag.all_stars = request.style or bag.style, request.doing.program, request.doing.stars
+        pupil.doing, work = request.doing, pupil.work
+        work.style, work.program, work.all_stars = request.style or work.style, request.doing.program, request.doing.stars
         if request.do == "hand_in":
-            bag.handed, bag.stars = bag.style, request.doing.stars
+            work.handed, work.stars = work.style, request.doing.stars
             await self._room.keep(joined.code, pupil)
             self.post({"type": "handed"})
         joined.notify_teachers()
