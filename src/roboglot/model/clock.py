@@ -181,6 +181,7 @@ class PatientClock(RealClock):
         if now >= self._limit < when:
             return STANDING
         wait = max(0.0, when - now)
+        # Robot time that is still made up for: the clock runs faster by HASTE until it is, then as usual.
         owed = max(0.0, self._owed - (time.monotonic() - real) * self._speed * HASTE)
         return max(wait - owed, wait / (1.0 + HASTE)) / self._speed
 

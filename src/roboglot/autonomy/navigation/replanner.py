@@ -74,6 +74,10 @@ class Replanner:
             raise
 
     async def _known_route(self, goals: tuple[Point, ...]) -> Route | None:
+        """Return a route around obstacles, else one without isolated things, which may be gone; None: wait.
+
+        Raises Unreachable if the map alone, without obstacles, shows that there is none.
+        """
         course, options, rules = self._course, self._goal.options, self._course.drawn
         start, straight, journey = course.belief.pose.point, self._goal.straight, self._journey
         try:

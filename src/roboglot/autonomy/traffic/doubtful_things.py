@@ -20,9 +20,10 @@ GONE_NEAR = 0.1  # m around the former place of a removed leg in which the map n
 
 
 def without_doubtful(grid: EvidenceGrid) -> NDArray[np.int16]:
-    """Return a copy of the map's evidence with free cells in place of single things that may go away.
+    """Return a copy of the map's evidence with free cells in place of isolated things, which may go away.
 
-    A person mapped in a door is not part of its wall, as the loaded map had floor there.
+    On a loaded map (``given``), cells that scans added are examined by themselves: a person mapped in a door is then
+    isolated, although the wall is next to them.
     """
     shown: NDArray[np.int16] = without_things(grid.evidence, THING_CELLS)
     if grid.given is not None:

@@ -69,7 +69,7 @@ class NarrowFinder:
             self._examine(math.floor(y / RESOLUTION), math.floor(x / RESOLUTION))
 
     def contains(self, grid: EvidenceGrid, here: Point, place: Point, now: float) -> bool:
-        """Return the same for one ``place``; the robot is ``here``."""
+        """Return whether ``place`` (map, m) lies in a narrow place; the robot is ``here``."""
         self._update(grid, here, now)
         at = row, column = math.floor(place.y / RESOLUTION), math.floor(place.x / RESOLUTION)
         row, column = row - self._corner[0], column - self._corner[1]

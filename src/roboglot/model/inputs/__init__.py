@@ -1,1 +1,1 @@
-"""Inputs from outside other than requests at doors, recorded and repeated; and fairness between clients and other work."""
+"""Inputs from outside, other than requests at doors, recorded and repeated; fairness between clients and robots."""

@@ -123,7 +123,10 @@ class Calls:
             self._host.write(kept)
 
     def take(self, call: CallMessage | PlainCall, size: int) -> None:
-        """Take a call of ``size`` bytes. Raises ProtocolViolation."""
+        """Take a call of ``size`` bytes. Raises ProtocolViolation.
+
+        A short call goes to ``asked`` at once, if nothing delays it: no earlier answers to repeat, no limit reached.
+        """
         if self._waiting is not None:
             raise ProtocolViolation("a call before the reply to the last one")
         name = call.name

@@ -39,6 +39,7 @@ class SoftTouch:
     def sense(self, _stamp: float, _seconds: float) -> None:
         """Measure ahead, and limit the base's pace."""
         twist, base = self._base.wanted, self._base
+        # A limit holds until the wanted speed is harmless in itself; without a limit, slow driving is not examined.
         slow = twist.speed <= (max(SLOW, self._speed) if math.isinf(base.hindrances.pace) else self._speed)
         if slow:
             base.hindrances.pace = math.inf

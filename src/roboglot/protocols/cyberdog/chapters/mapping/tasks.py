@@ -71,7 +71,7 @@ async def start_task(
     relative_pos: Int32 = AUTOMATIC,
     keep_distance: float = 0.0,
 ) -> object:
-    """Answers ``accepted``, feedback codes, ``result``; the task continues if the stream breaks."""
+    """Start a task; answer ``accepted``, feedback codes, ``result``. The task continues if the stream breaks."""
     context = call.context
     if type not in NEEDS:
         return call.refused({"accepted": int(Accepted.NO)}, f"there is no task of type {type}")

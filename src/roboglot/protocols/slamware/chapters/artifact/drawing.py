@@ -38,7 +38,7 @@ def wire_line(line: Line) -> wire.Line:
 
 
 def metadata_of(line: Line) -> dict[str, str]:
-    """Return the line's metadata, with its control points where they are now: the model moves them, not their text."""
+    """Return the line's metadata, with the text of its control points updated: the model moves only the points."""
     metadata = dict(line.metadata)
     if line.control is None:
         return metadata
