@@ -338,7 +338,11 @@ class Seat:
         if joined is None or pupil is None:
             return
         pupil.doing, work = request.doing, pupil.work
-        work.style, work.program, work.all_stars = request.style or work.style, request.doing.program, request.doing.stars
+        work.style, work.program, work.all_stars = (
+            request.style or work.style,
+            request.doing.program,
+            request.doing.stars,
+        )
         if request.do == "hand_in":
             work.handed, work.stars = work.style, request.doing.stars
             await self._room.keep(joined.code, pupil)
