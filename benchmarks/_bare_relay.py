@@ -1,4 +1,4 @@
-"""A relay that only passes bytes, with or without TLS at both ends: the floor under what a proxy adds.
+"""A relay that only passes bytes, with or without TLS at both ends: the least that any proxy adds.
 
 python _bare_relay.py ADDRESS PORT HOST [FOLDER]; FOLDER: robot.pem and robot.key for the client, client-cert.pem and
 client-key.pem for the robot. The loop's own TLS, no parsing, no file.

@@ -1,4 +1,4 @@
-"""Figures of benchmarks beside their limits, with a ratio: 1 just meets the limit, more is better."""
+"""Figures of benchmarks compared with their limits, as a ratio: 1 just meets the limit, more is better."""
 
 from __future__ import annotations
 

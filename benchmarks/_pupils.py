@@ -1,4 +1,4 @@
-"""Clients in a separate process: one for each robot, with ten requests a second; and their observations.
+"""Clients in a separate process, one for each robot, with ten requests a second; and what they measure.
 
 REST clients ask for the pose and have their robot turn, text clients turn theirs and take pushes at 10 Hz, gRPC
 clients send frames that let the dog turn, and take its heartbeats. Some text clients film: they take the video's bytes.

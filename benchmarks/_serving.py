@@ -1,7 +1,7 @@
-"""A server's processor time beside that of a reference which does nothing, asked in turns in the same run.
+"""Processor time of a server compared with that of a reference that does nothing, measured in turns in the same run.
 
-The share of an idle robot's world is measured first and subtracted: on a busy machine the same number of
-requests lasts longer, and the world's share would grow with that.
+The processor time of the idle robot's world is measured first and subtracted: on a busy machine the same number of
+requests takes longer, so the world would otherwise take a larger share.
 """
 
 from __future__ import annotations

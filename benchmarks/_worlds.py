@@ -1,7 +1,8 @@
 """Worlds full of robots that drive at the same time, each in a separate process, forked from a warm one.
 
-With ``turns``, so many of them at once advance by ``TURN`` of robot time while the others wait. Left to the system,
-more worlds than cores lose each other's caches at every switch of processes, a hundred times a second: 1.1 ms each.
+With ``turns``, that many worlds at once advance by ``TURN`` of robot time while the others wait. Scheduled by the
+system, more worlds than cores would evict each other's data from the caches at every switch of processes, a hundred
+times a second, which costs 1.1 ms each time.
 """
 
 from __future__ import annotations

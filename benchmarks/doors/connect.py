@@ -1,10 +1,10 @@
 """Claim: `roboglot connect` adds <= 100 µs to a round trip, <= 5 ms to the jitter of 50 Hz pushes, and 720p30 passes.
 
-Robot, gateway and `roboglot connect` are processes on this machine; the same client asks the robot directly and behind
-the tunnel, in turns, on the text protocol. Of round trips the best stretch counts, because other work only ever adds.
-The robot has one core; the client and `connect`, which elsewhere are on another machine, share a second: left to itself
-a virtual machine's kernel may wake two of the three on one core, for it takes cores that rest for lent out. What that
-costs is printed, too.
+Robot, gateway and `roboglot connect` are processes on this machine; the same client asks the robot directly and through
+the tunnel, in turns, over the text protocol. The best stretch of round trips counts, because other work only adds time.
+The robot is pinned to one core; the client and `connect`, which are usually on another machine, share a second core.
+Without pinning, the kernel of a virtual machine may run two of the three on one core, because it takes idle cores to
+be in use by other machines. That case is printed, too.
 
     scripts/bench connect
 """

@@ -1,10 +1,10 @@
 """Claim: 200 long streams of tasks open at once in one process; an app that answers no push never blocks the robot.
 
-A dog does one task (6004) and one update (5010) at a time, and who joins either takes its stream over. So 200 such
-streams are those of 100 dogs in one process, which map and download. One dog alone is given as many: its two, and
-bluetooth scans, of which it may run any number. Then an app takes heartbeats and leaves every push unanswered while a
-dog maps: how long others wait for an answer meanwhile, and what the process grows by. The same figures without an app
-stand beside it.
+A dog does one task (6004) and one update (5010) at a time; a client that joins one takes its stream over. So the 200
+streams are those of 100 dogs in one process, each of which maps and downloads. Then a single dog gets 200 streams: its
+two, and bluetooth scans, of which it may run any number. At last, an app accepts heartbeats and leaves every push
+unanswered while a dog maps: measured are how long other clients wait for an answer, and by how much the process grows,
+compared with the same without an app.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The robot is our text door in a network of its own, behind a router and, for one row, a relay; the program that drives
 it is another process on the far side. It makes itself root of a network namespace of its own (`unshare`). Times are
 from the fault until the wheels' speed has fallen by a tenth, and until they stand. `lost_control.py drive=speed` shows
-what velocities that stand until they are changed would do.
+the same for velocities, which a robot keeps until they are changed.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""Claim: who looks after 10,000 robots' heartbeats takes <= 10 % of a core; the registry's server beside it.
+"""Claim: a coordinator that receives the heartbeats of 10,000 robots takes <= 10 % of a core.
 
 100 programs of 100 simulated robots each, in separate processes: they send the supervisor's heartbeats once a
 second, and renew their robots' homes on PostgreSQL twice a second, as shards do. This process is the coordinator: it
-hears them, and watches over the registry. With Ray installed, another part asks actors of Ray instead, 100 times a
-second, as `fleet up --on` does. Processor time counts, so that a busy machine changes little.
+receives the heartbeats and watches the registry. With Ray installed, another part queries actors of Ray instead, 100
+times a second, as `fleet up --on` does. Processor time is measured, so that a busy machine changes little; that of the
+registry's server is printed beside it.
 
     scripts/bench heartbeats [--programs 100] [--robots-each 100] [--seconds 20]
 """

@@ -2,8 +2,8 @@
 
 It knows all robots, goals and speeds exactly. Discs move at 1 m/s on a grid, turn and brake at no cost, and keep 0.1 m
 from each other and 0.05 m from walls. They are planned one after the other in space and time, around those before; the
-best of several orders counts. So it is no proof that less is impossible, but shows what coordination could give at most
-about: robots that see and hear only what is near, have to turn, and slow down beside others need more.
+best of several orders counts. That is not a proven lower bound, but shows roughly what perfect coordination could
+reach. Real robots need more time: they see and hear only what is near, have to turn, and slow down beside others.
 
     scripts/bench meeting_bound [--first 0] [--scenarios 4] [--orders 8]
 """

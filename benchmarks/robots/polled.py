@@ -1,13 +1,16 @@
 """Claim: with its doors open and polled at 10 Hz, a standing lockstep robot keeps >= 0.9 of its speed, and >= 270 x.
 
-A second of robot time is ten steps. After each, two clients ask: a pose by REST, and a text command. That is 20
-requests a second; one client that asks at the two doors in turns makes the 10 that "polled at 10 Hz" says, too. By
-processor time of the robot's process, in turns with windows in which no one asks, and with windows in which the same
-clients ask two bare servers in the robot's event loop (``_echoes``): those leave what a door that does nothing would. A
-part of the cost is that the process sleeps between steps, and finds its caches cold: ``later`` only waits.
+A second of robot time is ten steps. After each step, two clients send a request: one for the pose over REST, and a text
+command. That makes 20 requests per second of robot time. "Polled at 10 Hz" can also mean 10: one client that uses the
+two doors in turn. Both are measured.
 
-At some 400 times real time those are thousands of requests a second of the machine. A page or a script that looks at
-its robot asks ten times in a second of its own time instead, while the robot runs on: measured, too.
+Figures are by the processor time of the robot's process. Windows with requests alternate with windows without any, and
+with windows in which the same clients poll two bare servers in the robot's event loop (``_echoes``), which show the
+cost of a door that does nothing. A part of the cost is that the process sleeps between steps and finds its caches cold:
+``later`` only waits, to measure that.
+
+At some 400 times real time these are thousands of requests per real second. A page or a script polls its robot ten
+times per second of real time instead, while robot time runs on: that is measured, too.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Claim: at >= 1,000 places of six buildings, whole and half mapped: none wrong, >= 97 % right, <= 30 ms median.
 
-Asked is what localization asks: where in the whole map was this scan taken. Right is within 10 cm and 3 degrees. Places
-that the map does not show (less than 85 % of the echoes on its surfaces) need no answer, nor do those of which a scan
-at a rival place says the same: nine in ten echoes within 15 cm. Half a map may
-show only the rival: no scan separates them, and such a belief is counted as a twin. ``--quick``: 40 places a
-building. ``--drawn SEED``: the same of four buildings drawn from that seed, which nothing was tuned on.
+Each scan is searched in the whole map, as localization does. An answer is right within 10 cm and 3 degrees. No answer
+is expected at places that the map does not show (less than 85 % of the echoes on its surfaces), and at places whose
+scan would look the same at a rival place (nine in ten echoes within 15 cm). Half a map may show only the rival, which
+no scan can tell apart: such an answer is counted as a twin. ``--quick``: 40 places a building. ``--drawn SEED``: four
+buildings drawn from that seed, on which nothing was tuned.
 """
 
 from __future__ import annotations
