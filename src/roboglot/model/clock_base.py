@@ -310,7 +310,7 @@ class RealTimers:
                 heapq.heappush(self._heap, entry)
 
     def _fire(self, timer: RealTimer) -> None:
-        """Call it, unless one before it has called it off; an error of its own affects no other."""
+        """Call the timer's callback, unless an earlier one has cancelled it; its error does not affect other timers."""
         callback, timer.callback = timer.callback, None
         if callback is None:
             return

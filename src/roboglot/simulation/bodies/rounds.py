@@ -15,13 +15,13 @@ LAST = 1 << 60  # after all
 
 
 class Agenda:
-    """Numbers of the schedules that have something due in a tick, in their order; the others are not looked at.
+    """Finds the schedules with something due in a tick, in their order, without looking at the others.
 
-    ``before``: by schedule, the tick of the world before its first one.
+    ``number`` is the index of a schedule. ``before``: for each schedule, the world's tick before its first one.
     """
 
     def __init__(self, schedules: Sequence[Schedule], before: Sequence[int], tick: int) -> None:
-        """``tick``: the last one."""
+        """``tick``: the last tick that has passed."""
         self._schedules, self._before, self._tick = schedules, before, tick
         self._booked = [0] * len(schedules)  # the next tick of each in which something is due
         self._due: dict[int, list[int]] = {}  # by tick; entries that differ from ``_booked`` are out of date
@@ -33,7 +33,7 @@ class Agenda:
 
     def begin(self, tick: int) -> Iterator[int]:
         """Yield those that are due in ``tick``, also those that become due before their turn."""
-        for number in self._left:  # the last tick was broken off
+        for number in self._left:  # an error ended the last tick early
             self._book(number, self._tick)
         self._tick, self._left = tick, sorted(self._due.pop(tick, ()))
         while self._left:

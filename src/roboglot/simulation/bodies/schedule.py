@@ -53,10 +53,10 @@ class Job:
 
 
 class Schedule:
-    """Calls in the order of ``jobs``; a job's duty is looked at when its turn comes.
+    """Calls in the order of ``jobs``; a job's duty is checked when its turn comes.
 
-    The lists for all ticks of a cycle are made once. Equal ones are one, to need little memory: the data of a hundred
-    robots must fit the caches.
+    The lists of calls for all ticks of a cycle are made once. Equal lists are shared, to save memory: the data of a
+    hundred robots must fit into the processor's caches.
     """
 
     __slots__ = ("_jobs", "_length", "_on", "_rounds", "_start", "changed")

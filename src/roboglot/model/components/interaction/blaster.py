@@ -11,7 +11,7 @@ BEADS_MAX = 8  # per shot
 
 
 def check_beads(beads: int) -> None:
-    """Raise InvalidGoal unless a shot can have so many beads."""
+    """Raise InvalidGoal unless a shot can have this number of beads."""
     if not 1 <= beads <= BEADS_MAX:
         raise InvalidGoal(f"a shot has 1 to {BEADS_MAX} beads, not {beads}")
 

@@ -53,7 +53,7 @@ class LiftClient(Component):
 
     @abstractmethod
     def hold_door(self, seconds: float) -> None:
-        """Keep the door open that long where the car stands, opening it if it is shut (at most 120 s)."""
+        """Keep the door open for ``seconds`` (at most 120) where the car stands; open it if it is shut."""
 
     @abstractmethod
     def close_door(self) -> None:

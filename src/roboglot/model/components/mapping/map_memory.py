@@ -118,7 +118,10 @@ class MapMemory(Component):
 
     @contextmanager
     def exchange(self) -> Iterator[None]:
-        """Have others wait in ``settle`` while grid and drawings are exchanged. Plan no way meanwhile: that waits."""
+        """Have others wait in ``settle`` while grid and drawings are exchanged.
+
+        Planning waits, too: a plan made inside would wait for itself.
+        """
         self._holds += 1
         self._released.clear()
         try:

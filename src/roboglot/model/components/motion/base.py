@@ -50,11 +50,11 @@ class Base(Component):
         return None
 
     def check_free(self, command: Twist | WheelSpeeds) -> None:
-        """Raise at once what driving so would abort with: Collided where the hull touches something on that side."""
+        """Raise the error that would abort ``command``: Collided if the hull touches something on that side."""
         return
 
     def hindrance(self, command: Twist | WheelSpeeds) -> Blocked | None:
-        """Return the contactless hindrance (emergency braking, a cliff) to driving like this, or None.
+        """Return what keeps the robot from ``command`` without contact (emergency braking, a cliff), or None.
 
         A hindered base still turns as commanded; a planner may look for a way around.
         """
