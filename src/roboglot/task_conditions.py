@@ -131,7 +131,7 @@ def _values(field: str, low: int, high: int) -> frozenset[int]:
         last = int(match["last"] or (high if match["first"] is None or match["step"] else first))
         step = int(match["step"] or 1)
         if not low <= first <= last <= high or step == 0:
-            raise BadCondition(f"{item!r} is outside {low} to {high}")
+            raise BadCondition(f"{item!r} is outside of {low} to {high}")
         values.update(range(first, last + 1, step))
     return frozenset(values)
 

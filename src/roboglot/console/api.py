@@ -254,7 +254,7 @@ class Api:
 
 
 def _nothing_here() -> Problem:
-    return Problem(404, "there is nothing here; /api/openapi.json says what there is")
+    return Problem(404, "there is nothing here; /api/openapi.json lists what there is")
 
 
 def _whole(text: str) -> int:

@@ -198,7 +198,7 @@ class Application:
         await receive()  # websocket.connect
         try:
             if scope["path"] not in ("/live", "/studio") or self._refusal(scope, "GET"):
-                raise Unknown("the page is of another host")
+                raise Unknown("the page is from another host")
             named = await enter(self._desk, self._login, scope)
         except Unknown:
             await send({"type": "websocket.close", "code": GOING_AWAY})

@@ -203,7 +203,7 @@ def _undivided(path: Path, file: IO[bytes]) -> Iterator[McapRecord]:
     if not has_all:
         rest = file.seek(0, SEEK_END) - read
         until = f"{(last - max(first, 0)) / 1e9:.1f} s ({datetime.fromtimestamp(last / 1e9, UTC):%F %T} UTC)"
-        log.warning("%s is cut off: it is read until %s; %d bytes after that are no whole record", path, until, rest)
+        log.warning("%s is cut off: it is read until %s; %d bytes after that are not a whole record", path, until, rest)
 
 
 def unpacked(path: Path, chunk: Chunk) -> Sequence[McapRecord]:

@@ -98,7 +98,7 @@ class Overview:
             if why := self._browsers.refusal(of_rows(scope["headers"], scope["method"])):
                 raise Problem(403, why)
             if scope["method"] not in ("GET", "HEAD"):
-                raise Problem(405, "this page only looks; a world's own console does more")
+                raise Problem(405, "this page is read-only; a world's own console does more")
             await self._route(scope, send)
         except Problem as problem:
             await answer_json(send, {"error": problem.why}, problem.status)

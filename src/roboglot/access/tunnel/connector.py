@@ -169,7 +169,7 @@ class Connector:
             return decode_json(frame.payload, Welcome)
         except DecodeError as error:
             raise Refused(
-                f"the gateway's greeting is none of roboglot's: {why_invalid(error, wanted=Welcome)}"
+                f"the gateway's greeting is not roboglot's: {why_invalid(error, wanted=Welcome)}"
             ) from None
 
     def _is_app(self, port: int) -> bool:

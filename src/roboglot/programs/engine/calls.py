@@ -215,7 +215,7 @@ class Calls:
         """Answer a call from the history; return True if it was interrupted there and needs a new answer."""
         known = self._history.popleft()
         if known.name != call.name:
-            words = f"the program asked for {call.name} where it had asked for {known.name} before"
+            words = f"the program called {call.name} where it had called {known.name} before"
             self._host.end(ExitReason.DIVERGED, "ReplayDiverged", words)
         elif known.body is None:
             return True

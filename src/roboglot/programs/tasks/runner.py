@@ -160,7 +160,7 @@ class Runner:
             await self._give_back(task.id, state, words, journal)
             return
         await living.revive()
-        living.log.write("note", "the program is led back to where it was: what it had printed comes once more")
+        living.log.write("note", "the program is replayed up to where it was: what it had printed is printed again")
         if history.interrupted:
             living.log.write("error", f"the server ended during {history.interrupted}: it is not repeated")
         self._supervisors.add(self._supervise(living), f"task {task.id}")

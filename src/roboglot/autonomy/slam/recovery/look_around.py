@@ -114,7 +114,7 @@ async def _watched(robot: Robot, move: Action, goes: Callable[[LaserScan], bool]
                 break
     finally:
         if not move.status.ended:
-            move.cancel("it looks no further")
+            move.cancel("the search has ended")
     await move.done()
     return move.status is ActionStatus.SUCCEEDED
 

@@ -100,7 +100,7 @@ async def recognized_any_gesture(session: Session, timeout: int = 60, sensitivit
 async def recognized_designated_gesture(session: Session, timeout: int = 60, gesture_type: int = 0) -> Record:
     """Wait for one gesture (1 to 300 s) while recognition is on; without it in time, all are False: no failure."""
     if not 1 <= gesture_type <= len(GESTURES):
-        return _gestures(state(StateCode.FAIL, f"gesture_type = {gesture_type} is no gesture"), set())
+        return _gestures(state(StateCode.FAIL, f"gesture_type = {gesture_type} is not a gesture"), set())
     return await _wait(session, timeout, 1, GESTURES[gesture_type - 1], least=1)
 
 

@@ -120,7 +120,7 @@ class SimulatedBluetooth(Bluetooth):
     async def disconnect(self) -> None:
         if self._wanted is None:
             raise Refused("no device is connected")
-        await self._robot.actions.cancel(resource=BLUETOOTH, reason="the device is let go")
+        await self._robot.actions.cancel(resource=BLUETOOTH, reason="the device is released")
         self._wanted, self._linked = None, False
 
     async def forget(self, address: str | None) -> None:

@@ -30,5 +30,5 @@ class CyberDogDocking(Docking):
 
     def undock(self, *, source: str = "") -> Action:
         if not self._skills.reported.docked:
-            raise Refused("the robot is on no dock")
+            raise Refused("the robot is not on a dock")
         return self._skills.robot[Driving].move_by(Pose(OFF_DOCK), source=source)

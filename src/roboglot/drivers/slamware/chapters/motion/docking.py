@@ -46,7 +46,7 @@ class SlamwareDocking(Docking):
 
     def undock(self, *, source: str = "") -> Action:
         if not self._reported.docked:
-            raise Refused("the robot is on no dock")
+            raise Refused("the robot is not on a dock")
         return self._driving.move_by(Pose(OFF_DOCK), source=source)
 
 
