@@ -154,8 +154,8 @@ async def test_unproved_ends_are_hung_up_on(proved: bool, known: bool, passes: b
     context.load_cert_chain(house / "tls" / "server-cert.pem", house / "tls" / "server-key.pem")
     server = await asyncio.start_server(robot, "127.0.0.1", port, ssl=context)
     target = Target(f"cyberdog://127.0.0.1:{port}?certs={tmp_path / 'believed'}&app={free_port()}")
-    writer = ExchangeWriter(tmp_path / "x.mcap", target, "0")
-    relay = DogRelay(target, BETWEEN, writer, Proof(proof.certificate, proof.key, proof.callers))
+    exchanges = ExchangeWriter(tmp_path / "x.mcap", target, "0")
+    relay = DogRelay(target, BETWEEN, exchanges, Proof(proof.certificate, proof.key, proof.callers))
     await relay.open()
     came = b""
     try:
@@ -170,6 +170,6 @@ async def test_unproved_ends_are_hung_up_on(proved: bool, known: bool, passes: b
             await writer.wait_closed()
     finally:
         await relay.close()
-        writer.close()
+        exchanges.close()
         server.close()
     assert (heard, came) == (([b"from the app"], b"from the robot") if passes else ([], b""))

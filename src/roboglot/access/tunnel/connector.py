@@ -168,9 +168,7 @@ class Connector:
         try:
             return decode_json(frame.payload, Welcome)
         except DecodeError as error:
-            raise Refused(
-                f"the gateway's greeting is not roboglot's: {why_invalid(error, wanted=Welcome)}"
-            ) from None
+            raise Refused(f"the gateway's greeting is not roboglot's: {why_invalid(error, wanted=Welcome)}") from None
 
     def _is_app(self, port: int) -> bool:
         """Return whether the gateway may reach this port of the machine; if not, log which option would allow it."""
