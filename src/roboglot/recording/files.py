@@ -19,7 +19,7 @@ from mcap.writer import CompressionType, Writer
 from zstandard import ZstdCompressor
 
 from roboglot.recording.entries import KINDS, NANO, Encode, Entry, encoding_of
-from roboglot.recording.latched_values import REPEATED, Standing
+from roboglot.recording.latched_values import REPEATED, LatchedValues
 from roboglot.recording.redaction import Redaction
 from roboglot.values import dataclass
 
@@ -226,7 +226,7 @@ class PartWriter:
 class Files:
     """The parts of one recording: ``PATH.mcap``, then ``PATH-002.mcap`` and so on; in a folder, names are generated.
 
-    Each part begins with the standing values, so that it can be read without the parts before it.
+    Each part begins with the latched values, so that it can be read without the parts before it.
     """
 
     def __init__(self, path: Path, origin: Origin, redaction: Redaction, limits: Limits) -> None:
@@ -235,7 +235,7 @@ class Files:
         self._part: PartWriter | None = None
         self._number = 0
         self._closed: list[tuple[Path, int]] = []
-        self._standing = Standing()
+        self._latched = LatchedValues()
         self.written = 0  # entries
         self.deleted = 0  # parts
 
@@ -266,7 +266,7 @@ class Files:
         if full:
             part = self._next(entry.at)
         part.write(entry)
-        self._standing.note(entry)
+        self._latched.note(entry)
         self.written += 1
 
     def flush(self) -> None:
@@ -292,6 +292,6 @@ class Files:
             log.warning("recording: deleted %s, all parts may take %d bytes", path, self._limits.total_bytes)
         self._number += 1
         self._part = PartWriter(self.path, self._origin, self._redaction, at, self._number)
-        for entry in self._standing.at(at):
+        for entry in self._latched.at(at):
             self._part.repeat(entry)
         return self._part

@@ -244,7 +244,7 @@ class Recorder:
         self._sampling = asyncio.get_running_loop().create_task(self._sample(), name="recorder")
 
     def _look_again(self) -> None:
-        """Sample all standing values again, for a recording that begins beside another."""
+        """Sample all latched values again, for a recording that begins beside another."""
         for sampler in self._samplers:
             sampler.again()
         if self._truth is not None:

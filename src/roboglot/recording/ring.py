@@ -1,6 +1,6 @@
 """The last minutes, kept in memory, compressed second by second; written to a file after a fault.
 
-Standing values (the map, faults) outlive their block: the file begins with them.
+Latched values (the map, faults) outlive their block: the file begins with them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import zstandard
 
 from roboglot.recording.entries import NANO, Entry
 from roboglot.recording.files import Origin, PartWriter
-from roboglot.recording.latched_values import STANDING, STANDING_MAX
+from roboglot.recording.latched_values import LATCHED, LATCHED_MAX
 from roboglot.recording.redaction import Redaction
 
 BYTES_MAX = 64 << 20  # of compressed entries; older ones are dropped first
@@ -27,7 +27,7 @@ class Ring:
     def __init__(self, origin: Origin, redaction: Redaction, seconds: float = 300.0) -> None:
         self._origin, self._redaction, self._seconds = origin, redaction, seconds
         self._blocks: deque[tuple[int, bytes]] = deque()
-        self._standing: dict[str, bytes] = {}  # by topic: the last entry before the first block
+        self._latched: dict[str, bytes] = {}  # by topic: the last entry before the first block
         self._bytes = 0
         self._open: list[Entry] = []
         self._lock = threading.Lock()
@@ -51,7 +51,7 @@ class Ring:
         """Drop all entries."""
         with self._lock:
             self._blocks.clear()
-            self._standing.clear()
+            self._latched.clear()
             self._open.clear()
             self._bytes = 0
 
@@ -59,13 +59,13 @@ class Ring:
         """Write the ring's entries into a new file; returns their number. Raises OSError."""
         with self._lock:
             blocks, rest = [data for _, data in self._blocks], list(self._open)
-            standing = list(self._standing.values())
+            latched = list(self._latched.values())
         first = rest[0].at if rest else 0
         if blocks:
             first = self._unpack(blocks[0])[0].at
         part, count = PartWriter(path, self._origin, self._redaction, first), 0
         try:
-            before = [entry._replace(at=first) for data in standing for entry in self._unpack(data)]
+            before = [entry._replace(at=first) for data in latched for entry in self._unpack(data)]
             for entries in (before, *map(self._unpack, blocks), rest):
                 for entry in entries:
                     part.write(entry)
@@ -86,10 +86,10 @@ class Ring:
 
     def _forget(self, block: bytes) -> None:
         self._bytes -= len(block)
-        last = {entry.topic: entry for entry in self._unpack(block) if entry.kind in STANDING}
+        last = {entry.topic: entry for entry in self._unpack(block) if entry.kind in LATCHED}
         for topic, entry in last.items():
-            if topic in self._standing or len(self._standing) < STANDING_MAX:
-                self._standing[topic] = self._pack([entry])
+            if topic in self._latched or len(self._latched) < LATCHED_MAX:
+                self._latched[topic] = self._pack([entry])
 
     @staticmethod
     def _pack(entries: list[Entry]) -> bytes:

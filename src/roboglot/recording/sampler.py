@@ -84,7 +84,7 @@ class Sampler:
             self._filming = None
 
     def again(self) -> None:
-        """Report standing values again, as another recording begins."""
+        """Report latched values again, as another recording begins."""
         self._before.clear()
         self._shown = False
 

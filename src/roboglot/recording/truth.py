@@ -21,7 +21,7 @@ class TruthSampler:
         self._before: object = None
 
     def again(self) -> None:
-        """Report standing values again."""
+        """Report latched values again."""
         self._before = None
 
     def beat(self, number: int, at: int, put: Put) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
+from roboglot.autonomy.building.floor_storage import FloorStorage, Storey
 from roboglot.autonomy.building.floors import LiftFloors
 from roboglot.autonomy.slam.evidence import EvidenceGrid
 from roboglot.fleet import Fleet
@@ -91,7 +91,7 @@ async def test_up_and_down_with_maps_and_docks(tour: Tour) -> None:
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert tour.robot[Docking].home is not None
     assert tour.robot[MapAnnotations].current.areas == ()
-    kept = await StoreyShelf(tour.robot).take(1)  # as after a restart: only what is on disk
+    kept = await FloorStorage(tour.robot).take(1)  # as after a restart: only what is on disk
     assert kept is not None
     assert agreement(upstairs, kept.map.occupancy()) > 0.98
     assert kept.drawn.areas == (replace(drawn, id=1),)
@@ -99,17 +99,17 @@ async def test_up_and_down_with_maps_and_docks(tour: Tour) -> None:
 
 
 async def test_unreadable_or_unwritable_floor_on_disk_is_reported(tour: Tour, caplog: pytest.LogCaptureFixture) -> None:
-    robot, shelf = tour.robot, StoreyShelf(tour.robot)
+    robot, storage = tour.robot, FloorStorage(tour.robot)
     for data in (b"", b"garbage", b"\x80"):
         await robot[FileStore].write("floors/2.msgpack", data)
-        assert await shelf.take(2) is None
+        assert await storage.take(2) is None
     assert caplog.text.count("cannot read") == 3
     tour.world.faults.inject("full_disk", "a")
     storey = Storey(EvidenceGrid(), None, Annotations(), Pose(1.0), Pose())
-    await shelf.put(1, storey, lasting=True)
+    await storage.put(1, storey, lasting=True)
     assert "kept in memory only" in caplog.text
-    assert await shelf.take(1) is storey
-    assert await shelf.take(1) is None
+    assert await storage.take(1) is storey
+    assert await storage.take(1) is None
 
 
 async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:

@@ -1,4 +1,4 @@
-"""Run by test_robomaster_vigil.py as root of a network of its own: a robot, a client on a cable, the cable cut.
+"""Run by test_client_watch.py as root of a network of its own: a robot, a client on a cable, the cable cut.
 
 argv[1]: the groups that may send echo requests ("0 0": ours; empty: no one). Prints how long the robot moved on.
 """

@@ -12,7 +12,7 @@ from typing import Any, cast
 import pytest
 
 from roboglot.protocols.robomaster.keepalive import LOOK_PERIOD, probe_for_life, unanswered
-from roboglot.protocols.robomaster.limits import VIGIL_PERIOD
+from roboglot.protocols.robomaster.limits import WATCH_PERIOD
 from tests.protocols.robomaster.text_client import ADDRESS
 
 DEAD = 5000  # ms
@@ -33,7 +33,7 @@ class Line:
         return self if name == "socket" else (self.peer, 4711)
 
     def setsockopt(self, _level: int, option: int, value: int) -> None:
-        assert option != socket.TCP_KEEPCNT or value > 5.0 / VIGIL_PERIOD, "the kernel would end it in the vigil"
+        assert option != socket.TCP_KEEPCNT or value > 5.0 / WATCH_PERIOD, "the kernel would end it during the watch"
         assert option != socket.TCP_USER_TIMEOUT or value == 0, "it would end those who do not read"
 
     def getsockopt(self, *_: int) -> bytes:

@@ -14,8 +14,8 @@ from roboglot.kernels import CAMERA, MODULES
 from roboglot.kernels.ahead import KernelsUnavailable
 from roboglot.model.clock import LockstepClock, RealClock
 from roboglot.simulation import rendering
-from roboglot.simulation.rendering import studio
-from roboglot.simulation.rendering.studio import Studio
+from roboglot.simulation.rendering import render_pool
+from roboglot.simulation.rendering.render_pool import RenderPool
 from roboglot.simulation.rendering.views import Scenery
 
 
@@ -33,18 +33,18 @@ async def test_first_picture_has_its_kernels_compiled_apart(compiles: bool, monk
         done.append(threading.current_thread().daemon)  # others are waited for at the end
         return Mock(spec=Scenery)
 
-    monkeypatch.setattr(studio, "compile_beside", compile_beside)
-    monkeypatch.setattr(studio, "missing", lambda names: names)
-    opened = Studio(open_stage, RealClock())
+    monkeypatch.setattr(render_pool, "compile_beside", compile_beside)
+    monkeypatch.setattr(render_pool, "missing", lambda names: names)
+    opened = RenderPool(open_stage, RealClock())
     assert await opened.stage() is await opened.stage()
     assert done == [CAMERA, True, True]
     assert not opened.delay
 
 
 async def test_stage_opens_in_place_in_lockstep(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(studio, "compile_beside", Mock(side_effect=AssertionError))
+    monkeypatch.setattr(render_pool, "compile_beside", Mock(side_effect=AssertionError))
     here = threading.get_ident()
-    stage = await Studio(lambda: Mock(opened_in=threading.get_ident()), LockstepClock()).stage()
+    stage = await RenderPool(lambda: Mock(opened_in=threading.get_ident()), LockstepClock()).stage()
     assert vars(stage)["opened_in"] == here
 
 

@@ -47,7 +47,7 @@ class _File(msgspec.Struct):
     inside: Pose
 
 
-class StoreyShelf:
+class FloorStorage:
     """Storage of floors by number; in memory only for a robot without a FileStore."""
 
     def __init__(self, robot: Robot) -> None:

@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from roboglot.autonomy.building.floor_storage import Storey, StoreyShelf
+from roboglot.autonomy.building.floor_storage import FloorStorage, Storey
 from roboglot.autonomy.building.lift_queue import Turn, turn
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
 from roboglot.autonomy.navigation.course import Course, Goal
@@ -55,7 +55,7 @@ class LiftFloors(Floors):
     def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
         self.robot, self.belief, self.navigation = robot, course.belief, navigation
         self._course = course
-        self._others = StoreyShelf(robot)
+        self._others = FloorStorage(robot)
         self._current = 0
         self._changing = asyncio.Lock()  # one exchange of floors at a time
         self._places: tuple[Pose, Pose] | None = None  # the waiting place, and the place inside the car

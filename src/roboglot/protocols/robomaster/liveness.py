@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable
 from ipaddress import IPv4Address
 
 from roboglot.protocols.robomaster.keepalive import unanswered
-from roboglot.protocols.robomaster.limits import VIGIL_MISSES_MAX, VIGIL_PERIOD
+from roboglot.protocols.robomaster.limits import WATCH_MISSES_MAX, WATCH_PERIOD
 
 log = logging.getLogger(__name__)
 
@@ -83,7 +83,7 @@ class DrivingClient:
         return self._greetings > 0
 
     def missing(self, echoed: bool, elapsed: float) -> bool:
-        """Count one check, ``elapsed`` s after the last; return True after VIGIL_MISSES_MAX without a sign of life.
+        """Count one check, ``elapsed`` s after the last; return True after WATCH_MISSES_MAX without a sign of life.
 
         A miss is an unanswered probe; silence alone does not count.
         """
@@ -98,10 +98,10 @@ class DrivingClient:
         self._echoes = self._echoes or echoed
         alive = echoed or silent < elapsed * 1000
         self._misses = self._misses + 1 if asked and not alive else 0
-        return self._misses == VIGIL_MISSES_MAX
+        return self._misses == WATCH_MISSES_MAX
 
 
-class Vigil:
+class ClientWatch:
     """Watches the clients of one robot; ``drives`` returns whether one drives, ``gone`` stops its motions."""
 
     def __init__(
@@ -133,7 +133,7 @@ class Vigil:
     def _plan(self) -> None:
         loop = asyncio.get_running_loop()
         self._looked = loop.time()
-        self._timer = loop.call_later(VIGIL_PERIOD, self._look)
+        self._timer = loop.call_later(WATCH_PERIOD, self._look)
 
     def _look(self) -> None:
         elapsed = asyncio.get_running_loop().time() - self._looked

@@ -18,7 +18,7 @@ from roboglot.protocols.robomaster.connection import ControlConnection
 from roboglot.protocols.robomaster.context import Context
 from roboglot.protocols.robomaster.datagrams import Datagrams, broadcast_address
 from roboglot.protocols.robomaster.limits import CONTROL_CONNECTIONS_MAX, MEDIA_CONNECTIONS_MAX, PILOTS_MAX
-from roboglot.protocols.robomaster.liveness import Vigil
+from roboglot.protocols.robomaster.liveness import ClientWatch
 from roboglot.protocols.robomaster.ports.discovery import announce
 from roboglot.protocols.robomaster.ports.event_port import Readers
 from roboglot.protocols.robomaster.ports.media_port import MediaPort
@@ -47,7 +47,7 @@ class RoboMasterDoor:
         self._address = address
         self._config = config
         self._connections: set[ControlConnection] = set()
-        self._vigil = Vigil(
+        self._watch = ClientWatch(
             lambda: [connection.driver for connection in self._connections],
             self.context.moves,
             self.context.stop_speaker,
@@ -102,7 +102,7 @@ class RoboMasterDoor:
         if self._announcing:
             self._announcing.cancel()
         self._leave_stand_in()
-        self._vigil.close()
+        self._watch.close()
         self._gate.close()
         for server in self._servers.values():
             server.close()
@@ -168,7 +168,7 @@ class RoboMasterDoor:
     # -- connections --
 
     def _control_connection(self) -> asyncio.Protocol:
-        self._vigil.begin()
+        self._watch.begin()
         return ControlConnection(self.context, self._connections, self._explain, lenient=self._config.lenient)
 
     def _serial_connection(self) -> asyncio.Protocol:

@@ -28,7 +28,7 @@ WRIST = JOINTS.index("right_wrist")
 
 
 @dataclass(slots=True)
-class _Somebody:
+class _SeenPerson:
     """A person in sight: joints (world), their visibility, and the box of the whole body."""
 
     walker: Walker
@@ -47,7 +47,7 @@ class _Somebody:
 def see_people(glance: Glance) -> list[PersonSeen]:
     """Return the people who are sufficiently visible."""
     found = []
-    for who in _everybody(glance):
+    for who in _people_in_sight(glance):
         distance, place = glance.estimate(who.middle)
         found.append(PersonSeen(glance.shaken(who.box), _number(who, glance), distance, place))
     return found
@@ -56,7 +56,7 @@ def see_people(glance: Glance) -> list[PersonSeen]:
 def see_skeletons(glance: Glance) -> list[SkeletonSeen]:
     """Return the joints of people, with those outside the picture or hidden marked as invisible."""
     found = []
-    for who in _everybody(glance):
+    for who in _people_in_sight(glance):
         places, _ = glance.view.project(who.joints)
         places += glance.random.standard_normal(places.shape) * PIXEL_NOISE * (1.0, glance.view.aspect)
         joints = tuple(Joint(x, y, visible) for (x, y), visible in zip(places.tolist(), who.seen.tolist(), strict=True))
@@ -67,7 +67,7 @@ def see_skeletons(glance: Glance) -> list[SkeletonSeen]:
 def see_faces(glance: Glance) -> list[FaceSeen]:
     """Return the faces turned to the camera and near enough to be distinguished."""
     found = []
-    for who in _everybody(glance):
+    for who in _people_in_sight(glance):
         walker = who.walker
         head = who.joints[HEAD].mean(axis=0)
         facing = Pose(float(head[0]), float(head[1]), walker.pose.yaw)
@@ -85,7 +85,7 @@ def see_faces(glance: Glance) -> list[FaceSeen]:
 def see_gestures(glance: Glance) -> list[GestureSeen]:
     """Return the gestures made towards the camera with a visible hand."""
     found = []
-    for who in _everybody(glance):
+    for who in _people_in_sight(glance):
         showing = who.walker.showing
         if showing is None or showing[1] < GESTURE_TIME or who.distance > GESTURE_RANGE:
             continue
@@ -114,7 +114,7 @@ def see_robots(glance: Glance) -> list[RobotSeen]:
     return [robot for _, robot in sorted(found, key=lambda entry: entry[0])]
 
 
-def _everybody(glance: Glance) -> Iterator[_Somebody]:
+def _people_in_sight(glance: Glance) -> Iterator[_SeenPerson]:
     """Yield the people in sight, nearest first."""
     near = []
     for walker in glance.around.walkers:
@@ -130,10 +130,10 @@ def _everybody(glance: Glance) -> Iterator[_Somebody]:
         joints = _turned(own, walker.pose.yaw) + at
         seen = glance.visible(joints, walker)
         if seen.mean() >= PART and not glance.overlooked():
-            yield _Somebody(walker, joints, seen, box, away)
+            yield _SeenPerson(walker, joints, seen, box, away)
 
 
-def _number(who: _Somebody, glance: Glance) -> int:
+def _number(who: _SeenPerson, glance: Glance) -> int:
     return glance.numbers.setdefault(who.walker.key, len(glance.numbers) + 1)
 
 

@@ -11,11 +11,11 @@ from roboglot.simulation.building.things import Things
 from roboglot.simulation.detectors.glance import Surroundings
 from roboglot.simulation.radio.gadgets import Gadgets
 from roboglot.simulation.radio.radio import Radio
-from roboglot.simulation.rendering.studio import Studio
+from roboglot.simulation.rendering.render_pool import RenderPool
 from roboglot.simulation.sound.sound import Air
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
-from roboglot.simulation.world.randomness import Chances
+from roboglot.simulation.world.randomness import RandomStreams
 from roboglot.simulation.world.sight import Sight
 from roboglot.values import dataclass
 
@@ -36,9 +36,9 @@ class Environment:
     sight: Sight
     rays: Rays
     surroundings: Surroundings
-    studio: Studio
+    render_pool: RenderPool
     beads: Beads
-    chances: Chances
+    chances: RandomStreams
     north: float
 
     @property

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 
-class Chances:
+class RandomStreams:
     """All random streams of one world."""
 
     def __init__(self, seed: int) -> None:

@@ -40,7 +40,7 @@ from roboglot.simulation.people.routine import Clap, Say
 from roboglot.simulation.radio.gadgets import Gadgets
 from roboglot.simulation.radio.radio import Radio
 from roboglot.simulation.rendering.opening import stage_of
-from roboglot.simulation.rendering.studio import Studio
+from roboglot.simulation.rendering.render_pool import RenderPool
 from roboglot.simulation.sound.sound import Air, Source, Speech
 from roboglot.simulation.sound.voice import hummed
 from roboglot.simulation.world.beads import Beads
@@ -50,7 +50,7 @@ from roboglot.simulation.world.hands import Hands
 from roboglot.simulation.world.lag_monitor import Pace
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
-from roboglot.simulation.world.randomness import Chances
+from roboglot.simulation.world.randomness import RandomStreams
 from roboglot.simulation.world.sight import Sight
 from roboglot.simulation.world.sightlines import SightLines
 from roboglot.simulation.world.ticking import Ticking
@@ -160,9 +160,9 @@ class World:
             sight=Sight(description, hulls, walkers, props, things),
             rays=physics.rays,
             surroundings=Surroundings(description, hulls, walkers, props, lines),
-            studio=Studio(stage_of(description, hulls, walkers, props, things, life), self._clock),
+            render_pool=RenderPool(stage_of(description, hulls, walkers, props, things, life), self._clock),
             beads=beads,
-            chances=Chances(seed),
+            chances=RandomStreams(seed),
             north=math.radians(description.georeference.north if description.georeference else 90.0),
         )
 

@@ -23,7 +23,7 @@ from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.components.motion.gimbal_axes import GimbalSection
-from roboglot.simulation.rendering.studio import Studio
+from roboglot.simulation.rendering.render_pool import RenderPool
 from roboglot.simulation.rendering.views import Eye, Instant, Scenery
 from roboglot.values import dataclass
 
@@ -102,9 +102,9 @@ class Shortfall:
 class SimulatedCamera(Camera):
     """Camera at the front of the torso, moving with it. No noise, no lens errors, no motion blur."""
 
-    def __init__(self, section: CameraSection, hull: Hull, studio: Studio, clock: Clock) -> None:
+    def __init__(self, section: CameraSection, hull: Hull, render_pool: RenderPool, clock: Clock) -> None:
         self.width, self.height, self.rate, self.fov = section.width, section.height, section.rate, section.fov
-        self._section, self._hull, self._studio, self._clock = section, hull, studio, clock
+        self._section, self._hull, self._render_pool, self._clock = section, hull, render_pool, clock
         self._exposure = 0.0
         self._renderer: Renderer | None = None
         self._preparing: asyncio.Task[None] | None = None
@@ -135,7 +135,7 @@ class SimulatedCamera(Camera):
 
     @property
     def delay(self) -> str:
-        return self._studio.delay
+        return self._render_pool.delay
 
     def prepare(self) -> None:
         """Load the renderer and draw once, in the background; do nothing in lockstep."""
@@ -154,12 +154,12 @@ class SimulatedCamera(Camera):
 
     async def _capture(self) -> Frame:
         async with self._busy:
-            stage = await self._studio.stage()
+            stage = await self._render_pool.stage()
             if self._renderer is None:
-                self._renderer = await self._studio.renderer(self.width, self.height, self.fov)
+                self._renderer = await self._render_pool.renderer(self.width, self.height, self.fov)
             shot = self._shoot(stage, self._renderer)
             self.drawn += 1
-            return await self._studio.work(shot.develop)
+            return await self._render_pool.work(shot.develop)
 
     def subscribe(self) -> Viewer[Frame]:
         return self._feed.subscribe()
@@ -203,7 +203,7 @@ class SimulatedCamera(Camera):
 
 
 def _fit(fit: Fitting) -> SimulatedCamera:
-    return SimulatedCamera(fit.body[CameraSection], fit.hull, fit.world.studio, fit.robot.clock)
+    return SimulatedCamera(fit.body[CameraSection], fit.hull, fit.world.render_pool, fit.robot.clock)
 
 
 PART = Part(name="camera", interface=Camera, section=CameraSection, fit=_fit, detach=SimulatedCamera.close)

@@ -27,7 +27,7 @@ from roboglot.simulation.detectors.cards import see_markers, see_tags
 from roboglot.simulation.detectors.glance import Glance, Surroundings
 from roboglot.simulation.detectors.lines import see_lines
 from roboglot.simulation.rendering.projection import view_of
-from roboglot.simulation.world.randomness import Chances
+from roboglot.simulation.world.randomness import RandomStreams
 
 T = TypeVar("T")
 log = logging.getLogger(__name__)
@@ -90,7 +90,13 @@ class SimulatedVision(Vision):
     """Vision that numbers people alike in all detectors."""
 
     def __init__(
-        self, section: VisionSection, robot: Robot, camera: Camera, hull: Hull, around: Surroundings, chances: Chances
+        self,
+        section: VisionSection,
+        robot: Robot,
+        camera: Camera,
+        hull: Hull,
+        around: Surroundings,
+        chances: RandomStreams,
     ) -> None:
         self._section, self._robot, self._camera, self._hull = section, robot, camera, hull
         self._around, self._chances = around, chances

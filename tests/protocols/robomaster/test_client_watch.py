@@ -12,8 +12,8 @@ import pytest
 
 from roboglot.model.components.motion.base import Base
 from roboglot.model.robot import Robot
-from roboglot.protocols.robomaster.limits import VIGIL_MISSES_MAX, VIGIL_PERIOD
-from roboglot.protocols.robomaster.liveness import DrivingClient, Echoes, Vigil
+from roboglot.protocols.robomaster.limits import WATCH_MISSES_MAX, WATCH_PERIOD
+from roboglot.protocols.robomaster.liveness import ClientWatch, DrivingClient, Echoes
 from roboglot.protocols.robomaster.server import RoboMasterDoor
 from roboglot.testing import Forward
 from tests.protocols.robomaster.conftest import Connect
@@ -60,14 +60,14 @@ async def test_the_door_stops_what_a_lost_client_drives(
     answering = {"127.0.0.1"}
     monkeypatch.setattr(DrivingClient, "askable", True)
     monkeypatch.setattr(Echoes, "answered", lambda _self: set(answering))
-    monkeypatch.setattr(Vigil, "_plan", lambda _self: None)
+    monkeypatch.setattr(ClientWatch, "_plan", lambda _self: None)
     client = await connect()
 
     async def look_often() -> None:
-        for _ in range(VIGIL_MISSES_MAX):
-            door._vigil._looked = asyncio.get_running_loop().time() + 3600  # acknowledgements are all older
-            door._vigil._look()
-            await forward(seconds=VIGIL_PERIOD)
+        for _ in range(WATCH_MISSES_MAX):
+            door._watch._looked = asyncio.get_running_loop().time() + 3600  # acknowledgements are all older
+            door._watch._look()
+            await forward(seconds=WATCH_PERIOD)
 
     assert await client.ask("command;") == "ok;"
     assert await client.ask("chassis speed x 0.4;") == "ok;"
@@ -97,13 +97,13 @@ def test_silence_alone_is_no_death(driver: DrivingClient) -> None:
 
 def test_host_that_answered_and_stops_answering_is_gone(driver: DrivingClient) -> None:
     assert not driver.missing(True, 0.0)
-    assert [driver.missing(False, 0.0) for _ in range(VIGIL_MISSES_MAX + 2)].index(True) == VIGIL_MISSES_MAX - 1
+    assert [driver.missing(False, 0.0) for _ in range(WATCH_MISSES_MAX + 2)].index(True) == WATCH_MISSES_MAX - 1
 
 
 def test_one_answer_among_many_losses_is_life(driver: DrivingClient) -> None:
     driver.missing(True, 0.0)
     for _ in range(20):
-        assert not any(driver.missing(False, 0.0) for _ in range(VIGIL_MISSES_MAX - 1))
+        assert not any(driver.missing(False, 0.0) for _ in range(WATCH_MISSES_MAX - 1))
         assert not driver.missing(True, 0.0)
 
 
@@ -121,15 +121,15 @@ def test_hosts_of_this_machine_are_not_asked() -> None:
 
 async def test_idle_client_is_never_reported_gone(driver: DrivingClient) -> None:
     gone: list[str] = []
-    vigil = Vigil(lambda: [driver], lambda _name: False, gone.append)
-    vigil._echoes = Echoes()
+    watch = ClientWatch(lambda: [driver], lambda _name: False, gone.append)
+    watch._echoes = Echoes()
     driver.missing(True, 0.0)
     for _ in range(20):
-        vigil._look()
+        watch._look()
     assert gone == []
-    vigil._drives = lambda _name: True
-    for _ in range(VIGIL_MISSES_MAX + 2):
-        vigil._looked += 3600
-        vigil._look()
+    watch._drives = lambda _name: True
+    for _ in range(WATCH_MISSES_MAX + 2):
+        watch._looked += 3600
+        watch._look()
     assert gone == ["10.0.0.1:5000"], "once"
-    vigil.close()
+    watch.close()

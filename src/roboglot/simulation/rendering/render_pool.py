@@ -1,4 +1,4 @@
-"""Renderers of a world's cameras: kernels are loaded for the first one; real time works in threads.
+"""Renderers of a world's cameras: kernels are loaded for the first one; with a real clock, threads do the work.
 
 In lockstep everything runs in place, so that the same seed gives the same pictures at the same instants.
 """
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
-class Studio:
-    """Studio of one world, without cost until the first ``stage``."""
+class RenderPool:
+    """Scenery and renderers for all cameras of one world; costs nothing until the first ``stage``."""
 
     def __init__(self, open_stage: Callable[[], Scenery], clock: Clock) -> None:
         self._open_stage = open_stage
