@@ -1,4 +1,4 @@
-"""Reads text that anyone may have written: what it should not be is a ValueError in plain words."""
+"""Reads text from untrusted sources; malformed text raises ValueError with the reason in plain words."""
 
 from __future__ import annotations
 

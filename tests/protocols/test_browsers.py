@@ -99,7 +99,7 @@ def test_refusals_are_logged_once_as_warnings(caplog: pytest.LogCaptureFixture) 
 
 @pytest.mark.parametrize("origin", ["studio.example", "https://studio.example/path", "http://a b", ""])
 def test_invalid_origins_are_refused_by_name(origin: str) -> None:
-    with pytest.raises(ValueError, match="is no origin"):
+    with pytest.raises(ValueError, match="is not an origin"):
         Browsers("[slamware]", (origin,))
 
 

@@ -135,7 +135,7 @@ async def test_robots_start_apart_and_on_the_floor(simulate):
         (RobotPlacement("a", start=Pose(0.1, 5)), "cannot stand"),
         (RobotPlacement("a", start=Pose(50, 5)), "has no place"),
         (RobotPlacement("a", floor=3), "no floor 3"),
-        (RobotPlacement("a", body="unicorn"), "is named 'unicorn', and it is no .toml file; there are .*universal"),
+        (RobotPlacement("a", body="unicorn"), "is named 'unicorn', and it is not a .toml file; there are .*universal"),
     ],
 )
 def test_impossible_placements_are_refused_in_plain_words(placement, message):

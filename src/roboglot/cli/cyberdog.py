@@ -55,7 +55,7 @@ def command(
     drive X Y YAW SECONDS (m/s, rad/s) · go X Y [THETA] (m, rad) · map NAME · photo [FILE] · record SECONDS [FILE]
     """
     if what not in WORK:
-        sys.exit(f"roboglot cyberdog: {what!r} is none of {', '.join(WORK)}")
+        sys.exit(f"roboglot cyberdog: {what!r} is not one of {', '.join(WORK)}")
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # a failed handshake is reported below
     folder = certs or _own(data)
     try:

@@ -1,4 +1,4 @@
-"""A recorded drive, whatever the format of its file. SI units, REP-103/105 frames."""
+"""A recorded drive, independent of its file's format. SI units, REP-103/105 frames."""
 
 from __future__ import annotations
 

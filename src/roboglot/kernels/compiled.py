@@ -28,7 +28,7 @@ from numba.core.typing import Signature
 from numba.extending import typeof_impl
 from numba.np.numpy_support import from_dtype, map_layout
 
-from roboglot.kernels import ahead  # is in no kernel: a change of it compiles none anew
+from roboglot.kernels import ahead  # part of no kernel: a change of it recompiles none
 
 F = TypeVar("F", bound=Callable[..., object])
 CHECKED = "python"  # error model of kernels that raise ZeroDivisionError

@@ -2,7 +2,7 @@
 
 The protocols have no authentication of their own, and every page in every browser of this machine reaches loopback. So
 a request is refused when a page of another host sent it (Origin), or when its Host is a name that may have been rebound
-to this machine's address. Programs that are no browsers send no Origin and an address or a known name as Host.
+to this machine's address. Programs other than browsers send no Origin and an address or a known name as Host.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Browsers:
     """The rule of one door. ``setting`` names its part of the configuration, for messages; empty: it has none.
 
     ``origins``: pages of other hosts that may use the door ("https://studio.example"), or "*" for all. ``hosts``: names
-    of this machine beside its addresses, localhost and its own host name. Raises ValueError for what is no origin.
+    of this machine beside its addresses, localhost and its own host name. Raises ValueError for what is not an origin.
     """
 
     def __init__(self, setting: str, origins: Sequence[str] = (), hosts: Sequence[str] = ()) -> None:
@@ -169,5 +169,5 @@ def _checked(setting: str, origin: str) -> str:
     """Return an origin of the configuration in the form that browsers send."""
     text = origin.lower().rstrip("/")
     if text not in (ANY, "null") and not _ORIGIN.fullmatch(text):
-        raise ValueError(f'{setting} origins: {origin!r} is no origin; write it as "https://studio.example", or "*"')
+        raise ValueError(f'{setting} origins: {origin!r} is not an origin; write "https://studio.example", or "*"')
     return text

@@ -54,7 +54,7 @@ class Secrets:
                 del self._by_start[_start(form)]
 
     def without(self, payload: bytes) -> bytes:
-        """Return ``payload`` without the known values; bytes that are no text stay."""
+        """Return ``payload`` without the known values; bytes that are not text stay."""
         forms = {form for start in self._starts(payload) for form in self._by_start[start] if form in payload}
         return _replaced(payload, forms) if forms else payload
 

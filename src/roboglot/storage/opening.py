@@ -51,7 +51,7 @@ def open_database(
 
     ``robots``: only this program writes their data, in the order of its calls. ``only_read``: a server's tables are not
     migrated, and cannot be written. Raises ValueError for another kind of URL or a database of a newer program; OSError
-    if the server or its driver is missing or a robot is taken; sqlite3.Error for a file that is no SQLite database.
+    if the server or its driver is missing or a robot is taken; sqlite3.Error for a file that is not an SQLite database.
     """
     if not url:
         return Database(file, in_place=in_place, schema=schema)

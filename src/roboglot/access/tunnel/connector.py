@@ -67,7 +67,7 @@ class KnownGateways:
         try:
             known = json.loads(self._path.read_text()) if self._path.exists() else {}
         except ValueError as error:
-            raise NotTrusted(f"{self._path} cannot be read ({error}): remove it to start afresh") from None
+            raise NotTrusted(f"{self._path} cannot be read ({error}): remove it to start again") from None
         if (kept := known.get(gateway)) == shown:
             return shown, False
         if kept is not None:

@@ -153,7 +153,7 @@ def _unusable(error: BaseException, address: str) -> str:
     match getattr(error, "errno", None):
         case errno.EADDRNOTAVAIL:
             network = IPv4Network(f"{address}/24", strict=False)
-            return f"{address} is no address of this machine; as root: ip route add local {network} dev lo"
+            return f"{address} is not an address of this machine; run as root: ip route add local {network} dev lo"
         case errno.EADDRINUSE:
             return f"{getattr(error, 'strerror', error)}; --address chooses another one"
         case errno.EACCES:

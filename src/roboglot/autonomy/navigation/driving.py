@@ -187,7 +187,7 @@ class OdometryDriving(Driving):
                     await clock.keep_calling(step)
         finally:
             if self._command is command:
-                self._action = None  # the robot brakes from now on: later commands start afresh
+                self._action = None  # the robot brakes from now on: later commands start a new one
 
     async def _hold_at_most(self, action: Action, seconds: float) -> None:
         """Pause for at most ``seconds``, the rest of the command's lifetime."""

@@ -96,13 +96,13 @@ def configuration(recording: Recording, folder: Path) -> Config:
 def _why_not(recording: Recording, config: Config) -> str:
     """Return why the recording cannot be run again; empty if it can."""
     if config.access.on:
-        return "who was let in by name cannot come in again: the recording has no tokens"
+        return "clients signed in, and the recording does not contain their tokens"
     if any(not robot.is_simulated for robot in config.robots):
-        return "real and recorded robots do not live in a world that could be run again"
+        return "it has a real or recorded robot; only simulated robots can be run again"
     if getattr(config.doors.get("vda5050"), "broker", ""):
-        return "fleet control (VDA 5050) speaks through a broker, which the recording does not have"
+        return "fleet control (VDA 5050) used a broker, whose messages are not in the recording"
     if getattr(config.doors.get("visual"), "cloud", ""):
-        return "the cloud of block programs answered then, and the recording does not have what it said"
+        return "the answers of the cloud of block programs are not in the recording"
     late = recording.first / 1e9 - recording.epoch
     if recording.epoch and late > BEGIN_MAX:
         return f"{recording.path} begins {late:.1f} s after its robots, and what happened before is not in it"

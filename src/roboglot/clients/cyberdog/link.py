@@ -181,7 +181,7 @@ class DogLink:
         with self._exchange(call, code, text) as reply:
             async for answer in call:
                 if answer is None:
-                    raise BadAnswer(f"{code}: the robot sent bytes that are no answer")
+                    raise BadAnswer(f"{code}: the robot's answer cannot be decoded")
                 if reply is not None:
                     found = IN_BAND.search(answer.data)
                     reply(answer.data, f"error_code {found[1]}" if found else "")
@@ -193,7 +193,7 @@ class DogLink:
         with self._exchange(call, code, text) as reply:
             async for chunk in call:
                 if chunk is None:
-                    raise BadAnswer(f"{code}: the robot sent bytes that are no part of a file")
+                    raise BadAnswer(f"{code}: a part of the robot's file cannot be decoded")
                 if reply is not None:
                     reply(chunk.SerializeToString(), "")
                 yield chunk
@@ -298,7 +298,7 @@ class _App:
 
 async def _refuse(rpc: grpc.aio.ServicerContext) -> NoReturn:
     """End a call of bytes that are not a message. Raises what gRPC does."""
-    await rpc.abort(grpc.StatusCode.INTERNAL, "these bytes are no message")
+    await rpc.abort(grpc.StatusCode.INTERNAL, "the message cannot be decoded")
     raise AssertionError
 
 

@@ -269,7 +269,7 @@ def _ends(_check: Check, work: Work) -> Why | None:
 
 
 def distance(spot: Spot, walls: Walls) -> float:
-    """Return the distance (m) from the dog's centre to the nearest outline; 0 inside one that is no room."""
+    """Return the distance (m) from the dog's centre to the nearest outline; 0 inside one that is not a room."""
     nearest = math.inf
     for outline in walls:
         for start, end in zip(outline, [*outline[1:], outline[0]], strict=True):

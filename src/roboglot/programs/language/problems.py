@@ -177,7 +177,7 @@ Parameters with a default come after those without.
 带默认值的参数要写在不带默认值的后面。
 
 expression cannot contain assignment
-The name of an argument is no expression; to compare two values write '=='.
+The name of an argument cannot be an expression; to compare two values write '=='.
 参数名不能是表达式；比较两个值请用 '=='。
 
 xpected one or more names after '(\w+)'

@@ -108,7 +108,7 @@ def _apps_ca(apps: Path) -> ec.EllipticCurvePrivateKey:
         write(apps / CA_KEY, _pem(ec.generate_private_key(ec.SECP256R1())), private=True)
     issuer_key = load_pem_private_key((apps / CA_KEY).read_bytes(), password=None)
     if not isinstance(issuer_key, ec.EllipticCurvePrivateKey):
-        raise ValueError(f"{apps / CA_KEY} is no key of ours; remove {apps} to have new ones")
+        raise ValueError(f"{apps / CA_KEY} is not a key that roboglot wrote; remove {apps} to create new ones")
     if not _is_strict(apps / CA_CERT):
         write(apps / CA_CERT, _certificate(APPS_CA, issuer_key, APPS_CA, issuer_key).public_bytes(Encoding.PEM))
     return issuer_key

@@ -1,7 +1,7 @@
 """Detection, within seconds, of a peer that has vanished silently.
 
 A peer that is alive but does not read keeps its connection. TCP_USER_TIMEOUT would end that, too, so the kernel's
-statistics are read instead. The number of lost probes alone is no proof: a driving client is probed many times a
+statistics are read instead. The number of lost probes alone proves nothing: a driving client is probed many times a
 second.
 """
 

@@ -1,4 +1,4 @@
-"""Names that a robot makes anew in each session, as the ids of actions: which stands for which, one to one.
+"""Names that a robot makes new in each session, such as ids of actions: pairs those of two recordings one to one.
 
 Such a name is a UUID anywhere, or a number or a text with digits in a field whose name says id. UUIDs are unique;
 the others are so among the fields of their name: action 1 is not wall 1.

@@ -24,7 +24,7 @@ def load_body(name: str) -> Body:
     path, (name, preset) = body_source(name), split_realism(name)
     if not name.endswith(".toml") and (not name.isidentifier() or not path.is_file()):
         known = sorted(file.stem for file in BODIES.glob("*.toml"))
-        raise BadFile(f"no body is named {name!r}, and it is no .toml file{instead(name, known)}")
+        raise BadFile(f"no body is named {name!r}, and it is not a .toml file{instead(name, known)}")
     content: Any = read_toml(path, _file_type())
     sections = {part.name: getattr(content, part.name) for part in parts() if part.section is not None}
     for part in parts():

@@ -36,7 +36,7 @@ def completed(world: WorldDescription, where: str) -> WorldDescription:
             if not models:
                 names = ", ".join(repr(other.name) for other in floors) or "none"
                 raise BadFile(
-                    f"{where}: floors[{number}].like = {floor.like!r} is no earlier floor; there are: {names}"
+                    f"{where}: floors[{number}].like = {floor.like!r} is not an earlier floor; there are: {names}"
                 )
             walls, furniture = models[0].walls + floor.walls, models[0].furniture + floor.furniture
             floor = msgspec.structs.replace(floor, walls=walls, furniture=furniture)

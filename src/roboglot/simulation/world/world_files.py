@@ -68,7 +68,7 @@ def load_world(name_or_path: str | Path) -> WorldDescription:
         case ".yaml" | ".yml":
             return completed(import_ros_map(path), str(path))
         case _:
-            raise BadFile(f"no world is named {name!r}, and it is no .toml or .yaml file{instead(name, known)}")
+            raise BadFile(f"no world is named {name!r}, and it is not a .toml or .yaml file{instead(name, known)}")
 
 
 def world_sources(name_or_path: str) -> list[Path]:

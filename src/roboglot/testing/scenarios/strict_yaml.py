@@ -1,4 +1,4 @@
-"""YAML that refuses a key given twice, of which PyYAML silently takes the last."""
+"""YAML that refuses a key given twice; PyYAML silently takes the last one."""
 
 from __future__ import annotations
 

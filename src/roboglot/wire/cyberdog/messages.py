@@ -11,7 +11,7 @@ M = TypeVar("M")
 
 
 def reading(decode: Callable[[bytes], M]) -> Callable[[bytes], M | None]:
-    """Return a decoder that returns None for bytes that are no such message, or whose text is not UTF-8."""
+    """Return a decoder that returns None for bytes that are not such a message, or whose text is not UTF-8."""
 
     def read(data: bytes) -> M | None:
         try:

@@ -55,7 +55,7 @@ def _decode_with_line_ends(text: str) -> object:
 
 
 def _refuse(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no JSON")
+    raise ValueError(f"{name} is not JSON")
 
 
 def fitting(values: Mapping[str, object], fields: type[msgspec.Struct]) -> Mapping[str, object]:

@@ -62,7 +62,7 @@ def parse_answer(body: bytes) -> CloudAnswer:
     except (ValueError, KeyError, AttributeError, RecursionError) as error:
         raise BadCloudAnswer(f"no answer of a cloud: {error}"[:200]) from None
     if not isinstance(items, list) or len(items) > ITEMS_MAX or not all(isinstance(item, dict) for item in items):
-        raise BadCloudAnswer("data is no list of programs")
+        raise BadCloudAnswer("data is not a list of programs")
     return answer
 
 

@@ -152,7 +152,7 @@ def is_current(robot: Robot) -> bool:
 
 
 def require_current(robot: Robot) -> None:
-    """Raise Unconnected for a real robot without a link, of which no motion and no rate is known."""
+    """Raise Unconnected for a real robot without a link: its motion and its rates are unknown."""
     if Link in robot:
         robot[Link].require()
 

@@ -1,4 +1,4 @@
-"""Instants at which a robot, and its base, last started: times that count from there begin anew."""
+"""Instants at which a robot, and its base, last started; times counted from there begin again at 0."""
 
 from __future__ import annotations
 

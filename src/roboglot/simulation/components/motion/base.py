@@ -191,7 +191,7 @@ class SimulatedBase(Base):
         return True
 
     def _turn_wheels(self, twist: Twist) -> None:
-        """Command the hull's wheels, of which some may be dead."""
+        """Command the hull's wheels, some of which may be dead."""
         self._ramp.set(twist)
         for notice in self.when_driven:
             notice()

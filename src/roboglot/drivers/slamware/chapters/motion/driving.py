@@ -70,7 +70,7 @@ class SlamwareDriving(Driving):
                     self._check()
             finally:
                 if self._command is wanted:
-                    self._action = None  # it brakes: later commands start afresh
+                    self._action = None  # it brakes: later commands start a new one
 
         self._action = self._start("drive", keep, goal=command, source=source)
         return self._action

@@ -88,7 +88,7 @@ async def recognise_faces(
             faces.stop()
         return {"result": int(FaceResult.DONE)}
     if command not in (0, 1) or (command == 1 and not username):
-        return _refused(call, FaceResult.UNDEFINED, f"command {command} is none of 0, 1 (which has a username) and 2")
+        return _refused(call, FaceResult.UNDEFINED, f"command {command} is not 0, 1 (with a username) or 2")
     if faces.busy:
         return _refused(call, FaceResult.UNDEFINED, BUSY)
     faces.recognise(username if command == 1 else "", id, max(1, min(SECONDS_MAX, timeout)))

@@ -60,7 +60,7 @@ def _chunks(data: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield the chunks within the outermost one."""
     kind, header, _ = HEADER.unpack_from(data)
     if kind != XML:
-        raise BadPackage("the manifest is no binary XML")
+        raise BadPackage("the manifest is not binary XML")
     at = header
     while at < len(data):
         kind, _, size = HEADER.unpack_from(data, at)

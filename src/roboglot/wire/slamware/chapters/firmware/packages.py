@@ -51,7 +51,7 @@ def entry_of(file: BinaryIO, name: str) -> bytes:
     tail = file.read(TAIL)
     end = tail.rfind(b"PK\5\6")
     if end < 0 or len(tail) < end + 22:
-        raise BadPackage("it is no zip archive")
+        raise BadPackage("it is not a zip archive")
     if int.from_bytes(tail[end + 12 : end + 16], "little") > DIRECTORY_MAX:
         raise BadPackage("its table of contents is too long")
     try:
@@ -60,7 +60,7 @@ def entry_of(file: BinaryIO, name: str) -> bytes:
     except KeyError:
         raise BadPackage(f"it has no {name}") from None
     except (zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, ValueError, OSError, EOFError) as error:
-        raise BadPackage(f"it is no sound zip archive: {error}") from None
+        raise BadPackage(f"the zip archive is damaged: {error}") from None
     if len(data) > ENTRY_MAX:
         raise BadPackage(f"its {name} is too long")
     return data
