@@ -1,4 +1,4 @@
-"""Narrowing of types, for tests that know more of a value than its type says."""
+"""Narrowing of types, for tests that know more about a value than its type says."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def test_overrides_win_over_the_file(tmp_path: Path) -> None:
 
 
 def test_address_moves_first_robot_of_a_file(tmp_path: Path) -> None:
-    """It took the file's robots away and started another one."""
+    """Regression: it removed the file's robots and started another one."""
     path = tmp_path / "robots.toml"
     path.write_text('[[robots]]\nname = "x"\nbody = "cyberdog2"\n[[robots]]\nname = "y"\n', "utf-8")
     robots = load_config(path, {"address": "127.3.0.1"}).robots

@@ -1,4 +1,4 @@
-"""The wheel with the core alone: clients and commands work, and what is missing is one sentence.
+"""The wheel with the core alone: clients and commands work; what lacks an extra says so in one sentence.
 
 The environment is made without a network: the wheel is built here, and the packages of the core's requirements are
 linked from this environment, nothing else.

@@ -1,4 +1,4 @@
-"""A robot of the runtime that asks who comes, in lockstep."""
+"""A runtime in lockstep whose robot has access control."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def store(data: Path) -> AccessStore:
-    """The list, with the matrix' callers by address and as apps."""
+    """The access list with the matrix's callers, by address and as apps."""
     store = open_store(data)
     for caller in CALLERS:
         robot = "b" if caller.name == "owner-of-b" else "a"

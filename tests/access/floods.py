@@ -64,7 +64,7 @@ def handshakes(robot: str, count: int, _: Path) -> None:
 
 
 def log_ins(robot: str, count: int, _: Path) -> None:
-    """Guesses of a password, many on each connection, not waiting for answers."""
+    """Guesses of a password, many on each connection, without waiting for answers."""
     for line in connections(robot, (1448,), -(-count // TRIES_AT_ONCE)):
         for number in range(TRIES_AT_ONCE):
             guess = base64.b64encode(f"anna:guess {number}".encode()).decode()

@@ -1,4 +1,4 @@
-"""The eight callers of the matrix, and the doors as they see them."""
+"""The eight callers of the access matrix, and what each door answers them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ CALLERS = (
 
 
 async def rest_status(client: httpx.AsyncClient, key: str) -> int:
-    """Return the status that an operation is answered; braces of its path are filled in."""
+    """Return the HTTP status of an operation's answer; names in the braces of its path are filled in."""
     method, path = key.split(" ", 1)
     filled = "/".join("1" if part.startswith("{") else part for part in path.split("/"))
     reply = await client.request(method, filled, content=b"{}" if method in ("POST", "PUT") else None)
@@ -119,7 +119,7 @@ async def open_frames(address: str) -> TextLink | None:
 
 
 async def frame_states(link: TextLink, frames: list[dict[str, object]]) -> list[tuple[object, str]]:
-    """State and words of what each frame is answered."""
+    """Return the state and the message of the answer to each frame."""
     states: list[tuple[object, str]] = []
     for number, frame in enumerate(frames):
         await link.send(json.dumps({"id": f"f{number}", **frame}))

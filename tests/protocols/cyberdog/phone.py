@@ -168,7 +168,7 @@ def _read(text: str) -> Any:
 
 
 async def until(condition: Callable[[], object], patience: float = PATIENCE) -> None:
-    """Wait, in real time, until the sockets have brought it about."""
+    """Wait, in real time, until the condition holds; sockets bring it about."""
     async with asyncio.timeout(patience):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.002)

@@ -57,7 +57,7 @@ class Viewer:
         await self.socket.close()
 
     async def until(self, true: Callable[[], object], seconds: float = 0.0) -> None:
-        """Wait until that is so; robot time passes too, at most ``seconds`` of it."""
+        """Wait until the condition holds; robot time passes too, at most ``seconds`` of it."""
         end = self.clock.time() + seconds
         async with asyncio.timeout(PATIENCE):
             while not true():

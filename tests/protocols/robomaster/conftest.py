@@ -1,4 +1,4 @@
-"""A door on free ports of a loopback address, and a tiny client of its own that knows nothing of ours."""
+"""A door on free ports of a loopback address, and a tiny client that shares no code with ours."""
 
 from __future__ import annotations
 

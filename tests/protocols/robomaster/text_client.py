@@ -1,4 +1,4 @@
-"""A tiny client of the text protocol that knows nothing of ours, and where its robot is."""
+"""A tiny client of the text protocol that shares no code with ours, and the address of its robot."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class Peer:
         return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok is not None]
 
     async def until(self, true: Callable[[], object], seconds: float = 0.0) -> None:
-        """Wait until that is so; robot time passes too, at most ``seconds`` of it."""
+        """Wait until the condition holds; robot time passes too, at most ``seconds`` of it."""
         end = self.clock.time() + seconds
         async with asyncio.timeout(PATIENCE):
             while not true():

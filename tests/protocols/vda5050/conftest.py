@@ -54,7 +54,7 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
 
 
 class Control:
-    """A fleet control of its own making: topics, messages, and nothing of roboglot's."""
+    """An independent fleet control: its own topics and messages, and no code of roboglot's."""
 
     def __init__(self, port: int, level: str) -> None:
         self.level = level
@@ -111,7 +111,7 @@ class Yard:
             await runtime.close()
 
     async def until(self, true: Callable[[], bool], seconds: float = 60.0) -> None:
-        """Let robot time pass, at most ``seconds`` of it, until that is so; messages take real time."""
+        """Let robot time pass, at most ``seconds`` of it, until the condition holds; messages take real time."""
         end, real = self.clock.time() + seconds, time.monotonic() + PATIENCE
         while True:
             self.control.hear()

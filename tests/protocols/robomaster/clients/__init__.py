@@ -1,1 +1,1 @@
-"""Clients of others, and the transcripts of the documentation."""
+"""Third-party clients, and the transcripts of the documentation."""
