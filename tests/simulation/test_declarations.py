@@ -63,7 +63,7 @@ def test_the_shipped_worlds_load(name):
         ('shape = "cylinder"', 'shape = "ball"', r"world.toml:16: .*'ball'"),
         ("doors = [{ at = 2 }]", "doors = [{ at = 5.9 }]", r"floors\[0\].walls\[0\].doors\[0\].*6 m long"),
         ("from = [6, 0], to = [6, 4]", "from = [6, 4], to = [6, 4]", r"floors\[0\].walls\[1\] has no length"),
-        ('like = "low"', 'like = "lower"', "no earlier floor; there are: 'low'"),
+        ('like = "low"', 'like = "lower"', "not an earlier floor; there are: 'low'"),
         ("at = [8, 6]", "at = [8, 60]", r"floors\[1\].furniture\[1\].at = \[8.0, 60.0\] lies outside the floor"),
         ('name = "test"', 'name = "test', "not TOML"),
         ('name = "test"', 'start = { at = [5, 5], floor = 2 }', "start.floor = 2, but the highest floor is 1"),
