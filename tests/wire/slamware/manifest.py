@@ -42,10 +42,10 @@ def manifest(package: str, version: str = "", number: int = 7, *, wide: bool = F
     return struct.pack("<HHI", 3, 8, 8 + len(body)) + body
 
 
-def archive(**files: bytes) -> bytes:
+def archive(method: int = zipfile.ZIP_DEFLATED, /, **files: bytes) -> bytes:
     """Return a zip archive; double underscores in the names are dots."""
     target = io.BytesIO()
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as zipped:
+    with zipfile.ZipFile(target, "w", method) as zipped:
         for name, data in files.items():
             zipped.writestr(name.replace("__", "."), data)
     return target.getvalue()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import tracemalloc
+import zipfile
 
 import pytest
 from hypothesis import given
@@ -42,6 +44,23 @@ def test_firmware_packages_are_described() -> None:
 def test_no_firmware(package: bytes) -> None:
     with pytest.raises(BadPackage):
         read_firmware(io.BytesIO(package))
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+def test_usual_packages_are_read(method: int) -> None:
+    assert read_firmware(io.BytesIO(archive(method, firmware__json=b'{"version": "1"}'))).version == "1"
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_bombs_of_other_methods_stay_packed(method: int) -> None:
+    package = io.BytesIO(archive(method, firmware__json=b" " * 2 * ENTRY_MAX))
+    tracemalloc.start()
+    try:
+        with pytest.raises(BadPackage, match="another method"):
+            read_firmware(package)
+        assert tracemalloc.get_traced_memory()[1] < ENTRY_MAX
+    finally:
+        tracemalloc.stop()
 
 
 @given(st.binary(max_size=400), st.integers(0, 400))
