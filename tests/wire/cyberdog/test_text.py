@@ -34,6 +34,13 @@ def test_nearly_json_is_read_or_refused(text: str) -> None:
         read_params(text)
 
 
+@pytest.mark.parametrize("end", ["", "\n"])
+@pytest.mark.parametrize("value", ['"\\ud800"', "1e999", "-1e999", "NaN", "Infinity", "9" * 5000, "[" * 100_000])
+def test_line_ends_let_nothing_else_in(value: str, end: str) -> None:
+    with pytest.raises(NotJson):
+        read_params(f'{{"a": {value}, "b": "{end}"}}')
+
+
 @given(JSON)
 def test_all_json_is_read(value: object) -> None:
     read = read_params(json.dumps(value, ensure_ascii=False).encode("utf-8", "ignore").decode())

@@ -48,8 +48,10 @@ def read_json(text: str) -> object:
 
 
 def _decode_with_line_ends(text: str) -> object:
+    """Return the value in ``text``, within the strict reader's bounds: no half characters, no infinite numbers."""
     try:
-        return _lenient.decode(text)
+        value: object = msgspec.json.decode(json.dumps(_lenient.decode(text)))
+        return value
     except (ValueError, RecursionError) as error:
         raise NotJson(str(error)) from None
 
