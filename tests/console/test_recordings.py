@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from mcap.writer import Writer
 
 from roboglot.console.recordings.kept import RecordingFolder
 from roboglot.model.errors import Busy, NotFound, Refused
@@ -55,6 +56,18 @@ def test_files_without_an_end_have_no_length(tmp_path: Path) -> None:
     assert {one.file: one.seconds for one in RecordingFolder(tmp_path).look(None)} == dict.fromkeys(
         ("killed.mcap", "other.mcap", "empty.mcap")
     )
+
+
+@pytest.mark.parametrize("strange", [{"robots": "no JSON"}, {"robots": "[" * 100_000}, {"robots": "[1, {}]"}])
+def test_strange_facts_hide_no_recording(tmp_path: Path, strange: dict[str, str]) -> None:
+    written(tmp_path / "ours.mcap", 3)
+    with (tmp_path / "theirs.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.add_metadata("roboglot", FACTS | {"part": "the first"} | strange)
+        writer.finish()
+    found = {one.file: (one.robots, one.parts[0].number) for one in RecordingFolder(tmp_path).look(None)}
+    assert found == {"ours.mcap": (["a", "b"], 1), "theirs.mcap": ([], 1)}
 
 
 def test_nothing_outside_of_the_folder_is_touched(tmp_path: Path) -> None:

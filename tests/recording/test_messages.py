@@ -6,6 +6,7 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 import pytest
 from foxglove_schemas_protobuf import FrameTransforms_pb2, LaserScan_pb2, PoseInFrame_pb2
@@ -17,7 +18,8 @@ from roboglot.model.sensing import LaserScan
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording import foxglove
 from roboglot.recording.entries import Entry, encoded
-from roboglot.recording.messages import decode_exchange, encode_exchange, encode_plain
+from roboglot.recording.messages import decode_exchange, decode_input, encode_exchange, encode_plain
+from roboglot.recording.reader import Record
 from roboglot.recording.redaction import FIELDS, Redaction
 
 if TYPE_CHECKING:
@@ -179,3 +181,13 @@ def test_scans_are_the_librarys(at: int, frame: str, ranges: list[float], start:
     message.pose.orientation.w = 1.0
     stamp(message.timestamp, at)
     assert found == message.SerializeToString()
+
+
+@pytest.mark.parametrize("data", [b"", b"[]", b"3", b'"\xff"', b"[" * 100_000, b'{"a": ' * 100_000])
+def test_messages_are_objects(data: bytes) -> None:
+    def parsed(data: bytes) -> object:
+        return Record("/a/inputs", "roboglot.Input", 0, data).json()
+
+    for read in (decode_exchange, decode_input, parsed):
+        with pytest.raises((msgspec.DecodeError, UnicodeDecodeError)):
+            read(data)

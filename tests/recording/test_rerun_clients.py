@@ -190,6 +190,10 @@ async def test_unrepeatable_recordings_are_refused(tmp_path: Path) -> None:
         attached = recording.attachments | {"config.json": json.dumps(broken).encode()}
         with pytest.raises(NoRerun, match=word):
             configuration(dataclasses.replace(recording, attachments=attached), tmp_path)
+    for damaged in (b"", b"[]", b"{}", b"[" * 100_000, b'{"world": 1}', b'{"world": "empty", "doors": []}'):
+        attached = recording.attachments | {"config.json": damaged}
+        with pytest.raises(NoRerun, match="lacks its configuration"):
+            configuration(dataclasses.replace(recording, attachments=attached), tmp_path)
     with pytest.raises(NoRerun, match=r"begins 12\.0 s after"):
         configuration(dataclasses.replace(recording, first=recording.first + 12_000_000_000), tmp_path)
     far = json.dumps(values | {"database": "postgresql://far/away", "registry": "far.db"}).encode()

@@ -19,6 +19,7 @@ import numpy as np
 from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.readings import READINGS
+from roboglot.validation import decode_json
 
 DEPTH_MAX = 6
 ITEMS_MAX = 200  # of a list in an event
@@ -43,9 +44,6 @@ class Kept(msgspec.Struct, omit_defaults=True):
     text: str = ""
     json: msgspec.Raw | msgspec.UnsetType = msgspec.UNSET
     base64: str = ""
-
-
-_kept = msgspec.json.Decoder(Kept)
 
 
 def split(payload: bytes) -> tuple[str, bytes, bytes]:
@@ -90,7 +88,7 @@ def encode_exchange(exchange: Exchange) -> bytes:
 
 def decode_exchange(data: bytes) -> Exchange:
     """Return the exchange of a message. Raises msgspec.DecodeError, ValueError."""
-    kept = _kept.decode(data)
+    kept = decode_json(data, Kept)
     body = b"" if kept.json is msgspec.UNSET else bytes(kept.json)
     payload = kept.text.encode() + body + (base64.b64decode(kept.base64) if kept.base64 else b"")
     return Exchange(
@@ -116,7 +114,7 @@ def encode_input(given: Input) -> bytes:
 
 def decode_input(data: bytes) -> Input:
     """Return the input of a message. Raises msgspec.DecodeError."""
-    value = _parsed.decode(data)
+    value = decode_json(data, dict[str, object])
     return msgspec.convert([value.get(name) for name in Input._fields], Input)
 
 

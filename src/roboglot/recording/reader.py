@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import re
 from collections.abc import Iterator, Sequence
@@ -23,6 +22,7 @@ from roboglot.model.inputs.outside import Input
 from roboglot.model.tap import DRIVER, SILENT, Direction, Exchange
 from roboglot.recording.latched_values import REPEATED
 from roboglot.recording.messages import decode_exchange, decode_input
+from roboglot.validation import decode_json
 from roboglot.values import dataclass
 from roboglot.wire.mcap_chunks import Allowance, Bomb, records_in
 from roboglot.wire.mcap_damage import DAMAGE, RECORD_MAX
@@ -45,8 +45,8 @@ class Record:
     data: bytes
 
     def json(self) -> Any:
-        """Return the message parsed; only for JSON messages."""
-        return json.loads(self.data)
+        """Return a JSON message's object. Raises msgspec.DecodeError, also if it is something else."""
+        return decode_json(self.data, dict[str, object])
 
 
 @dataclass(slots=True)

@@ -124,3 +124,17 @@ def test_a_battery_that_says_little_is_translated() -> None:
     messages = list(Ros2Translator().translate(Record("/a/battery", "roboglot.Battery", 5, b'{"percentage": 0.5}')))
     assert [message.topic for message in messages] == ["/a/battery_state", "/a/battery/state"]
     assert math.isfinite(messages[0].at)
+
+
+@pytest.mark.parametrize(
+    ("schema", "data"),
+    [
+        ("roboglot.Battery", b'{"voltage": 1e300}'),  # a float of 32 bits there
+        ("roboglot.Battery", b"[" * 100_000),
+        ("roboglot.Lidar", b'{"a": ' * 100_000),
+        ("foxglove.Grid", b"\xff"),
+    ],
+)
+def test_values_without_a_ros_form_are_damage(schema: str, data: bytes) -> None:
+    with pytest.raises(ValueError, match="/a/x"):
+        list(Ros2Translator().translate(Record("/a/x", schema, 1, data)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
-import json
 import shutil
 import sys
 import tempfile
@@ -70,20 +69,24 @@ def command(
 
 def configuration(recording: Recording, folder: Path) -> Config:
     """Return the recording's configuration, for a rerun with its data in ``folder``. Raises NoRerun."""
+    from msgspec import DecodeError, convert
+
     from roboglot.config import ConsoleConfig, config_of
     from roboglot.protocols import sections
+    from roboglot.validation import decode_json
 
     clock = recording.facts.get("clock", "")
     if clock != "lockstep":
         raise NoRerun(f"{recording.path} was recorded on a running clock ({clock}), so a second run would differ")
     try:
-        values: dict[str, Any] = json.loads(recording.attachments["config.json"])
-    except (KeyError, ValueError):
+        values = decode_json(recording.attachments["config.json"], dict[str, object])
+        of_doors, at = convert((values.pop("doors", {}), values["world"]), tuple[dict[str, object], str])
+    except (KeyError, DecodeError):
         raise NoRerun(f"{recording.path} lacks its configuration") from None
     for name, data in recording.attachments.items():  # world and bodies as they were then
         (folder / Path(name).name).write_bytes(data)
-    values |= values.pop("doors", {}) | {"data": str(folder / "data")}
-    if (world := folder / Path(values["world"]).name).suffix and world.exists():
+    values |= of_doors | {"data": str(folder / "data")}
+    if (world := folder / Path(at).name).suffix and world.exists():
         values["world"] = str(world)
     config = config_of(values, doors=sections(), origin=str(recording.path))
     if why := _why_not(recording, config):

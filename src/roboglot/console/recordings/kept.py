@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import os
 import re
 import shlex
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -21,11 +20,13 @@ import msgspec
 from roboglot.console.http import SAFETY, Problem, Send, answer
 from roboglot.console.settings import COMPARE_SECONDS, DOWNLOAD_BYTES
 from roboglot.model.errors import Busy, NotFound, Refused
+from roboglot.validation import decode_json
 
 SUFFIX = ".mcap"
 REPLAY_ADDRESS = "127.0.0.100"  # hardly ever another robot's
 HEAD_RECORDS = 3  # among which the metadata is
 _numbered = re.compile(r"(.+)-(\d{3,})")
+_part_number = re.compile(r"[1-9][0-9]{0,5}")
 REPORT = b"default-src 'none'; style-src 'unsafe-inline'"  # what the page of a comparison may load
 
 
@@ -82,18 +83,18 @@ class RecordingFolder:
         parts = sorted((part for part, _, _ in members), key=lambda part: part.number)
         facts = members[0][1]
         firsts, lasts = [p.first for p in parts if p.first is not None], [p.last for p in parts if p.last is not None]
-        robots = json.loads(facts.get("robots", "{}"))
+        robots = _robots(facts)
         whole = len(lasts) == len(parts)
         return Kept(
             parts[0].file,
             parts,
-            sorted(robots) or ([facts["robot"]] if "robot" in facts else []),
+            robots or ([facts["robot"]] if "robot" in facts else []),
             facts.get("world", ""),
             round(max(lasts) - min(firsts), 1) if whole else None,
             sum(part.bytes for part in parts),
             max(at for _, _, at in members),
             running is not None and running.parent == self._folder and running.name in {p.file for p in parts},
-            self._play(parts[0].file, sorted(robots)),
+            self._play(parts[0].file, robots),
         )
 
     def _play(self, file: str, robots: Sequence[str]) -> str:
@@ -182,6 +183,14 @@ def _piece(source: IO[bytes], size: int) -> bytes:
     return source.read(size).ljust(size, b"\0")
 
 
+def _robots(facts: Mapping[str, str]) -> list[str]:
+    """Return the names of the recorded robots, sorted; none if the file does not tell them in our form."""
+    try:
+        return sorted(decode_json(facts.get("robots", "{}"), dict[str, object]))
+    except msgspec.DecodeError:
+        return []
+
+
 def _base(part: Part) -> str:
     """Return the name that all parts of a recording share."""
     stem = part.file.removesuffix(SUFFIX)
@@ -196,7 +205,8 @@ def _outline(path: Path, size: int) -> tuple[Part, dict[str, str]]:
     with path.open("rb") as file:
         summary = summary_of(file)
     facts = _facts(path)
-    number = int(facts.get("part", "1"))
+    part = facts.get("part", "")
+    number = int(part) if _part_number.fullmatch(part) else 1
     if summary is None or summary.statistics is None:
         return Part(path.name, size, number), facts
     times = summary.statistics.message_start_time / 1e9, summary.statistics.message_end_time / 1e9

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Msg, Msgarg
 
 JSON = "std_msgs/msg/String"
+# Of damaged messages: their own bytes, values that no ROS type holds, and those that are missing.
+DAMAGE = (DecodeError, msgspec.MsgspecError, SerdeError, struct.error, LookupError, ArithmeticError, RecursionError)
 ROS_LEVELS = {number: python for python, number in LEVELS.items()}  # rcl's levels equal Python's
 SPEED_SPAN = 0.5  # s of poses from which a speed is computed
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -138,7 +140,7 @@ class Ros2Translator:
                     yield from handler(record, TYPES[record.schema].FromString(record.data))
             else:
                 yield from self._own(record)
-        except (DecodeError, msgspec.MsgspecError) as error:
+        except DAMAGE as error:
             raise ValueError(f"{record.topic}: {error}") from None
 
     def _own(self, record: Record) -> Iterator[RosMessage]:
