@@ -77,6 +77,34 @@ async def test_only_known_tokens_and_passwords_let_in(runtime: Runtime, store: A
     assert await status(("anna", "correct horse")) == 401
 
 
+async def first_line(port: int, path: str, proof: bytes) -> bytes:
+    """First line of the answer to a request that a REST door and a WebSocket understand; empty: the line was cut."""
+    reader, writer = await asyncio.open_connection(ADDRESS, port)
+    head = f"GET {path} HTTP/1.1\r\nHost: {ADDRESS}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+    key = "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+    writer.write(f"{head}{key}Authorization: ".encode() + proof + b"\r\n\r\n")
+    try:
+        async with asyncio.timeout(10):
+            return await reader.readline()
+    finally:
+        writer.close()
+
+
+async def test_a_proof_that_is_no_text_is_refused(runtime: Runtime, caplog: pytest.LogCaptureFixture) -> None:
+    for proof in (b"Basic \xe9", b"Basic \xff==", b"Basic /w==", b"Bearer \xe9", b"\xe9"):
+        for port, path in ((1448, POSE), (50053, "/programs")):
+            assert b" 401 " in await first_line(port, path, proof), (port, proof)
+    assert not [record.message for record in caplog.records if record.levelname == "ERROR"]
+
+
+async def test_a_failed_check_ends_the_opening(runtime: Runtime, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def fail(*_: object) -> str:
+        raise OSError("the list cannot be read")
+
+    monkeypatch.setattr(guard_of(runtime), "admit", fail)
+    assert await first_line(50053, "/programs", b"Bearer x") == b""
+
+
 async def test_address_is_allowed_in_each_of_its_forms(runtime: Runtime, store: AccessStore) -> None:
     for given, peers in (
         ("::ffff:127.0.95.77", ["127.0.95.77:4242", "[::ffff:127.0.95.77]:4242", "ipv6:%5B::ffff:127.0.95.77%5D:4242"]),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 
 
 def host_of(address: str) -> str:
@@ -25,6 +24,6 @@ def basic_of(value: str) -> tuple[str, str]:
         return "", ""
     try:
         name, _, password = base64.b64decode(rest.strip(), validate=True).decode().partition(":")
-    except (binascii.Error, UnicodeDecodeError):
+    except ValueError:  # no base64, or no text in it
         return "", ""
     return name, password

@@ -251,5 +251,7 @@ class Connection(asyncio.Protocol):
         self._pending.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
             log.error("cannot answer %s: %s", self._name, error, exc_info=error)
+            if self._protocol is None:  # it was not admitted, and would wait for ever
+                self.writer.abort()
         if self._transport is not None and not self._transport.is_closing() and len(self._pending) < PENDING_MAX:
             self._transport.resume_reading()
