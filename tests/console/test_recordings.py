@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+from io import BytesIO
 from pathlib import Path
 
+import msgspec
 import pytest
 from mcap.writer import Writer
 
+from roboglot.console.http import Problem
+from roboglot.console.recordings import kept
 from roboglot.console.recordings.kept import RecordingFolder
 from roboglot.model.errors import Busy, NotFound, Refused
 from roboglot.recording.entries import NANO, Entry
@@ -18,8 +22,8 @@ from tests.console.conftest import Shown
 FACTS = {"version": "1", "world": "office", "robots": '{"a": "universal", "b": "cyberdog2"}'}
 
 
-def written(path: Path, seconds: int, limits: Limits | None = None) -> None:
-    files = Files(path, Origin(FACTS), Redaction(), limits or Limits())
+def written(path: Path, seconds: int, limits: Limits | None = None, facts: dict[str, str] | None = None) -> None:
+    files = Files(path, Origin(FACTS | (facts or {})), Redaction(), limits or Limits())
     files.open(1000 * NANO)
     for second in range(seconds + 1):
         files.write(Entry("/a/events", "event", (1000 + second) * NANO, 0, {"event": "Tick", "number": second}))
@@ -30,12 +34,58 @@ def written(path: Path, seconds: int, limits: Limits | None = None) -> None:
 def test_recordings_are_listed_with_what_people_look_for(tmp_path: Path) -> None:
     for number, name in enumerate(("old", "new")):
         written(tmp_path / f"{name}.mcap", 5 + number)
-        os.utime(tmp_path / f"{name}.mcap", (1e9 + number, 1e9 + number))
     (tmp_path / "notes.txt").write_text("no recording")
     new, old = RecordingFolder(tmp_path).look(None)
-    assert (new.file, new.seconds, new.robots, new.world, new.at) == ("new.mcap", 6.0, ["a", "b"], "office", 1e9 + 1)
+    assert (new.file, new.seconds, new.robots, new.world) == ("new.mcap", 6.0, ["a", "b"], "office")
     assert (old.file, old.seconds, old.bytes) == ("old.mcap", 5.0, (tmp_path / "old.mcap").stat().st_size)
     assert f"--robot 'a=recording:{tmp_path / 'new.mcap'}#a'" in new.play
+
+
+def test_copies_keep_the_date_of_the_recording(tmp_path: Path) -> None:
+    written(tmp_path / "copied.mcap", 1)
+    written(tmp_path / "later.mcap", 1)
+    os.utime(tmp_path / "copied.mcap", (2e9, 2e9))
+    later, copied = RecordingFolder(tmp_path).look(None)
+    assert (copied.file, later.file) == ("copied.mcap", "later.mcap")
+    assert later.at - 60 < copied.at <= later.at < 2e9
+
+
+@pytest.mark.parametrize(
+    "facts",
+    [
+        {"robots": "no JSON"},
+        {"robots": "7"},
+        {"robots": '["a"]'},
+        {"robots": '{"a": 1}'},
+        {"robots": "[" * 100_000},
+        {"begun": "yesterday", "robots": "{"},
+    ],
+)
+def test_damaged_head_harms_no_other_recording(tmp_path: Path, facts: dict[str, str]) -> None:
+    written(tmp_path / "good.mcap", 2)
+    written(tmp_path / "bad.mcap", 3, facts=facts)
+    bad, good = sorted(RecordingFolder(tmp_path).look(None), key=lambda one: one.file)
+    assert (good.damage, good.robots, good.seconds) == ("", ["a", "b"], 2.0)
+    assert (bad.damage, bad.robots) == ("the list of robots at its head cannot be read", [])
+    msgspec.json.encode([bad, good])
+    assert RecordingFolder(tmp_path).path("bad.mcap").exists()
+    RecordingFolder(tmp_path).remove("bad.mcap", None)
+    assert [path.name for path in tmp_path.iterdir()] == ["good.mcap"]
+
+
+@pytest.mark.parametrize("number", ["two", "", "9" * 5000, "-1"])
+def test_damaged_number_of_a_part_is_named(tmp_path: Path, number: str) -> None:
+    (tmp_path / "a.mcap").write_bytes(head_of_part(number))
+    (one,) = RecordingFolder(tmp_path).look(None)
+    assert (one.damage, one.file) == ("the number of the part at its head cannot be read", "a.mcap")
+
+
+def test_names_of_other_alphabets_are_listed(tmp_path: Path) -> None:
+    written(tmp_path / "good.mcap", 2)
+    (tmp_path / os.fsdecode(b"\xff\xfe.mcap")).write_bytes((tmp_path / "good.mcap").read_bytes())
+    found = {one.damage for one in RecordingFolder(tmp_path).look(None)}
+    assert found == {"", "its name is not UTF-8: rename the file"}
+    msgspec.json.encode(RecordingFolder(tmp_path).look(None))
 
 
 def test_parts_are_one_recording(tmp_path: Path) -> None:
@@ -53,9 +103,21 @@ def test_files_without_an_end_have_no_length(tmp_path: Path) -> None:
     os.truncate(tmp_path / "killed.mcap", (tmp_path / "killed.mcap").stat().st_size - 100)
     (tmp_path / "other.mcap").write_bytes(b"no MCAP at all")
     (tmp_path / "empty.mcap").touch()
-    assert {one.file: one.seconds for one in RecordingFolder(tmp_path).look(None)} == dict.fromkeys(
-        ("killed.mcap", "other.mcap", "empty.mcap")
-    )
+    found = {one.file: (one.seconds, one.damage) for one in RecordingFolder(tmp_path).look(None)}
+    assert found == {
+        "killed.mcap": (None, ""),
+        "other.mcap": (None, "other.mcap is not an MCAP file"),
+        "empty.mcap": (None, "empty.mcap is not an MCAP file"),
+    }
+
+
+def head_of_part(number: str) -> bytes:
+    """Return a recording without an end whose head says that it is this part."""
+    file = BytesIO()
+    writer = Writer(file)
+    writer.start(profile="", library="roboglot")
+    writer.add_metadata("roboglot", FACTS | {"part": number})
+    return file.getvalue()
 
 
 @pytest.mark.parametrize("strange", [{"robots": "no JSON"}, {"robots": "[" * 100_000}, {"robots": "[1, {}]"}])
@@ -138,5 +200,22 @@ async def test_two_recordings_are_compared_on_a_page(shown: Shown) -> None:
     one, other = files
     page = (await shown.read(f"/api/recordings/{one}/compared/{other}/a")).decode()
     assert "ground truth: at most 0.00 m apart" in page
+    assert await shown.read(f"/api/recordings/{one}/compared/{other}/a") == page.encode()
     status, words = await shown.ask(f"/api/recordings/{one}/compared/{other}/z")
     assert (status, words["error"]) == (409, f"{one} has nothing of that robot and protocol")
+
+
+@pytest.mark.slow  # starts processes
+async def test_comparison_without_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = Files(tmp_path / "large.mcap", Origin(FACTS), Redaction(), Limits())
+    files.open(1000 * NANO)
+    files.write(Entry("/a/events", "event", 1000 * NANO, 0, {"event": "Tick", "text": " " * (200 << 20)}))
+    files.close()
+    for limit in (20 << 20, 300 << 20):  # it cannot begin; it cannot go on
+        monkeypatch.setattr(kept, "COMPARE_MEMORY", limit)
+        with pytest.raises(Problem) as refused:
+            await RecordingFolder(tmp_path).send_comparison(
+                "large.mcap", "large.mcap", "", lambda _message: pytest.fail("sent")
+            )
+        assert refused.value.status == 409
+    assert refused.value.why == "out of memory: the recordings are too large to be compared"

@@ -10,15 +10,17 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from roboglot.model.events import FloorReached
 from roboglot.model.geometry import Pose
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing import reports
 from roboglot.recording.comparing.comparison import Comparison
-from roboglot.recording.comparing.drives import ODOMETRY, POSES, TRUTH, Drive, Track, compare_drives
+from roboglot.recording.comparing.drives import ODOMETRY, POSES, TRUTH, Drive, Track, compare_drives, read_drive
 from roboglot.recording.comparing.masks import STRICT, Mask
 from roboglot.recording.comparing.recordings import compare_recordings
 from roboglot.recording.entries import NANO, Entry
 from roboglot.recording.files import Files, Limits, Origin
+from roboglot.recording.messages import plain
 from roboglot.recording.reader import BadRecording
 from roboglot.recording.redaction import Redaction
 
@@ -140,6 +142,24 @@ def test_actions_are_paired_in_order(tmp_path: Path) -> None:
         ("action 1", "(not there)", "sit succeeded"),
         ("action 2", "turn succeeded", "turn failed"),
     ]
+
+
+def test_floors_are_paired_in_order() -> None:
+    places = {TRUTH: track(straight())}
+    outcome = compare_drives(Drive(places, floors=[1, 0]), Drive(places, floors=[2, 0]), Mask(), ("one", "other"))
+    row = next(row for row in outcome.rows if row.operation == "floors")
+    assert (row.checks, row.agreed) == (2, 1)
+    assert [(d.what, d.one, d.other) for d in row.differences] == [("floor 1", "1", "2")]
+
+
+def test_floors_are_read_from_events(tmp_path: Path) -> None:
+    files = Files(tmp_path / "a.mcap", Origin({"version": "1"}), Redaction(), Limits())
+    files.open(NANO)
+    for at, floor in enumerate((1, 0)):
+        reached = plain(FloorReached(stamp=float(at), floor=floor, place=Pose())) | {"event": "FloorReached"}
+        files.write(Entry("/a/events", "event", (1000 + at) * NANO, 0, reached))
+    files.close()
+    assert read_drive(tmp_path / "a.mcap", "a").floors == [1, 0]
 
 
 def test_waiting_before_the_drive_does_not_count() -> None:

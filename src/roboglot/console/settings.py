@@ -13,6 +13,7 @@ CALLS_MAX = 8  # pages that show live video by WebRTC
 CALL_SECONDS = 20.0  # s for such a call to connect
 REVOKED_SECONDS = 0.5  # between two checks whether a page's session lasts, and a caller may still see the robot
 COMPARE_SECONDS = 300.0  # s for a comparison of two recordings
+COMPARE_MEMORY = 2 << 30  # bytes of its data
 DOWNLOAD_BYTES = 1 << 20  # of a recording, sent at once
 OFFER_MAX = 64 * 1024  # characters in a page's call offer
 JPEG_QUALITY = 75

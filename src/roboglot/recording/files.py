@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field
+from datetime import UTC, datetime
 from errno import EEXIST
 from pathlib import Path
 from struct import Struct, pack
@@ -177,7 +178,8 @@ class PartWriter:
 
     def _begin(self, origin: Origin, at: int, part: int) -> None:
         self._writer.start(profile="", library=LIBRARY)
-        self._writer.add_metadata("roboglot", {**origin.facts, "part": str(part)})
+        begun = datetime.now(UTC).isoformat(timespec="milliseconds")
+        self._writer.add_metadata("roboglot", {**origin.facts, "begun": begun, "part": str(part)})
         for attachment in origin.attachments:
             self._writer.add_attachment(at, at, attachment.name, attachment.media_type, attachment.data)
         self.flush()

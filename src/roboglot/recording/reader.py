@@ -199,7 +199,8 @@ def _undivided(path: Path, file: IO[bytes]) -> Iterator[McapRecord]:
             yield record
     except DAMAGE as error:
         if isinstance(error, McapError) and file.tell() <= 16:
-            raise BadRecording(f"{path} is not an MCAP file") from None
+            why = f"{path} is not an MCAP file"
+            raise BadRecording(why) from None
     if not has_all:
         rest = file.seek(0, SEEK_END) - read
         until = f"{(last - max(first, 0)) / 1e9:.1f} s ({datetime.fromtimestamp(last / 1e9, UTC):%F %T} UTC)"
@@ -207,9 +208,11 @@ def _undivided(path: Path, file: IO[bytes]) -> Iterator[McapRecord]:
 
 
 def unpacked(path: Path, chunk: Chunk) -> Sequence[McapRecord]:
-    """Return the records of a chunk. Raises BadRecording."""
+    """Return the records of a chunk. Raises BadRecording; MemoryError if it is too large, which is no damage."""
     try:
         return records_in(chunk)
+    except MemoryError:
+        raise
     except DAMAGE as error:
         raise BadRecording(f"{path} is damaged: {error}") from None
 
@@ -266,7 +269,8 @@ def _read_records(path: Path, recording: Recording, *, first: bool) -> None:
             case Message(sequence=0) if not first:
                 pass  # an earlier part has it
             case Metadata(name="roboglot"):
-                recording.facts |= {key: value for key, value in record.metadata.items() if key != "part"}
+                facts = {key: value for key, value in record.metadata.items() if key != "part"}
+                recording.facts = facts | recording.facts  # those of the first part, as when it was begun
             case Attachment():
                 recording.attachments[record.name] = record.data
             case Message() if channel is not None and schema is not None:

@@ -10,6 +10,7 @@ import signal
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from datetime import datetime
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,32 +19,38 @@ from typing import IO
 import msgspec
 
 from roboglot.console.http import SAFETY, Problem, Send, answer
-from roboglot.console.settings import COMPARE_SECONDS, DOWNLOAD_BYTES
+from roboglot.console.settings import COMPARE_MEMORY, COMPARE_SECONDS, DOWNLOAD_BYTES
 from roboglot.model.errors import Busy, NotFound, Refused
-from roboglot.validation import decode_json
+from roboglot.values import dataclass
 
 SUFFIX = ".mcap"
 REPLAY_ADDRESS = "127.0.0.100"  # hardly ever another robot's
 HEAD_RECORDS = 3  # among which the metadata is
 _numbered = re.compile(r"(.+)-(\d{3,})")
-_part_number = re.compile(r"[1-9][0-9]{0,5}")
+_whole = re.compile(r"[0-9]{1,9}")
 REPORT = b"default-src 'none'; style-src 'unsafe-inline'"  # what the page of a comparison may load
 
 
 class Part(msgspec.Struct, frozen=True):
-    """One file of a recording; ``first`` and ``last``: times of its messages, Unix s, None if it has no end."""
+    """One file of a recording; ``first`` and ``last``: times of its messages, Unix s, None if it has no end.
+
+    ``begun``: when it was begun, by the clock of the machine that wrote it, Unix s; of older files without a date, when
+    they were last written. ``damage``: why the head is not read, empty if it is.
+    """
 
     file: str
     bytes: int
     number: int
+    begun: float
     first: float | None = None
     last: float | None = None
+    damage: str = ""
 
 
 class Kept(msgspec.Struct, frozen=True):
-    """One recording: its parts, robots by name, length (None: not known), and when it was last written, Unix s.
+    """One recording: its parts, robots by name, length (None: not known), and when it was begun, Unix s.
 
-    ``play``: command that plays it back. ``running``: it is being written.
+    ``play``: command that plays it back. ``running``: it is being written. ``damage``: why it is not read.
     """
 
     file: str
@@ -55,6 +62,16 @@ class Kept(msgspec.Struct, frozen=True):
     at: float
     running: bool
     play: str
+    damage: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Outline:
+    """A part, and what its head says."""
+
+    part: Part
+    robots: Sequence[str]
+    world: str
 
 
 class RecordingFolder:
@@ -62,39 +79,40 @@ class RecordingFolder:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._known: dict[tuple[str, int, int], tuple[Part, dict[str, str]]] = {}
+        self._known: dict[tuple[str, int, int], _Outline] = {}
         self._comparing = asyncio.Lock()
+        self._compared: tuple[object, bytes] | None = None  # the last comparison: of these files, its page
 
     def look(self, running: Path | None) -> list[Kept]:
         """Return all recordings, the newest first; ``running``: the file that is being written."""
-        found: dict[str, list[tuple[Part, dict[str, str], float]]] = {}
+        found: dict[str, list[_Outline]] = {}
         known = {}
         for path in sorted(self._folder.glob(f"*{SUFFIX}")):
             with suppress(OSError):
                 state = path.stat()
                 key = path.name, state.st_size, state.st_mtime_ns
-                part, facts = known[key] = self._known.get(key) or _outline(path, state.st_size)
-                found.setdefault(_base(part), []).append((part, facts, state.st_mtime))
+                one = known[key] = self._known.get(key) or _outline(path, state)
+                found.setdefault(_base(one.part), []).append(one)
         self._known = known
         kept = [self._kept(members, running) for members in found.values()]
         return sorted(kept, key=lambda one: -one.at)
 
-    def _kept(self, members: Sequence[tuple[Part, dict[str, str], float]], running: Path | None) -> Kept:
-        parts = sorted((part for part, _, _ in members), key=lambda part: part.number)
-        facts = members[0][1]
+    def _kept(self, members: Sequence[_Outline], running: Path | None) -> Kept:
+        members = sorted(members, key=lambda one: one.part.number)
+        parts, head = [one.part for one in members], members[0]
         firsts, lasts = [p.first for p in parts if p.first is not None], [p.last for p in parts if p.last is not None]
-        robots = _robots(facts)
         whole = len(lasts) == len(parts)
         return Kept(
-            parts[0].file,
+            head.part.file,
             parts,
-            robots or ([facts["robot"]] if "robot" in facts else []),
-            facts.get("world", ""),
+            head.robots,
+            head.world,
             round(max(lasts) - min(firsts), 1) if whole else None,
             sum(part.bytes for part in parts),
-            max(at for _, _, at in members),
+            min(part.begun for part in parts),
             running is not None and running.parent == self._folder and running.name in {p.file for p in parts},
-            self._play(parts[0].file, robots),
+            self._play(head.part.file, head.robots),
+            next((part.damage for part in parts if part.damage), ""),
         )
 
     def _play(self, file: str, robots: Sequence[str]) -> str:
@@ -143,22 +161,36 @@ class RecordingFolder:
                 await send({"type": "http.response.body", "body": data, "more_body": size > 0})
 
     async def send_comparison(self, one: str, other: str, robot: str, send: Send) -> None:
-        """Send a page that compares two recordings, made by a separate process. Raises RobotError, Problem."""
+        """Send a page that compares two recordings, made by a separate process. Raises RobotError, Problem.
+
+        The last page is kept, so that a page which has waited for it may open it.
+        """
         if self._comparing.locked():
             raise Busy("another comparison is being made")
         async with self._comparing:
-            with TemporaryDirectory(prefix="roboglot-compare-") as folder:
-                page = Path(folder) / "page.html"
-                options = ["--html", str(page), *(["--robot", robot] if robot else [])]
-                await self._run(["compare", *options, "--", self.path(one).name, self.path(other).name])
-                body = await asyncio.to_thread(page.read_bytes)
+            states = [path.stat() for path in (self.path(one), self.path(other))]
+            asked = one, other, robot, [(state.st_size, state.st_mtime_ns) for state in states]
+            if self._compared is None or self._compared[0] != asked:
+                self._compared = asked, await self._compare(one, other, robot)
+            body = self._compared[1]
         more = [(b"content-security-policy", REPORT), (b"cache-control", b"no-store")]
         await answer(send, 200, b"text/html; charset=utf-8", body, more)
 
+    async def _compare(self, one: str, other: str, robot: str) -> bytes:
+        with TemporaryDirectory(prefix="roboglot-compare-") as folder:
+            page = Path(folder) / "page.html"
+            options = ["--html", str(page), *(["--robot", robot] if robot else [])]
+            await self._run(["compare", *options, "--", one, other])
+            try:
+                return await asyncio.to_thread(page.read_bytes)
+            except OSError:  # it ended as if there were differences
+                raise Problem(409, "the comparison ended early") from None
+
     async def _run(self, arguments: Sequence[str]) -> None:
         """Run ``roboglot`` in the folder, as reading takes seconds and no robot may wait for it. Raises Problem."""
+        limited = f'ulimit -d {COMPARE_MEMORY >> 10} && exec nice "$@"'
         process = await asyncio.create_subprocess_exec(
-            *("nice", sys.executable, "-m", "roboglot", *arguments),
+            *("sh", "-c", limited, "sh", sys.executable, "-m", "roboglot", *arguments),
             cwd=self._folder,
             stdout=asyncio.subprocess.DEVNULL,
             stderr=asyncio.subprocess.PIPE,
@@ -183,14 +215,6 @@ def _piece(source: IO[bytes], size: int) -> bytes:
     return source.read(size).ljust(size, b"\0")
 
 
-def _robots(facts: Mapping[str, str]) -> list[str]:
-    """Return the names of the recorded robots, sorted; none if the file does not tell them in our form."""
-    try:
-        return sorted(decode_json(facts.get("robots", "{}"), dict[str, object]))
-    except msgspec.DecodeError:
-        return []
-
-
 def _base(part: Part) -> str:
     """Return the name that all parts of a recording share."""
     stem = part.file.removesuffix(SUFFIX)
@@ -198,29 +222,67 @@ def _base(part: Part) -> str:
     return numbered[1] if numbered and part.number > 1 and int(numbered[2]) == part.number else stem
 
 
-def _outline(path: Path, size: int) -> tuple[Part, dict[str, str]]:
-    """Return a file as a part of a recording, and its metadata; reads only its head and its end. Raises OSError."""
-    from roboglot.recording.reader import summary_of
+def _outline(path: Path, state: os.stat_result) -> _Outline:
+    """Return what the head and the end of a file say. Raises OSError."""
+    from roboglot.recording.reader import BadRecording, summary_of
 
+    facts, robots, number, why = dict[str, str](), list[str](), 1, ""
+    try:
+        path.name.encode()
+        facts = _facts(path)
+        robots, number = _robots(facts), _number(facts)
+    except UnicodeEncodeError:
+        why = "its name is not UTF-8: rename the file"
+    except BadRecording as error:
+        why = str(error).replace(str(path), path.name)
     with path.open("rb") as file:
         summary = summary_of(file)
-    facts = _facts(path)
-    part = facts.get("part", "")
-    number = int(part) if _part_number.fullmatch(part) else 1
-    if summary is None or summary.statistics is None:
-        return Part(path.name, size, number), facts
-    times = summary.statistics.message_start_time / 1e9, summary.statistics.message_end_time / 1e9
-    return Part(path.name, size, number, *times), facts
+    first = last = None
+    if summary is not None and (found := summary.statistics) is not None:
+        first, last = found.message_start_time / 1e9, found.message_end_time / 1e9
+    name = path.name.encode("utf-8", "replace").decode()
+    part = Part(name, state.st_size, number, _begun(facts, first) or state.st_mtime, first, last, why)
+    return _Outline(part, robots, facts.get("world", ""))
 
 
 def _facts(path: Path) -> dict[str, str]:
-    """Return the metadata at the head of a file; none if it is not a recording of ours. Raises OSError."""
+    """Return the metadata at the head of a file. Raises BadRecording, OSError."""
     from mcap.records import Metadata
 
     from roboglot.recording.reader import BadRecording, records
 
-    with suppress(BadRecording):
-        for record, *_ in islice(records(path), HEAD_RECORDS):
-            if isinstance(record, Metadata) and record.name == "roboglot":
-                return dict(record.metadata)
-    return {}
+    for record, *_ in islice(records(path), HEAD_RECORDS):
+        if isinstance(record, Metadata) and record.name == "roboglot":
+            return dict(record.metadata)
+    why = "it does not begin as recordings of roboglot do"
+    raise BadRecording(why)
+
+
+def _robots(facts: Mapping[str, str]) -> list[str]:
+    """Return the names of the robots. Raises BadRecording."""
+    from roboglot.recording.reader import BadRecording
+
+    if "robots" not in facts:
+        return [facts["robot"]] if "robot" in facts else []
+    try:
+        return sorted(msgspec.json.decode(facts["robots"], type=dict[str, str]))
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        why = "the list of robots at its head cannot be read"
+        raise BadRecording(why) from None
+
+
+def _number(facts: Mapping[str, str]) -> int:
+    """Return the number of a part. Raises BadRecording."""
+    from roboglot.recording.reader import BadRecording
+
+    if not _whole.fullmatch(text := facts.get("part", "1")):
+        why = "the number of the part at its head cannot be read"
+        raise BadRecording(why)
+    return int(text)
+
+
+def _begun(facts: Mapping[str, str], first: float | None) -> float | None:
+    """Return when a part was begun, Unix s, None if it is not known; ``first``: robot time of its first message."""
+    with suppress(ValueError, OverflowError, KeyError):
+        return datetime.fromisoformat(facts["begun"]).timestamp()
+    return first if facts.get("clock") == "x1" else None  # other clocks soon tell another time than people's

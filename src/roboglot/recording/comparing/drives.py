@@ -15,6 +15,7 @@ import numpy as np
 from foxglove_schemas_protobuf import FrameTransforms_pb2, PoseInFrame_pb2
 from google.protobuf.message import DecodeError
 
+from roboglot.model.events import FloorReached
 from roboglot.model.geometry import Pose
 from roboglot.recording.comparing.comparison import MISSING, Row
 from roboglot.recording.comparing.masks import Mask
@@ -88,27 +89,32 @@ def _turn(angle: np.ndarray | float) -> np.ndarray:
 
 @dataclass(slots=True)
 class Drive:
-    """Tracks of one robot by source, and its actions in order, with their last status."""
+    """Deeds of one robot: its tracks by source, and in order its actions with their last status, and its floors."""
 
     tracks: dict[str, Track] = field(default_factory=dict)
     actions: list[tuple[str, str]] = field(default_factory=list)
+    floors: list[int] = field(default_factory=list)
 
 
 def read_drive(path: Path, robot: str) -> Drive:
     """Read what a robot did. Raises BadRecording, OSError."""
     places: dict[str, list[tuple[float, Pose]]] = {TRUTH: [], POSES: [], ODOMETRY: []}
     actions: dict[int, tuple[str, str]] = {}
+    floors: list[int] = []
     topics = {f"/truth/{robot}/pose": TRUTH, f"/{robot}/pose": POSES}
     try:
-        for record in read_messages(path, *topics, "/tf", f"/{robot}/actions"):
+        for record in read_messages(path, *topics, "/tf", f"/{robot}/actions", f"/{robot}/events"):
             if record.schema == "roboglot.Action":
                 value = record.json()
                 actions[value["id"]] = str(value["name"]), str(value["status"])
+            elif record.schema == "roboglot.Event":
+                if (value := record.json())["event"] == FloorReached.__name__:
+                    floors.append(int(value["floor"]))
             elif (pose := _pose(record, robot)) is not None:
                 places[topics.get(record.topic, ODOMETRY)].append((record.at / 1e9, pose))
     except (DecodeError, ValueError, KeyError, TypeError) as error:
         raise BadRecording(f"{path} has a message that cannot be read: {error}") from None
-    return Drive({source: Track(found) for source, found in places.items() if found}, list(actions.values()))
+    return Drive({source: Track(found) for source, found in places.items() if found}, list(actions.values()), floors)
 
 
 def _pose(record: Record, robot: str) -> Pose | None:
@@ -138,7 +144,9 @@ class Outcome:
 
 def compare_drives(one: Drive, other: Drive, mask: Mask, names: tuple[str, str]) -> Outcome:
     """Compare two drives by the best source that both have; ``names``: of the recordings."""
-    rows = [_compared_actions(one.actions, other.actions)] if one.actions or other.actions else []
+    rows = [_paired("actions", *([" ".join(action) for action in drive.actions] for drive in (one, other)))]
+    rows += [_paired("floors", *([str(floor) for floor in drive.floors] for drive in (one, other)))]
+    rows = [row for row in rows if row.ones or row.others]
     for source in (TRUTH, POSES, ODOMETRY):
         if source in one.tracks and source in other.tracks:
             row, figures = _compared_places(source, one.tracks[source], other.tracks[source], mask)
@@ -185,12 +193,12 @@ def _near(one: Track, other: Track, times: np.ndarray, mask: Mask) -> tuple[np.n
     return good.any(axis=1), apart.min(axis=1)
 
 
-def _compared_actions(ones: Sequence[tuple[str, str]], others: Sequence[tuple[str, str]]) -> Row:
-    """Pair equal actions in their order; the others are differences."""
-    row = Row(SECTION, "actions", len(ones), len(others))
-    for what, start, end, first, last in SequenceMatcher(None, ones, others, autojunk=False).get_opcodes():
+def _paired(what: str, ones: Sequence[str], others: Sequence[str]) -> Row:
+    """Pair equal actions, or floors reached, in their order; the others are differences."""
+    row = Row(SECTION, what, len(ones), len(others))
+    for match, start, end, first, last in SequenceMatcher(None, ones, others, autojunk=False).get_opcodes():
         mine, theirs = ones[start:end], others[first:last]
         for number in range(max(len(mine), len(theirs))):
-            a, b = (" ".join(side[number]) if number < len(side) else MISSING for side in (mine, theirs))
-            row.check(what == "equal", f"action {start + number + 1}", a, b)
+            a, b = (side[number] if number < len(side) else MISSING for side in (mine, theirs))
+            row.check(match == "equal", f"{what.removesuffix('s')} {start + number + 1}", a, b)
     return row

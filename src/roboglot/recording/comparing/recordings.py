@@ -15,6 +15,14 @@ def compare_recordings(one: Path, other: Path, mask: Mask, robot: str = "", door
 
     Raises BadRecording, OSError.
     """
+    try:
+        return _compared(one, other, mask, robot, door)
+    except MemoryError:
+        why = "out of memory: the recordings are too large to be compared"
+        raise BadRecording(why) from None
+
+
+def _compared(one: Path, other: Path, mask: Mask, robot: str, door: str) -> Comparison:
     found = read_recording(one), read_recording(other)
     names = [robot or _only_robot(recording) for recording in found]
     sessions = [recording.of(name, door) for recording, name in zip(found, names, strict=True)]
