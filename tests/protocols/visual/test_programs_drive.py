@@ -6,8 +6,11 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any
 
+import pytest
+
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.system.firmware import Firmware, Module
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
@@ -16,6 +19,7 @@ from tests.protocols.visual.front_end import FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 
+WALK = "while True:\n    cyberdog.motion.go_straight(0.2, 0.5)\n    cyberdog.motion.go_straight(-0.2, 0.5)\n"
 SQUARE = """
 cyberdog.task.block('stand~1');
 cyberdog.motion.resume_standing();
@@ -165,3 +169,47 @@ async def test_polling_program_ends_in_lockstep(app: FrontEnd) -> None:
     await app.start("t", POLLING)
     await app.ends("t", pace=0.5)
     assert await app.printed("t") == ["999"]  # and one before the loop
+
+
+@pytest.mark.parametrize("module", Module)
+async def test_stop_during_a_restart_ends_the_program(
+    connect: Connect, robot: Robot, world: World, module: Module
+) -> None:
+    app = await connect(robot)
+    await app.start("t", WALK)
+    await app.until(lambda: robot[Base].velocity.speed > 0.1)
+    robot[Firmware].restart(module)
+    await app.clock.advance(1.0)
+    held = world.truth.pose_of("a")
+    [answer] = await app.ask("shutdown", "t")
+    assert answer["state"] == 27
+    assert answer["describe"].endswith("It is carried out as soon as the module is up again.")
+    await app.clock.advance(12.0)
+    assert await app.state("t") == "shutdown"
+    assert world.truth.pose_of("a").distance_to(held) < 0.02
+
+
+async def test_suspended_during_a_restart_waits_for_recovery(connect: Connect, robot: Robot, world: World) -> None:
+    app = await connect(robot)
+    await app.start("t", WALK)
+    await app.until(lambda: robot[Base].velocity.speed > 0.1)
+    robot[Firmware].restart(Module.BASE)
+    await app.clock.advance(1.0)
+    held = world.truth.pose_of("a")
+    await app.ask("suspend", "t")
+    await app.clock.advance(12.0)
+    assert await app.state("t") == "suspend"
+    assert world.truth.pose_of("a").distance_to(held) < 0.02
+    await app.ask("recover", "t")
+    await app.until(lambda: robot[Base].velocity.speed > 0.1)
+
+
+async def test_teacher_ends_programs_that_a_restart_holds(connect: Connect, robot: Robot) -> None:
+    app = await connect(robot)
+    await app.start("t", WALK)
+    await app.until(lambda: robot[Base].velocity.speed > 0.1)
+    robot[Firmware].restart(Module.BASE)
+    await app.clock.advance(1.0)
+    assert list(await app.service.shutdown(["t"], why="ended by the teacher")) == ["t"]
+    await app.clock.advance(10.0)
+    assert (await app.service.log("t"))[-1].text == "ended by the teacher"

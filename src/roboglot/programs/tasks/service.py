@@ -22,6 +22,7 @@ from roboglot.programs.language.places import Step
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LOG_MAX, ListedProgram, LogEntry, StoredProgram, Stores
+from roboglot.programs.tasks.late_stops import LateStops
 from roboglot.programs.tasks.owners import act_for_owner
 from roboglot.programs.tasks.recovery import settle
 from roboglot.programs.tasks.reports import RunFigures, TaskReport, Whereabouts, done
@@ -70,6 +71,7 @@ class ProgramService:
         self.insights, self.log_pace = self._runner.insights, self._runner.log_pace
         self._runs = self._runner.runs
         self._fires = Background()
+        self._late = LateStops(robot, self._runs, self._fires, self.shutdown, self.suspend)
         self._turns = Turns(robot.clock, self._lock, stores.tasks, self._runner, settle(stores, robot.clock.epoch()))
 
     def start(self) -> None:
@@ -90,6 +92,7 @@ class ProgramService:
     async def close(self) -> None:
         """End every run; the tasks are as if a user had ended them. Scheduled tasks stay scheduled."""
         self._turns.closed = True
+        self._late.close()
         self._timetable.clear()
         async with self._lock:
             for run in self._runs.values():
@@ -257,6 +260,7 @@ class ProgramService:
                 except ProgramError as refusal:
                     refused[id] = refusal
                     _expect_end(self._runs, [id], ends=False)
+            self._late.give_reason(refused, why)
             for id in states:
                 if id in self._runs:
                     self._runs[id].call_off()
@@ -290,7 +294,6 @@ class ProgramService:
 
     async def _check_table(self, operation: TaskOperation, id: str) -> TaskState:
         """Return the task's current state if the tables allow ``operation``. Raises NotAllowed."""
-        check_mode(self.robot, operation)
         if (run := self._runs.get(id)) is not None:
             state = run.state
         else:
@@ -298,6 +301,7 @@ class ProgramService:
             state = TaskState(task.state) if task else TaskState.NULL
             if state.alive and id not in self._turns.lost:  # its end could not be recorded
                 state = TaskState.SHUTDOWN
+        self._late.check_mode(operation, id, possible=next_state(state, operation) is not None)
         if next_state(state, operation) is None:
             words = f"The current operation({operation}) is illegal: {id} is in {state}."
             if state is TaskState.SUSPEND:
