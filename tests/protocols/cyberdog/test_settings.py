@@ -267,3 +267,11 @@ async def test_each_refusal_has_its_reason_in_the_log(client, caplog) -> None:
         await client.ask(code, params)
         lines = [record.message for record in caplog.records if record.message.startswith(f"{code} refused: ")]
         assert [line for line in lines if line != f"{code} refused: "], (code, params)
+
+
+async def test_last_moments_of_the_door_refuse_changes(client: Client, robot) -> None:
+    robot.starts.down = "the robot restarts"
+    assert await client.ask(1011, {"nick_name": "Rex", "wake_name": ""}) == {"error_code": 322}
+    robot.starts.down = ""
+    names = await client.ask(1001, {"is_nick_name": True})
+    assert names["nick_name"]["current_name"] != "Rex"

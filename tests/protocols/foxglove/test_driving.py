@@ -207,3 +207,11 @@ async def test_pages_of_other_hosts_stay_outside(scene: Scene) -> None:
             await scene.connect(origin=page)
         assert refused.value.response.status_code == 403
     assert await scene.connect(origin=f"http://{ADDRESS}:{PORT}")
+
+
+async def test_robot_that_goes_down_takes_no_goal(scene: Scene) -> None:
+    viewer = await publisher(scene, "/cmd_vel")
+    scene.robot.starts.down = "the robot restarts"
+    await viewer.publish(FORWARD)
+    await viewer.until(lambda: any("the robot restarts" in why for why in viewer.complaints))
+    assert not scene.robot.actions.running()

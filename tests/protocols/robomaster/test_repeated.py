@@ -100,3 +100,11 @@ async def test_line_of_each_window_is_not_read_anew(connect, robot, door, monkey
     (connection,) = door._connections
     monkeypatch.setattr(connection, "_read", lambda _data: connection.transport.abort())
     assert await client.ask(MODE) == "chassis_lead;"
+
+
+async def test_last_moments_of_the_door_refuse_changes(client, robot) -> None:
+    line = "chassis speed x 0.1 y 0 z 0;"
+    await repeat(client, line)
+    robot.starts.down = "the robot restarts"
+    assert await repeat(client, line) == ["fail;"] * 3
+    assert await client.ask(MODE) == "chassis_lead;"

@@ -369,3 +369,10 @@ async def test_jack_and_doors_are_refused_while_stopped(
     assert 0.0 < robot[Jack].position == height
     assert await put(client, "base.emergency_stop", "off") == 200
     assert (await client.put(f"{box}/:open")).status_code == 200
+
+
+async def test_last_moments_of_the_door_refuse_changes(robot: Robot, client: httpx.AsyncClient) -> None:
+    robot.starts.down = "the robot restarts"
+    answer = await client.put(f"{SYSTEM}/parameter", json={"param": "base.max_moving_speed", "value": "0.2"})
+    assert (answer.status_code, answer.text) == (503, "Service Unavailable: the robot restarts")
+    assert (await client.get(f"{SYSTEM}/power/status")).status_code == 200

@@ -223,3 +223,12 @@ async def test_zones_are_refused_aloud(yard: Opened) -> None:
     await one.until(lambda: len(one.control.errors) == 2)
     assert one.control.state["orderId"] == ""
     assert one.control.heard["factsheet"][0]["typeSpecification"]["supportedZones"] == []
+
+
+async def test_robot_that_goes_down_takes_no_order(yard: Opened) -> None:
+    one = await yard()
+    one.robot.starts.down = "the robot restarts"
+    one.control.send("order", order("far", [(0, 0), (9, 0)]))
+    await one.until(lambda: bool(one.control.errors))
+    assert not one.robot.actions.running()
+    assert one.control.state["orderId"] == ""

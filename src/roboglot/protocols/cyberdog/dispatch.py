@@ -114,6 +114,8 @@ async def _answered(call: Call) -> object | None:
     try:
         if operation is not None and admission.enforced:
             admission.check(DOOR, str(int(call.code)), operation.right)
+        if operation is not None:
+            call.context.robot.starts.check(operation.right)
         values = {} if call.code in unread else read_params(call.text)
         if operation is None:
             call.why = "no robot of this program does that"

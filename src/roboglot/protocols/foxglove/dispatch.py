@@ -47,6 +47,7 @@ async def _do(context: Context, request: Request) -> tuple[Level, str]:
         return Level.ERROR, "this robot does not have that"
     try:
         context.robot.admission.check(DOOR, request.key, operation.right or Right.ADMIN)
+        context.robot.starts.check(operation.right)
         await operation.call(context, {_snake(name): value for name, value in request.values.items()})
     except BadParameters as bad:
         return Level.ERROR, str(bad)

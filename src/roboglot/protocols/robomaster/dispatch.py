@@ -129,6 +129,7 @@ def _enter(context: Context, key: str, text: str, asked: _Asked) -> None:
         asked.began = context.robot.tap.request(DOOR, key, text)
     if context.robot.admission.enforced:
         context.robot.admission.check(DOOR, key, TABLE[key].right)
+    context.robot.starts.check(TABLE[key].right)
 
 
 def _refused(profile: Profile, error: Exception, seq: int | None) -> Answer:
@@ -164,7 +165,7 @@ def at_once(context: Context, text: str) -> Repeated | None:
     network = asked[Network] if Network in asked else None  # noqa: SIM401 - one that comes later is real and on time
 
     def reply() -> bytes | Answer | None:
-        if tap.watched or (network is not None and network.delay):
+        if tap.watched or asked.starts.down or (network is not None and network.delay):
             return None
         try:
             result = handler()

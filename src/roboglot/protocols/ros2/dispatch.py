@@ -39,6 +39,7 @@ async def _do(context: Context, key: str, data: bytes | None, read: Read) -> tup
         return logging.ERROR, f"a message has at most {MESSAGE_MAX} bytes"
     try:
         context.robot.admission.check(DOOR, key, operation.right or Right.ADMIN)
+        context.robot.starts.check(operation.right)
         try:
             message = read(data, TYPES[key])
         except ValueError as error:

@@ -290,6 +290,7 @@ class Application:
                 await self._context.maps.starting.ended()
             if concerns_map(operation):
                 await settle(self._context.robot)
+            self._context.robot.starts.check(operation.right)
             return await operation.call(self._context, values)
         except BadParameters as error:
             raise bad_request(row.key, str(error)) from None

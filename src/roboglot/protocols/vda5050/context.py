@@ -15,6 +15,7 @@ from roboglot.model.admission import Forbidden, Right
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.errors import NotReady
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from roboglot.protocols.vda5050.error_book import ErrorBook
@@ -70,11 +71,14 @@ class Context:
         self.changed.set()
 
     def check(self, operation: str, right: Right | None) -> None:
-        """Raise Rejected unless fleet control has the right."""
+        """Raise Rejected unless fleet control has the right, and the robot is up."""
         try:
             self.robot.admission.check(DOOR, operation, right)
+            self.robot.starts.check(right)
         except Forbidden as refused:
             raise Rejected(ErrorKind.FORBIDDEN, str(refused)) from None
+        except NotReady as down:
+            raise Rejected(ErrorKind.NOT_AVAILABLE, str(down)) from None
 
     def take_order(self, payload: bytes) -> None:
         """Take an order or an update and drive it. Raises Rejected."""

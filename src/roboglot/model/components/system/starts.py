@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from roboglot.model.components.system.firmware import Module
+from roboglot.model.errors import NotReady
 from roboglot.model.events import EventStream, ModuleRestarted, Rebooted, Rebooting, ShuttingDown
+from roboglot.operations import Right
 
 
 class Starts:
@@ -16,6 +18,14 @@ class Starts:
         events.listen(ShuttingDown, self._shutting_down)
         events.listen(Rebooted, self._rebooted)
         events.listen(ModuleRestarted, self._module_restarted)
+
+    def check(self, right: Right | None) -> None:
+        """Raise NotReady for operations that need more than ``SEE`` while the robot is not up.
+
+        Its doors stay open a moment to send their last answers: what clients set then would be lost.
+        """
+        if self.down and right is not Right.SEE:
+            raise NotReady(self.down)
 
     def _rebooting(self, _: Rebooting) -> None:
         self.down = "the robot restarts"
