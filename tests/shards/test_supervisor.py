@@ -155,6 +155,7 @@ async def test_one_that_is_silent_is_not_called_fast(supervisor: Supervisor) -> 
         shard.heard = shard.since = asyncio.get_running_loop().time() - silent
         supervisor._look_after()
         assert shard.beat == Beat(factor, 1 << 20, 1.0)
+        assert shard.trouble == ("" if factor else f"not answering for {silent:.0f} s")
 
 
 async def test_one_that_is_silent_is_killed(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:

@@ -17,9 +17,11 @@ from pathlib import Path
 from unittest.mock import MagicMock
 
 import pytest
+import typer
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboglot.cli import campaign
 from roboglot.testing.campaign.report import interval, report
 from roboglot.testing.campaign.table import OtherCampaign, Row, Table, write_parquet
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, named, trials_of
@@ -301,3 +303,25 @@ def test_without_pyarrow_no_outdated_parquet_stays(tmp_path: Path, monkeypatch: 
     path.write_text("of an earlier run")
     assert not write_parquet([ENDED], path)
     assert not path.exists()
+
+
+def test_campaign_that_ends_early_reports_what_was_played(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "stays.yaml").write_text(STAYS)
+
+    def play(trials: Iterator[Trial], _leave: object, ended: Callable[[Trial, Result], None]) -> None:
+        ended(next(trials), Result(Outcome.PASSED))
+        raise OSError("raylet, a process of Ray, has ended")
+
+    monkeypatch.setattr(campaign, "_player", lambda *_: play)
+    with pytest.raises(typer.Exit) as exited:
+        campaign.command([tmp_path / "stays.yaml"], seeds=2, first_seed=1, on="", out=tmp_path / "out", longest=60.0)
+    assert exited.value.exit_code == 2
+    said = capsys.readouterr()
+    assert "1 of 1 trials passed" in said.out
+    assert said.err.splitlines() == [
+        "roboglot campaign: raylet, a process of Ray, has ended",
+        "the same command resumes",
+    ]
+    assert "1 of 2 were played" in (tmp_path / "out" / "report.md").read_text()

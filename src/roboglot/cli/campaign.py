@@ -6,6 +6,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -67,6 +68,10 @@ def command(
         interrupted = _play(left, table, _player(on, [each.path.parent for each in found], workers, longest))
     except (MissingExtra, OSError, ValueError) as bad:
         print(f"roboglot campaign: {visible(in_words(bad))}", file=sys.stderr)
+        if table.rows:
+            with suppress(OSError):  # a full disk may be what ended it
+                _write(table, folder, trials)
+            print("the same command resumes", file=sys.stderr)
         raise typer.Exit(2) from None
     passed = _write(table, folder, trials)
     if interrupted:

@@ -317,6 +317,6 @@ def _print(answer: Answer, name: str) -> None:
 
 
 def _why(row: Row) -> str:
-    if row.state == "ready":
+    if row.state == "ready" and not row.silent:
         return row.console or ""
     return str(row.reason)

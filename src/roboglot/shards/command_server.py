@@ -142,5 +142,6 @@ def _row(shard: Shard) -> Row:
         cpu=shard.beat.cpu,
         console=shard.ready.console if shard.ready else "",
         folder=str(shard.folder),
-        reason=shard.reason,
+        reason=shard.trouble,
+        silent=shard.silent,
     )

@@ -148,7 +148,7 @@ def _world(shard: Shard) -> dict[str, object]:
     return {
         "name": shard.plan.name,
         "state": str(shard.state),
-        "reason": shard.reason,
+        "reason": shard.trouble,
         "factor": shard.beat.factor,
         "restarts": shard.restarts,
         "console": shard.ready.console if shard.ready else "",

@@ -31,7 +31,10 @@ class RobotRow(msgspec.Struct):
 
 
 class Row(msgspec.Struct):
-    """One shard in the table; memory in bytes, cpu in s, ``factor`` 1 if it keeps up."""
+    """One shard in the table; memory in bytes, cpu in s, ``factor`` 1 if it keeps up.
+
+    ``silent``: s without an answer of a ready one, 0 if it answers.
+    """
 
     name: str
     state: str
@@ -45,6 +48,7 @@ class Row(msgspec.Struct):
     console: str
     folder: str
     reason: str
+    silent: float = 0.0
 
 
 class Answer(msgspec.Struct):

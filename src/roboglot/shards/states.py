@@ -40,6 +40,7 @@ class Shard:
         self.slow_for = 0  # checks in a row
         self.since = 0.0  # s by the loop's clock: start of the state
         self.heard = 0.0  # s by the loop's clock
+        self.silent = 0.0  # s without a heartbeat, of a ready one that should have sent some; 0: it sends them
         self.killed_at = 0.0  # s by the loop's clock; 0: not in this state
         self.beat = Beat(0.0, 0, 0.0)
         self.ready: Ready | None = None
@@ -48,6 +49,14 @@ class Shard:
         self.hopeless = False
         self.link: socket.socket | None = None
         self.again: asyncio.TimerHandle | None = None
+
+    @property
+    def trouble(self) -> str:
+        """Silence of a ready one, else the reason of its last end; empty without either."""
+        why = self.reason
+        if self.silent and self.state is State.READY:
+            why = f"not answering for {self.silent:.0f} s"
+        return why
 
     @property
     def is_settled(self) -> bool:
@@ -69,7 +78,7 @@ class Shards(dict[str, Shard]):
 
     def turn_to(self, shard: Shard, state: State) -> None:
         """Change a shard's state; one that was stopped by request has no reason."""
-        shard.state, shard.since, shard.killed_at = state, self._loop.time(), 0.0
+        shard.state, shard.since, shard.killed_at, shard.silent = state, self._loop.time(), 0.0, 0.0
         if state is State.STOPPED:
             shard.reason = ""
         self._changed.set()

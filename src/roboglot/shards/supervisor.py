@@ -216,7 +216,8 @@ class Supervisor:
             if limit is not None and silent > limit:
                 self._kill(shard, silent)
             elif shard.state is State.READY:
-                if silent > STALE:
+                shard.silent = silent if silent > STALE else 0.0
+                if shard.silent:
                     shard.beat = msgspec.structs.replace(shard.beat, factor=0.0)
                 self._judge(shard)
         self._watch = self._loop.call_later(1.0, self._look_after)
