@@ -91,3 +91,13 @@ async def test_enrolling_fails_without_a_face(client, app, robot, anna, world, p
     assert await client.ask(7002, {"command": 2}) == {"result": 0}
     await forward(seconds=65)
     assert len(app.of(7004)) == 1
+
+
+@pytest.mark.parametrize(("asked", "taken"), [(0, 1), (301, 300)])
+async def test_changed_timeout_of_recognition_is_logged(
+    client, caplog: pytest.LogCaptureFixture, asked: int, taken: int
+) -> None:
+    caplog.set_level("INFO", "roboglot")
+    assert await client.ask(7002, {"command": 0, "timeout": asked}) == {"result": 0}
+    assert f"a timeout of {asked} s is taken for {taken} s" in caplog.text
+    assert await client.ask(7002, {"command": 2}) == {"result": 0}

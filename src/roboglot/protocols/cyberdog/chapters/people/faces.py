@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Annotated
 
 import msgspec
@@ -16,6 +17,7 @@ from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.wire.cyberdog.codes import Code
 from roboglot.wire.cyberdog.text import Int32
 
+log = logging.getLogger(__name__)
 SECONDS_MAX = 300
 BUSY = "a face is being entered, or faces are recognised"
 Seconds = Annotated[int, msgspec.Meta(ge=0, le=2**31 - 1)]
@@ -91,5 +93,8 @@ async def recognise_faces(
         return _refused(call, FaceResult.UNDEFINED, f"command {command} is not 0, 1 (with a username) or 2")
     if faces.busy:
         return _refused(call, FaceResult.UNDEFINED, BUSY)
-    faces.recognise(username if command == 1 else "", id, max(1, min(SECONDS_MAX, timeout)))
+    seconds = max(1, min(SECONDS_MAX, timeout))
+    if seconds != timeout:
+        log.info("7002: a timeout of %d s is taken for %d s: it lasts from 1 to %d s", timeout, seconds, SECONDS_MAX)
+    faces.recognise(username if command == 1 else "", id, seconds)
     return {"result": int(FaceResult.DONE)}
