@@ -136,15 +136,20 @@ class Launcher:
         self._control = ours
         try:
             with theirs:
-                # Not cancelled halfway: the zygote would inherit any file that reuses the descriptor's number.
+                # Not left halfway, however often this is cancelled: the zygote would inherit any file that reuses the
+                # descriptor's number.
                 starting = asyncio.ensure_future(
                     asyncio.to_thread(_start_process, theirs.fileno(), self._filter_required)
                 )
-                try:
-                    self._process = await asyncio.shield(starting)
-                except asyncio.CancelledError:
-                    self._process = await starting
-                    raise
+                cancelled: asyncio.CancelledError | None = None
+                while not starting.done():
+                    try:
+                        await asyncio.wait([starting])
+                    except asyncio.CancelledError as error:
+                        cancelled = error
+                self._process = starting.result()
+                if cancelled is not None:
+                    raise cancelled
             self._loop.add_reader(ours.fileno(), self._receive)
             return await self._ready
         except BaseException:
