@@ -20,7 +20,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.runtime import Runtime
-from tests.browser.served import ADDRESS, FRIEND, PAGE_PATIENCE, REBOUND, STILL, STRANGER, OpenConsole, Page, Served
+from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, OpenConsole, Page, Served, Tabs
 
 # The shell is the same engine without a browser's own windows, which take as much of the processor as the pages.
 KINDS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
@@ -112,25 +112,31 @@ async def browser(site: int) -> AsyncIterator[async_api.Browser]:
         await opened.close()
 
 
+@pytest_asyncio.fixture(scope="session", loop_scope="session")
+async def all_tabs(browser: Any, opened: Served) -> Tabs:
+    """Pages of this robot's console."""
+    assert opened.runtime.console is not None
+    await opened.runtime.console.ready()
+    return Tabs(browser, opened.runtime.console.address)
+
+
 @pytest_asyncio.fixture(loop_scope="session")
-async def open_console(browser: Any, served: Served) -> AsyncIterator[OpenConsole]:
+async def tabs(all_tabs: Tabs) -> AsyncIterator[Tabs]:
+    """Pages for a test: the next one finds nothing of them."""
+    yield all_tabs
+    await all_tabs.close()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def open_console(tabs: Tabs, served: Served) -> AsyncIterator[OpenConsole]:
     """Open the console as someone, in a browser of their own; it must say nothing bad on its own console."""
-    opened, said = [], []
 
     async def open_it(person: str = "anna", view: str = "live", language: str = "en", **options: Any) -> Page:
-        context = await browser.new_context(**({"viewport": {"width": 1280, "height": 800}} | STILL | options))
-        opened.append(context)
-        await context.add_init_script(f"localStorage.person = '{person}'; localStorage.language = '{language}'")
-        page = await context.new_page()
-        page.set_default_timeout(PAGE_PATIENCE)
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
-        assert served.runtime.console is not None
-        await page.goto(f"{served.runtime.console.address}/#/{view}")
+        viewport = options.pop("viewport", {"width": 1280, "height": 800})
+        page = await tabs.open(f"/#/{view}", {"person": person, "language": language}, viewport, **options)
         await page.wait_for_selector("nav")
         return page
 
     yield open_it
-    for context in opened:
-        await context.close()
+    said = await tabs.close()
     assert [line for line in said if not re.search("ERR_(CONNECTION|INTERNET)", line)] == []

@@ -31,10 +31,12 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 FREEZE = """for (let i = 0; i < 1e4; i++) clearInterval(i);
     import('/link.js').then((link) => link.ask('a', 'no such verb')).catch(() => undefined)"""
 # The texts on each canvas since it was last cleared.
-WRITTEN = """window.written = [];
+WRITTEN = """() => {
+    window.written = [];
     const kind = CanvasRenderingContext2D.prototype, { clearRect, fillText } = kind;
     kind.clearRect = function (...all) { window.written.push(this.texts = []); clearRect.apply(this, all); };
-    kind.fillText = function (text, ...all) { this.texts?.push(text); fillText.call(this, text, ...all); };"""
+    kind.fillText = function (text, ...all) { this.texts?.push(text); fillText.call(this, text, ...all); };
+}"""
 LABELS = "found => found.map((one) => one.getAttribute('aria-label') ?? one.innerText)"
 
 
@@ -184,8 +186,7 @@ async def test_plots_show_the_robots_speed_and_battery(served: Served, open_cons
 
 async def test_labels_of_new_plots_differ(served: Served, open_console: OpenConsole) -> None:
     page = await open_console()
-    await page.add_init_script(WRITTEN)
-    await page.reload()
+    await page.evaluate(WRITTEN)
     await page.click("#tab-plots")
     await page.locator("[data-plot=speed] canvas").wait_for()
     for _ in range(3):  # with one value, two, three

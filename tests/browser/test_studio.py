@@ -12,10 +12,11 @@ import pytest
 import pytest_asyncio
 
 from roboglot.model.geometry import Pose
-from tests.browser.served import STILL, Served, becomes, shows, until
+from tests.browser.served import Served, Tabs, becomes, shows, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text("utf-8")
+PATH = "/studio/"
 READY = (  # unless its program already runs
     "window.studio && studio.editor.workspace"
     " && (document.querySelector('.button.main:enabled') || studio.runner.phase.value === 'running')"
@@ -64,32 +65,21 @@ DIRECTIONS = """(() => {
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def studio(opened: Served, browser: Any) -> AsyncIterator[Open]:
+async def studio(opened: Served, tabs: Tabs) -> AsyncIterator[Open]:
     """Open the studio; what a test has running is ended with it."""
-    console = opened.runtime.console
-    assert console is not None
-    await console.ready()
-    contexts: list[Any] = []
 
     async def opening(context: Any = None, **choices: str) -> Page:
         if context is None:
-            context = await browser.new_context(viewport={"width": 1400, "height": 900}, **STILL)
-            contexts.append(context)
-            kept = {"language": "en", "theme": "light", **choices}
-            await context.add_init_script(
-                f"for (const [k, v] of Object.entries({json.dumps(kept)})) localStorage[k] ??= v"
-            )
-        page = await context.new_page()
-        page.errors = []
-        page.on("pageerror", lambda error: page.errors.append(str(error)))
-        page.on("console", lambda said: page.errors.append(said.text) if said.type == "error" else None)
-        await page.goto(f"{console.address}/studio/")
+            storage = {"language": "en", "theme": "light", **choices}
+            page = await tabs.open(PATH, storage, {"width": 1400, "height": 900})
+        else:
+            page = await tabs.add(context)
+            await page.goto(f"{tabs.address}{PATH}")
         await until(page, READY)
         return page
 
     yield opening
-    for context in contexts:
-        await context.close()
+    await tabs.close()
     service = next(iter(opened.runtime._programs.values())).service
     await service.shutdown([figures.target_id for figures in service.running()])
 
