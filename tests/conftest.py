@@ -177,8 +177,7 @@ def _server_of(file: str) -> str:
 
 
 def pytest_collection_finish() -> None:
-    """Leave all modules that were imported out of garbage collections: they stay."""
-    gc.collect()
+    """Leave all that was loaded out of garbage collections: it stays. What is garbage of it is not worth a look."""
     gc.freeze()
     gc.enable()
     gc.set_threshold(20_000, 20, 20)  # a test's world is thousands of objects that end together

@@ -2,10 +2,10 @@
 
 ``install`` has ``subprocess.Popen``, and with it asyncio and execnet, start such commands like this, in a tenth of the
 processor time. The process is a child of ours as if we had started it ourselves: output, signals, exit status and
-waiting are the same. So do ``python -m tests.…``, and ``python -c`` with a program whose first line is ``# warm``; and
-zygotes of visual programs, each from a process that has loaded what they load (``tests/programs/zygote_bed.py``).
-Commands with an environment for another interpreter, and all other programs, start cold; so do those with
-``ROBOGLOT_TESTS_COLD=1`` in theirs. A worker is born with a process that forks of its own.
+waiting are the same. So do ``python -m pytest``, ``python -m tests.…``, and ``python -c`` with a program whose first
+line is ``# warm``; and zygotes of visual programs, each from a process that has loaded what they load
+(``tests/programs/zygote_bed.py``). Commands with an environment for another interpreter, and all other programs, start
+cold; so do those with ``ROBOGLOT_TESTS_COLD=1`` in theirs. A worker is born with a process that forks of its own.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def _is_ours(words: list[Any]) -> bool:
     """True if the command needs the modules that the forking process has loaded."""
     match words:
         case [sys.executable, "-m", str(module), *_]:
-            return module == "roboglot" or module.startswith("tests.")
+            return module in ("roboglot", "pytest") or module.startswith("tests.")
         case [sys.executable, "-c", str(code), *_]:
             return code.lstrip().startswith("# warm\n")
     return words == WORKER
@@ -225,6 +225,8 @@ def _run(words: list[str], folder: str) -> None:
 
             run_command()
         case ["-m", module, *arguments]:
+            if module == "pytest":
+                _leave_to_pytest()
             sys.argv, sys.path[0] = [module, *arguments], folder
             runpy.run_module(module, run_name="__main__", alter_sys=True)
         case ["-c", code, *arguments]:
@@ -268,13 +270,18 @@ def _work() -> None:
         os._exit(0)
     its.close()
     _parent = WarmParent(ours)
+    _leave_to_pytest()
+    sys.argv, sys.path[0] = ["-c"], ""
+    exec(eval(sys.stdin.readline()), _new_main())
+
+
+def _leave_to_pytest() -> None:
+    """Forget the modules whose assertions pytest rewrites."""
     for name in [name for name in sys.modules if f"{name}.".startswith(REWRITTEN)]:
         del sys.modules[name]
     for name in ("roboglot", "tests"):  # else pytest warns that they are imported already
         package = importlib.import_module(name)
         package.__doc__ = f"{package.__doc__}\nPYTEST_DONT_REWRITE"
-    sys.argv, sys.path[0] = ["-c"], ""
-    exec(eval(sys.stdin.readline()), _new_main())
 
 
 def main(descriptor: int) -> None:

@@ -48,7 +48,7 @@ def within_a_minute(runtime: Runtime, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 async def status(auth: httpx.Auth | tuple[str, str] | None = None, **headers: str) -> int:
-    async with httpx.AsyncClient(base_url=REST, auth=auth, headers=headers) as client:
+    async with httpx.AsyncClient(verify=False, base_url=REST, auth=auth, headers=headers) as client:
         return (await client.get(POSE)).status_code
 
 
@@ -128,7 +128,7 @@ async def test_guessing_is_stopped_and_costs_nothing(
 
     monkeypatch.setattr(proofs, "password_fits", fits)
     within_a_minute(runtime, monkeypatch)
-    async with httpx.AsyncClient(base_url=REST) as client:
+    async with httpx.AsyncClient(verify=False, base_url=REST) as client:
         for number in range(100):
             reply = await client.get(POSE, auth=("anna", f"guess {number}"))
             assert reply.status_code == 401
@@ -142,7 +142,7 @@ async def test_many_tries_at_once_count_one_by_one(
     within_a_minute(runtime, monkeypatch)
     store.add_person("anna", "correct horse", [Grant("*", SEE)])
     guard_of(runtime).reload()
-    async with httpx.AsyncClient(base_url=REST) as client:
+    async with httpx.AsyncClient(verify=False, base_url=REST) as client:
         tries = [client.get(POSE, auth=("anna", f"guess {number}")) for number in range(30)]
         replies = await asyncio.gather(*tries)
     assert sum("is not valid" in reply.text for reply in replies) == 3
@@ -201,7 +201,7 @@ async def test_a_right_ends_with_its_time(runtime: Runtime, store: AccessStore) 
     guard.now = lambda: moment
     token = store.add_machine("guest", [Grant("a", DRIVE, moment + 60.0)])
     guard.reload()
-    async with httpx.AsyncClient(base_url=REST, headers={"authorization": f"Bearer {token}"}) as client:
+    async with httpx.AsyncClient(verify=False, base_url=REST, headers={"authorization": f"Bearer {token}"}) as client:
         assert (await client.post(ACTIONS, json=GO)).status_code == 200
         [action] = runtime.fleet.robots["a"].actions.running()
         moment += 61.0
@@ -279,7 +279,9 @@ async def test_audit_keeps_changes_and_refusals_without_secrets(
 ) -> None:
     secrets = [store.add_machine("cell", [Grant("a", DRIVE)]), "a wrong password"]
     guard_of(runtime).reload()
-    async with httpx.AsyncClient(base_url=REST, headers={"authorization": f"Bearer {secrets[0]}"}) as client:
+    async with httpx.AsyncClient(
+        verify=False, base_url=REST, headers={"authorization": f"Bearer {secrets[0]}"}
+    ) as client:
         await client.get(POSE)
         await client.post(ACTIONS, json=GO)
         await client.delete("/api/core/slam/v1/maps")
@@ -303,7 +305,7 @@ async def test_audit_keeps_changes_by_the_console(runtime: Runtime, store: Acces
     guard_of(runtime).reload()
     assert runtime.console is not None
     await runtime.console.ready()
-    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{runtime.console.port}/api/") as client:
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{runtime.console.port}/api/", verify=False) as client:
 
         async def ask(who: str, path: str, **values: object) -> int:
             reply = await client.post(path, json=values, headers={"authorization": f"Bearer {who}"})

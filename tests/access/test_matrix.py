@@ -111,7 +111,7 @@ async def test_rest_does_what_the_right_allows(runtime: Runtime, reached: set[ob
     keys = [row.key for row in contract("slamware")]
     for caller in CALLERS:
         reached.clear()
-        transport = httpx.AsyncHTTPTransport(local_address=caller.address)
+        transport = httpx.AsyncHTTPTransport(local_address=caller.address, verify=False)
         async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=transport) as client:
             statuses = {key: await rest_status(client, key) for key in keys}
         allowed = {key for key in keys if may(caller, REST, key)}
@@ -241,7 +241,7 @@ async def test_the_console_does_what_the_right_allows(runtime: Runtime, monkeypa
     assert runtime.console is not None
     await runtime.console.ready()
     for caller in CALLERS:
-        transport = httpx.AsyncHTTPTransport(local_address=caller.address)
+        transport = httpx.AsyncHTTPTransport(local_address=caller.address, verify=False)
         url = f"http://127.0.0.1:{runtime.console.port}/api"
         async with httpx.AsyncClient(base_url=url, transport=transport) as client:
             for path, right in CONSOLE_POSTS.items():
@@ -314,7 +314,7 @@ async def test_wire_view_shows_every_row_on_a_wire(runtime: Runtime, reached: se
 
 async def ask_everything(runtime: Runtime, caller: Caller, data: Path) -> None:
     """Every row of the three catalogues whose operations go over a wire one by one."""
-    transport = httpx.AsyncHTTPTransport(local_address=caller.address)
+    transport = httpx.AsyncHTTPTransport(local_address=caller.address, verify=False)
     async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=transport) as client:
         for row in contract("slamware"):
             await rest_status(client, row.key)

@@ -26,7 +26,10 @@ def until(condition: Callable[[], bool]) -> None:
 
 
 def test_saved_map_is_loaded_at_the_next_start(tmp_path: Path) -> None:
-    with served(tmp_path / "data", address=ADDRESS) as robot, httpx.Client(base_url=f"http://{ADDRESS}:1448") as client:
+    with (
+        served(tmp_path / "data", address=ADDRESS) as robot,
+        httpx.Client(base_url=f"http://{ADDRESS}:1448", verify=False) as client,
+    ):
         until(lambda: client.get(f"{SLAM}/knownarea").json()["width"] > 0)
         assert client.post(LINES, json=[WALL]).json() is True
         assert client.post(f"{MULTI}/stcm/:save").status_code == 200
@@ -34,7 +37,10 @@ def test_saved_map_is_loaded_at_the_next_start(tmp_path: Path) -> None:
         known = client.get(f"{SLAM}/knownarea").json()
         robot.process.kill()
         robot.process.wait()
-    with served(tmp_path / "data", address=ADDRESS), httpx.Client(base_url=f"http://{ADDRESS}:1448") as client:
+    with (
+        served(tmp_path / "data", address=ADDRESS),
+        httpx.Client(base_url=f"http://{ADDRESS}:1448", verify=False) as client,
+    ):
         assert client.get("/api/multi-floor/status").json()["map_load_status"] == "LOADED"
         assert client.get(f"{SLAM}/knownarea").json()["width"] >= known["width"] - 0.1
         assert [wall["id"] for wall in client.get(LINES).json()] == [1, 2]

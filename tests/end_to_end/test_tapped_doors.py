@@ -42,7 +42,7 @@ def words(exchange: Exchange) -> tuple[str, str, str]:
 
 
 async def rest(asked: list[Exchange]) -> None:
-    async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448") as client:
+    async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", verify=False) as client:
         await client.get("/api/core/slam/v1/localization/pose")
         await client.post("/api/core/motion/v1/actions?x=1", json={"action_name": "none"})
         await client.get("/nowhere")

@@ -30,7 +30,7 @@ class Life:
         assert isinstance(runtime.clock, LockstepClock)
         self.runtime, self._clock = runtime, runtime.clock
         self.look: Callable[[], None] = lambda: None  # at the world, whenever time has passed
-        self._http = httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", timeout=60)
+        self._http = httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", timeout=60, verify=False)
         pems = Pems(*(path.read_bytes() for path in export_client(data / "cyberdog", data / "phone")))
         self._channel = pems.channel(50052, address=ADDRESS)
         self.phone = Client(self._channel, messages)

@@ -45,7 +45,7 @@ def warming_up(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
 async def rest(robot: Robot) -> AsyncIterator[httpx.AsyncClient]:
     door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await door.start()
-    async with httpx.AsyncClient(base_url=door.endpoints[0].address) as client:
+    async with httpx.AsyncClient(base_url=door.endpoints[0].address, verify=False) as client:
         yield client
     await door.close()
 

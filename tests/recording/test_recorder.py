@@ -63,7 +63,7 @@ async def test_mcap_reads_everything_that_was_recorded(tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
     started = Runtime(config(tmp_path / "data", RecordConfig(to=str(path))))
     await started.start()
-    async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448") as client:
+    async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", verify=False) as client:
         assert (await client.get("/api/core/system/v1/power/status")).status_code == 200
         wrong = await client.post("/api/core/motion/v1/actions", json={"action_name": "fly", "password": "geheim"})
         assert wrong.status_code == 400

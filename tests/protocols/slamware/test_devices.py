@@ -252,7 +252,7 @@ async def test_metres_and_seconds_count_over_the_robots_life(
     again = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await again.start()  # as after a crash: stored values count on
     await forward(seconds=2)
-    async with httpx.AsyncClient(base_url=again.endpoints[0].address) as other:
+    async with httpx.AsyncClient(base_url=again.endpoints[0].address, verify=False) as other:
         seconds = (await other.get("/api/core/statistics/v1/runtime")).json()
     await again.close()
     assert seconds == pytest.approx(32.0, abs=0.1)
@@ -327,7 +327,7 @@ async def test_emergency_braking_is_switched(hermes: Fleet) -> None:
     robot = hermes.robots["h"]
     door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
     await door.start()
-    async with httpx.AsyncClient(base_url=door.endpoints[0].address) as client:
+    async with httpx.AsyncClient(base_url=door.endpoints[0].address, verify=False) as client:
         for word, on in (("Off", False), ("On", True)):
             assert (await client.post(f"{SYSTEM}/aeb/control", json=word)).status_code == 200
             assert robot[EmergencyBraking].enabled is on

@@ -95,7 +95,7 @@ async def test_history_can_be_kept(bare: Robot) -> None:
     door = SlamwareDoor(bare, "127.0.0.1", SlamwareConfig(port=0, keep_events=True))
     await door.start()
     bare.events.publish(BumperPressed(stamp=1, zone="front"))
-    async with httpx.AsyncClient(base_url=door.endpoints[0].address) as client:
+    async with httpx.AsyncClient(base_url=door.endpoints[0].address, verify=False) as client:
         assert await read(client) == await read(client) == ["BUMPER_TRIGGERED"]
     await door.close()
 
