@@ -91,7 +91,7 @@ def test_pages_load_nothing_from_elsewhere() -> None:
 
 def test_the_page_is_small_enough() -> None:
     views = (f"/views/{name}.js" for name in ("camera", "class", "plots", "recordings", "sign"))
-    shown = (*views, "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when shown
+    shown = (*views, "/copies.js", "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when shown
     later = (*shown, "/words/server.zh.json")  # loaded after the page
     sent = {
         path: asset
@@ -128,3 +128,12 @@ def test_studio_asks_for_all_its_modules_at_once() -> None:
 
 def test_no_own_file_is_long() -> None:
     assert [path.name for path in OWN if len(Path(path).read_text("utf-8").splitlines()) > 400] == []
+
+
+def test_selection_is_named_as_safari_knows_it() -> None:
+    """Safari has no ``user-select`` but its own: without it, a finger held on the pad selects text."""
+    for path in OWN:
+        if path.suffix == ".css":
+            styles = path.read_text("utf-8")
+            own = re.findall(r"-webkit-user-select: (\w+)", styles)
+            assert own == re.findall(r"(?<!-)user-select: (\w+)", styles), path.name

@@ -2,6 +2,7 @@
 // the class, a pupil's page goes on to the console of the world that is theirs.
 import { effect, signal } from "@preact/signals";
 import { Button, elsewhere, html, kept, language, person, say, sent, t, translated } from "../base.js";
+import { saveAs } from "../copies.js";
 import { choose, hello } from "../link.js";
 import { ask, listen, online, open, send } from "./link.js";
 import { results } from "./missions.js";
@@ -96,11 +97,7 @@ async function look(name) {
 function exported() {
   const cell = (text) => { const plain = String(text).replace(/^[=+@\t\r-]/, "'$&"); return `"${plain.replaceAll('"', '""')}"`; };
   const rows = [t("studio.class.columns").split("|"), ...grid.value.pupils.map((p) => [p.name, p.world, p.robot, p.stars, t(p.handed ? "studio.yes" : "studio.no"), p.mission, inOwnWords(p.error)])];
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([`\ufeff${rows.map((row) => row.map(cell).join(",")).join("\n")}\n`], { type: "text/csv" }));
-  link.download = `class-${grid.value.code}.csv`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  saveAs(new Blob([`\ufeff${rows.map((row) => row.map(cell).join(",")).join("\n")}\n`], { type: "text/csv" }), `class-${grid.value.code}.csv`);
 }
 
 function Teacher() {

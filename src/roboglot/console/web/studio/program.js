@@ -1,6 +1,7 @@
 // The program that is open: its name, whether it is blocks or text, where it is kept, its versions, files.
 import { signal } from "@preact/signals";
 import { kept, say, t } from "../base.js";
+import { saveAs } from "../copies.js";
 import * as editor from "./editor.js";
 import { newId } from "./blocks.js";
 import { ask, frame, opened } from "./link.js";
@@ -193,11 +194,7 @@ export async function remove(id) {
 export function download(form) {
   const name = (program.value.name || t("studio.untitled")).replace(/[^\p{L}\p{N}_-]+/gu, "_");
   const text = form === "py" ? plain(python()) : form === "style" ? style() : JSON.stringify(whole(), null, 1);
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text], { type: form === "py" ? "text/x-python" : "application/json" }));
-  link.download = `${name}.${form === "py" ? "py" : form === "style" ? "style.json" : "roboglot.json"}`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  saveAs(new Blob([text], { type: form === "py" ? "text/x-python" : "application/json" }), `${name}.${form === "py" ? "py" : form === "style" ? "style.json" : "roboglot.json"}`);
 }
 
 /** Read a file: our own, the app's style, or Python. @param {File} file */

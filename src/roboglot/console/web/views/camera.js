@@ -2,6 +2,7 @@
 import { useEffect, useRef } from "preact/hooks";
 import { signal, useSignal } from "@preact/signals";
 import { Button, html, robotWord, say, t, translated } from "../base.js";
+import { saveAs } from "../copies.js";
 import { connections, current, seen, state, status, want } from "../link.js";
 
 const FILM_RATE = 15; // pictures a second
@@ -98,6 +99,11 @@ function heard(screen) {
   return (sound?.srcObject ?? sound?.captureStream?.() ?? sound?.mozCaptureStream?.())?.getAudioTracks() ?? [];
 }
 
+/** What films a stream; null in a browser that cannot. @param {MediaStream} stream */
+function recorderOf(stream) {
+  try { return new MediaRecorder(stream); } catch { return null; }
+}
+
 /** Film what is on the screen until it is called again; then the file is saved. @param {Element} screen @param {string} robot */
 function film(screen, robot) {
   const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
@@ -109,18 +115,15 @@ function film(screen, robot) {
     context?.drawImage(picture, 0, 0);
   };
   draw();
-  const recorder = new MediaRecorder(new MediaStream([...canvas.captureStream(FILM_RATE).getTracks(), ...heard(screen)])), parts = /** @type {Blob[]} */ ([]);
+  const recorder = recorderOf(new MediaStream([...canvas.captureStream(FILM_RATE).getTracks(), ...heard(screen)])), parts = /** @type {Blob[]} */ ([]);
+  if (!recorder) { say(t("film.cannot"), true); return; }
   const timer = setInterval(draw, 1000 / FILM_RATE);
   const late = setTimeout(() => { if (filming.value) filming.value(); }, FILM_MAX);
   filmed.value = 0;
   recorder.ondataavailable = ({ data }) => { parts.push(data); filmed.value += data.size; };
   recorder.onstop = () => {
     if (!filmed.value) { say(t("film.empty"), true); return; }
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob(parts, { type: recorder.mimeType }));
-    link.download = `${robot}.${recorder.mimeType.includes("mp4") ? "mp4" : "webm"}`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+    saveAs(new Blob(parts, { type: recorder.mimeType }), `${robot}.${recorder.mimeType.includes("mp4") ? "mp4" : "webm"}`);
   };
   recorder.start(1000);
   filming.value = () => { clearInterval(timer); clearTimeout(late); filming.value = null; recorder.stop(); };

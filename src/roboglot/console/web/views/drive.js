@@ -34,9 +34,11 @@ function fromKeys() {
 
 function useKeys() {
   useEffect(() => {
-    const typing = (event) => event.target.closest("input, select, textarea, [role=tab]") || event.ctrlKey || event.metaKey || event.altKey;
+    const taking = (event) => (event.key.startsWith("Arrow") ? "input, select, textarea, [role=tab]" : "input:not([type=range]), select, textarea"); // what has a use for the key
+    const typing = (event) => event.target.closest(taking(event)) || event.ctrlKey || event.metaKey || event.altKey;
     const down = (event) => {
       const key = event.key.toLowerCase();
+      if (key === "meta") letGo(); // until it is released, a Mac tells of no other key that is
       if (!(key in KEYS) || typing(event)) return;
       event.preventDefault();
       if (!event.repeat) { keys.add(key); fromKeys(); }

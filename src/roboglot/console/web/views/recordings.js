@@ -2,6 +2,7 @@
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, duration, fetched, html, language, say, t } from "../base.js";
+import { copied } from "../copies.js";
 import { connections, current, recording } from "../link.js";
 import { Recording } from "./recording.js";
 
@@ -23,7 +24,7 @@ async function remove(file) {
 }
 
 async function copy(text) {
-  try { await navigator.clipboard.writeText(text); say(t("recordings.copied")); } catch { prompt(t("copy.by.hand"), text); }
+  if (await copied(text)) say(t("recordings.copied"));
 }
 
 /** Have a comparison made; a refusal is said on this page. The server keeps the last one for the page that opens it. @param {string} path */

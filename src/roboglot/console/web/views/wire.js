@@ -34,11 +34,12 @@ async function over(what, wish) {
   try { return await fetched(`/api/robots/${current.value}/wire/${what}`, wish); } catch (error) { say(t("refused", { why: error.message }), true); return null; }
 }
 
+/** Loaded with the first message that is opened, so that a click is still one when it copies. @type {Promise<any> | null} */
+let copies = null;
+
 async function copy(number, form) {
-  const words = await over(`${number}/${form}`);
-  if (words === null) return undefined;
-  try { await navigator.clipboard.writeText(words); } catch { return prompt(t("copy.by.hand"), words); }
-  return say(t("copied", { form }));
+  const { copied } = await copies;
+  if (await copied(over(`${number}/${form}`))) say(t("copied", { form }));
 }
 
 async function sendAgain(number) {
@@ -50,7 +51,7 @@ async function sendAgain(number) {
 
 function Line({ row, slowest }) {
   const open = opened.value === row[NUMBER], asks = row[DIRECTION] === "request";
-  const toggle = () => { opened.value = open ? 0 : row[NUMBER]; };
+  const toggle = () => { copies ??= import("../copies.js").catch((error) => { copies = null; throw error; }); opened.value = open ? 0 : row[NUMBER]; };
   const share = row[MS] && slowest ? Math.max(2, Math.log1p(row[MS]) / Math.log1p(slowest) * 100) : 0;
   return html`<li class=${`${row[DIRECTION]} ${row[REFUSAL] ? "refused" : ""} ${open ? "open" : ""}`}>
     <button type="button" class="line" aria-expanded=${String(open)} onClick=${toggle}>
