@@ -81,7 +81,7 @@ async def test_a_program_does_not_outlive_its_server(
         log = await app.service.log("t")
         assert any("recover it to go on, or shut it down" in entry.text for entry in log)
         assert log[-1].text == "begun"  # once more, which the log says
-        assert "comes once more" in log[-2].text
+        assert "is printed again" in log[-2].text
         assert (await app.ask("shutdown", "t"))[0]["state"] == 0
         assert await app.state("t") == "shutdown"
         assert DatabaseJournalStore(database, "a").headers_now() == {}

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,10 @@ def test_file_opens_with_the_reader_of_mcap_itself(tmp_path: Path) -> None:
         assert summary.statistics.message_count == 5
         assert [message.sequence for _, _, message in reader.iter_messages()] == [1, 2, 3, 4, 5]
         assert [a.data for a in reader.iter_attachments()] == [b"x = 1"]
-        assert {m.name: m.metadata for m in reader.iter_metadata()} == {"roboglot": {"version": "1", "part": "1"}}
+        (head,) = reader.iter_metadata()
+        assert head.name == "roboglot"
+        assert head.metadata == {"version": "1", "part": "1", "begun": head.metadata["begun"]}
+        assert datetime.fromisoformat(head.metadata["begun"]).tzinfo == UTC
 
 
 @pytest.mark.timeout(900)  # a hang
