@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
+from typing import Any
 
 import pytest
 
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import Pose
-from tests.browser.served import Served, becomes, is_driven, shows, until
+from tests.browser.served import Served, Tabs, becomes, is_driven, shows, until
 from tests.browser.test_studio import READY, Open, loaded, phase, prints, studio
 
 __all__ = ["studio"]  # the fixture
@@ -124,6 +125,31 @@ async def test_escape_stops_the_robot_without_a_program(studio: Open, served: Se
     assert served.robot.actions.running() == []
     assert await page.locator(".notice.bad").count() == 0
     assert page.errors == []
+
+
+@pytest.mark.parametrize("path", ["/#/live", "/studio/"])
+async def test_escape_before_the_first_greeting_stops(served: Served, tabs: Tabs, browser: Any, path: str) -> None:
+    context, held = await browser.new_context(), list[Any]()
+
+    async def route(link: Any) -> None:
+        link.connect_to_server().on_message(lambda said: held.append(lambda: link.send(said)))
+
+    await context.route_web_socket("**/live", route)
+    page = await tabs.add(context)
+    await page.goto(f"{tabs.address}{path}")
+    await page.wait_for_selector("header")
+    await page.evaluate("new Promise(shown => requestAnimationFrame(() => setTimeout(shown)))")  # then it hears keys
+    served.robot[Driving].move_by(Pose(1.0, 0.0, 0.0), source="another client")
+    await served.clock.advance(0.5)
+    await becomes(lambda: asyncio.sleep(0, bool(held)), True)
+    await page.keyboard.press("Escape")
+    assert is_driven(served.robot)
+    for say in held:
+        say()
+    await becomes(lambda: asyncio.sleep(0, is_driven(served.robot)), False)
+    await served.clock.advance(1.0)
+    assert page.errors == []
+    await context.close()
 
 
 async def test_error_leaves_what_was_refused_before_it(studio: Open) -> None:

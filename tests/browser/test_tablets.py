@@ -74,7 +74,7 @@ async def test_browser_that_cannot_film_says_so(served: Served, open_console: Op
     await page.click("#tab-drive")
     await page.click("text=Show the camera")
     await page.click("figure >> text=Film")
-    await page.wait_for_selector(".notice >> text=This browser cannot film.")
+    await page.wait_for_selector(".notice >> text=this browser cannot film.")
 
 
 async def test_text_is_copied_whole_without_https(served: Served, open_console: OpenConsole, tmp_path: Path) -> None:

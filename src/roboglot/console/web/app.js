@@ -3,7 +3,7 @@ import { render } from "preact";
 import { useEffect } from "preact/hooks";
 import { signal } from "@preact/signals";
 import { Button, Icon, html, lacks, language, loadWords, notice, place, robotWord, t, theme } from "./base.js";
-import { age, changeWorld, choose, command, connect, current, hello, me, pace, recording, signOut, state, status, want } from "./link.js";
+import { age, changeWorld, choose, command, connect, current, hello, me, pace, recording, signOut, state, status, stopRobot, want } from "./link.js";
 import { Live } from "./views/live.js";
 import { later } from "./views/later.js";
 import { Robots } from "./views/robots.js";
@@ -20,7 +20,7 @@ const view = signal(named());
 addEventListener("hashchange", () => { view.value = named(); });
 
 function Stop() {
-  return html`<button type="button" class="stop" onClick=${() => command("stop")} title=${lacks("stop") || t("stop.hint")} aria-disabled=${lacks("stop") ? "true" : undefined}>
+  return html`<button type="button" class="stop" onClick=${stopRobot} title=${lacks("stop") || t("stop.hint")} aria-disabled=${lacks("stop") ? "true" : undefined}>
     <${Icon} name="stop" size=${18} /><span>${t("stop")}</span><kbd>Esc</kbd></button>`;
 }
 
@@ -93,7 +93,7 @@ function Notice() {
 
 function App() {
   useEffect(() => {
-    const key = (event) => { if (event.key === "Escape" && !event.repeat) command("stop"); };
+    const key = (event) => { if (event.key === "Escape" && !event.repeat) stopRobot(); };
     addEventListener("keydown", key);
     return () => removeEventListener("keydown", key);
   }, []);

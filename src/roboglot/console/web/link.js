@@ -140,6 +140,13 @@ export async function command(verb, values = {}, robot = current.value) {
   try { return await ask(robot, verb, values); } catch (error) { say(t("refused", { why: error.message }), true); return undefined; }
 }
 
+let stopFirst = false;
+/** Stop the robot that is shown; before the first greeting: with it. */
+export function stopRobot() {
+  if (hello.value || status.value === "out") return command("stop");
+  stopFirst = true;
+}
+
 /** @param {string} verb @param {object} [values] */
 export const changeWorld = (verb, values) => command(verb, values, "");
 
@@ -166,6 +173,8 @@ function receive(message) {
     case "hello":
       batch(() => { hello.value = message; states.value = {}; pace.value = message.pace; });
       watch();
+      if (stopFirst) stopRobot();
+      stopFirst = false;
       break;
     case "you": you.value = message.client; break;
     case "pong": beats.answered(message.at); break;

@@ -1,7 +1,7 @@
 // Running a program on the robot: run, pause, step, stop; which block is lit, what was printed, read, and went wrong.
 import { computed, effect, signal, untracked } from "@preact/signals";
 import { lacks, language, notice, say, t, translated } from "../base.js";
-import { command } from "../link.js";
+import { stopRobot } from "../link.js";
 import { blocksOfLines } from "./blocks.js";
 import * as bubbles from "./bubbles.js";
 import * as editor from "./editor.js";
@@ -114,7 +114,7 @@ async function go(step) {
 export const pause = () => orLater(() => operate("suspend"));
 export const stop = () => orLater(async () => { ending = true; ending = await operate("shutdown"); });
 /** Stop the robot, and its program. */
-export function halt() { if (phase.value !== "idle" && !lacks("program")) stop(); return command("stop"); }
+export function halt() { if (phase.value !== "idle" && !lacks("program")) stop(); return stopRobot(); }
 export const step = (/** @type {Step} */ how = "step") => run(how);
 
 /** @param {"suspend" | "shutdown" | "recover"} operation @param {string} [id] */

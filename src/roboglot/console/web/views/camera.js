@@ -116,7 +116,7 @@ function film(screen, robot) {
   };
   draw();
   const recorder = recorderOf(new MediaStream([...canvas.captureStream(FILM_RATE).getTracks(), ...heard(screen)])), parts = /** @type {Blob[]} */ ([]);
-  if (!recorder) { say(t("film.cannot"), true); return; }
+  if (!recorder) { say(t("film.empty"), true); return; }
   const timer = setInterval(draw, 1000 / FILM_RATE);
   const late = setTimeout(() => { if (filming.value) filming.value(); }, FILM_MAX);
   filmed.value = 0;

@@ -34,11 +34,11 @@ function fromKeys() {
 
 function useKeys() {
   useEffect(() => {
-    const taking = (event) => (event.key.startsWith("Arrow") ? "input, select, textarea, [role=tab]" : "input:not([type=range]), select, textarea"); // what has a use for the key
+    const taking = (event) => (event.key.startsWith("Arrow") ? "input, select, textarea, [role=tab]" : "input:not([type=range]), select, textarea");
     const typing = (event) => event.target.closest(taking(event)) || event.ctrlKey || event.metaKey || event.altKey;
     const down = (event) => {
       const key = event.key.toLowerCase();
-      if (key === "meta") letGo(); // until it is released, a Mac tells of no other key that is
+      if (key === "meta") letGo(); // a Mac hides other releases
       if (!(key in KEYS) || typing(event)) return;
       event.preventDefault();
       if (!event.repeat) { keys.add(key); fromKeys(); }
