@@ -189,6 +189,20 @@ async def test_stop_during_a_restart_ends_the_program(
     assert world.truth.pose_of("a").distance_to(held) < 0.02
 
 
+async def test_stop_holds_when_the_restart_is_called_off(connect: Connect, robot: Robot, world: World) -> None:
+    app = await connect(robot)
+    await app.start("t", WALK)
+    await app.until(lambda: robot[Base].velocity.speed > 0.1)
+    restart = robot[Firmware].restart(Module.SOFTWARE)
+    await app.clock.advance(1.0)
+    held = world.truth.pose_of("a")
+    await app.ask("shutdown", "t")
+    restart.cancel("called off")
+    await app.clock.advance(12.0)
+    assert await app.state("t") == "shutdown"
+    assert world.truth.pose_of("a").distance_to(held) < 0.02
+
+
 async def test_suspended_during_a_restart_waits_for_recovery(connect: Connect, robot: Robot, world: World) -> None:
     app = await connect(robot)
     await app.start("t", WALK)

@@ -237,7 +237,7 @@ class SimulatedFirmware(Firmware):
             finally:
                 self._module = None
                 let_move(self._robot, self._base.locks, lock)
-            robot.events.publish(ModuleRestarted(stamp=self._clock.time(), module=module))
+                robot.events.publish(ModuleRestarted(stamp=self._clock.time(), module=module))  # also if called off
 
         for holder in self._robot.actions.running(FIRMWARE):
             raise Busy(f"{holder.name} is under way")
