@@ -163,7 +163,7 @@ class Firefox:
 
 
 class WebKit:
-    """WebKitGTK's own browser, on a screen that nobody sees."""
+    """WebKitGTK's own browser, on a virtual screen."""
 
     def __init__(self, folder: Path) -> None:
         port, self._said = _free_port(), os.pipe()
