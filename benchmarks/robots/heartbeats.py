@@ -1,7 +1,7 @@
 """Claim: a coordinator that receives the heartbeats of 10,000 robots takes <= 10 % of a core.
 
 100 programs of 100 simulated robots each, in separate processes: they send the supervisor's heartbeats once a
-second, and renew their robots' homes on PostgreSQL twice a second, as shards do. This process is the coordinator: it
+second, and renew their robots' registry on PostgreSQL twice a second, as shards do. This process is the coordinator: it
 receives the heartbeats and watches the registry. With Ray installed, another part queries actors of Ray instead, 100
 times a second, as `fleet up --on` does. Processor time is measured, so that a busy machine changes little; that of the
 registry's server is printed beside it.
@@ -30,10 +30,10 @@ from roboglot.shards.messages import Beat, Ready, encode, pair
 from roboglot.shards.plan import FleetPlan, plan_fleet
 from roboglot.shards.states import State
 from roboglot.shards.supervisor import Supervisor
-from roboglot.storage.dead_programs import Silence
-from roboglot.storage.homes import Homes
+from roboglot.storage.dead_programs import DeadProgramWatch
 from roboglot.storage.opening import open_registry
-from roboglot.storage.residence import Residence
+from roboglot.storage.registry_lease import RegistryLease
+from roboglot.storage.robot_registry import RobotRegistry
 from tests.storage.postgresql_server import binary_folder, postgresql_server
 
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -65,18 +65,18 @@ def ready_of(plan: FleetPlan, number: int) -> Ready:
 async def simulate(plan: FleetPlan, registry: str, links: list[socket.socket], up: int) -> None:
     """Run the programs: claim robots, report it, then send heartbeats and renew until the coordinator ends."""
     databases = [open_registry(registry) for _ in range(CONNECTIONS)]
-    residences = []
+    leases = []
     for number, shard in enumerate(plan.shards):
         addresses = {robot["name"]: robot["address"] for robot in shard.settings["robots"]}
-        homes = Homes(databases[number % CONNECTIONS])
-        residences.append(Residence(homes, addresses, f"program {number}", lambda _: None))
-        await residences[-1].take()
+        shared = RobotRegistry(databases[number % CONNECTIONS])
+        leases.append(RegistryLease(shared, addresses, f"program {number}", lambda _: None))
+        await leases[-1].acquire()
     logging.disable(logging.ERROR)
-    await asyncio.gather(*(residence.renew() for residence in residences))  # the first ones took theirs a while ago
+    await asyncio.gather(*(lease.renew() for lease in leases))  # the first ones took theirs a while ago
     logging.disable(logging.NOTSET)
-    for number, (link, residence) in enumerate(zip(links, residences, strict=True)):
+    for number, (link, lease) in enumerate(zip(links, leases, strict=True)):
         link.send(encode(ready_of(plan, number)))
-        residence.keep()
+        lease.start_renewing()
     os.write(up, READY)
     turn = 0
     while True:
@@ -109,17 +109,17 @@ async def coordinate(
         supervisor = Listening(plan, Path(folder))
         supervisor.adopt(links)
         await supervisor.shards.until(lambda: all(shard.state is State.READY for shard in supervisor.shards.values()))
-        silence = asyncio.create_task(Silence(Homes(database), robots).look_always())
+        watching = asyncio.create_task(DeadProgramWatch(RobotRegistry(database), robots).run())
         await asyncio.sleep(2.0)
         server, own, began = used_by("postgres"), time.process_time(), time.monotonic()
         await asyncio.sleep(seconds)
         passed = time.monotonic() - began
         own, server = (time.process_time() - own) / passed, (used_by("postgres") - server) / passed
-        silence.cancel()
+        watching.cancel()
         late = max(asyncio.get_running_loop().time() - shard.heard for shard in supervisor.shards.values())
-        homes = await Homes(database).all()
+        registered = await RobotRegistry(database).all()
     database.close()
-    held = sum(home.holder != "" and home.epoch == 1 for home in homes.values())
+    held = sum(claim.holder != "" and claim.epoch == 1 for claim in registered.values())
     print(f"{len(plan.shards)} programs with {held} of {len(robots)} robots; the oldest heartbeat is {late:.2f} s old")
     print(f"the registry's server takes {server:.3f} cores for {2 * len(plan.shards)} renewals and 2 looks a second")
     claims.at_least("robots still at home", held, len(robots), "robots")

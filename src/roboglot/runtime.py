@@ -39,11 +39,11 @@ from roboglot.protocols.browsers import own_names
 from roboglot.protocols.door import Clouds, DoorType, Endpoint, PortKind, Site
 from roboglot.protocols.robot_doors import RobotDoors
 from roboglot.rehearsal import Rehearsals, scene_of
-from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_database, open_registry
 from roboglot.storage.outbox import Outbox
 from roboglot.storage.programs import program_stores
-from roboglot.storage.residence import Residence, holder_of
+from roboglot.storage.registry_lease import RegistryLease, holder_of
+from roboglot.storage.robot_registry import RobotRegistry
 from roboglot.storage.transactions import Transactions
 from roboglot.transport.tls import Tls, server_context
 from roboglot.validation import host_and_port
@@ -79,7 +79,7 @@ class Runtime:
             config.world, config.robots, clock=self.clock, seed=config.seed, database=self._database
         )
         self._registry: Transactions | None = None
-        self._residence = self._join_registry()
+        self._registry_lease = self._join_registry()
         self._shared: Transactions | None = None  # shared by all robots, on the server
         self.guard = self._build_guard() if config.access.on else None
         self._gateway: Gateway | None = None
@@ -95,7 +95,7 @@ class Runtime:
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
         self.console = Console(self.build_desk(), config.console, self._tls) if config.console.enabled else None
 
-    def _join_registry(self) -> Residence | None:
+    def _join_registry(self) -> RegistryLease | None:
         """Make every robot's lease depend on the registry. Raises OSError, ValueError if it cannot be opened."""
         where = self.config.registry or self.config.database
         if not where:
@@ -103,15 +103,15 @@ class Runtime:
         self._registry = open_registry(where)
         leases = {name: robot[Lease] for name, robot in self.fleet.robots.items()}
         addresses = {robot.name: robot.address for robot in self.config.robots}
-        residence = Residence(
-            Homes(self._registry),
+        registry_lease = RegistryLease(
+            RobotRegistry(self._registry),
             addresses,
             holder_of(self.config.data),
             lambda robot: leases[robot].halt("this program may not move the robot any more"),
         )
         for name, lease in leases.items():
-            lease.fence(partial(residence.why_not, name))
-        return residence
+            lease.fence(partial(registry_lease.refusal, name))
+        return registry_lease
 
     def _build_guard(self) -> Guard:
         """Return the guard of all doors; its list is stored with the robots' data. Raises OSError, ValueError."""
@@ -248,9 +248,9 @@ class Runtime:
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError with the address if it is taken."""
-        if self._residence is not None:
-            await self._residence.take()
-            self._residence.keep()
+        if self._registry_lease is not None:
+            await self._registry_lease.acquire()
+            self._registry_lease.start_renewing()
         if self.guard is not None:
             self.guard.start()
         self._begin_recording()
@@ -266,8 +266,8 @@ class Runtime:
         if self.guard is not None and self.config.access.gateway:
             self._gateway = self._build_gateway(self.guard)
             await self._gateway.start()
-            if self._residence is not None:
-                await self._residence.announce(self._gateway.reached_at(), self._gateway.certificate())
+            if self._registry_lease is not None:
+                await self._registry_lease.announce(self._gateway.reached_at(), self._gateway.certificate())
         if self.console is not None:
             self.console.open()
         await self.fleet.start(wait=self.config.lockstep)
@@ -291,8 +291,8 @@ class Runtime:
             await close_in_time("the program engine", self._engine.close())
         if self._gateway is not None:
             await close_in_time("the gateway", self._gateway.close())
-        if self._residence is not None:
-            await self._residence.close()
+        if self._registry_lease is not None:
+            await self._registry_lease.close()
         if self.guard is not None:
             self.guard.close()
         if self._registry is not None:

@@ -21,8 +21,8 @@ from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_confi
 from roboglot.operations import Right
 from roboglot.runtime import Runtime
 from roboglot.storage import gateways
-from roboglot.storage.homes import Homes
 from roboglot.storage.opening import open_registry, read_registry
+from roboglot.storage.robot_registry import RobotRegistry
 from roboglot.testing.addresses import free_addresses
 from tests.narrowing import known
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
@@ -120,18 +120,18 @@ async def test_client_leaves_a_program_that_lost_its_robot(tmp_path: Path) -> No
     registry, client = str(tmp_path / "registry.db"), Client()
     async with program(tmp_path / "one", registry, HOMES[0]) as (old, token), client.connected(registry, token):
         await client.next(client.readies)
-        renewals = known(old._residence)._keeping[0]
+        renewals = known(old._registry_lease)._tasks[0]
         renewals.cancel()  # it would take its robot back within half a second
         await asyncio.wait([renewals])
         same_people(tmp_path / "one", tmp_path / "two")
         database = open_registry(registry)
-        homes = Homes(database)
-        await homes.release((await homes.all())["a"].holder, {"a": 1})
+        claims = RobotRegistry(database)
+        await claims.release((await claims.all())["a"].holder, {"a": 1})
         async with program(tmp_path / "two", registry, HOMES[1], token):
             await client.next(client.readies)
             assert await client.next(client.said) == "robot a: it moved"
             assert await answers()
-            assert (await homes.all())["a"].epoch == 2
+            assert (await claims.all())["a"].epoch == 2
         database.close()
 
 
@@ -139,15 +139,15 @@ async def test_only_certificate_that_the_registry_has_is_believed(tmp_path: Path
     registry, client = str(tmp_path / "registry.db"), Client()
     async with program(tmp_path / "one", registry, HOMES[0]) as (runtime, token):
         database = open_registry(registry)
-        homes = Homes(database)
-        home = (await homes.all())["a"]
+        claims = RobotRegistry(database)
+        claim = (await claims.all())["a"]
         assert runtime._gateway is not None
-        assert home.gateway == f"127.0.0.1:{runtime._gateway.port}"
-        await homes.announce(home.holder, home.gateway, "0" * 64)
+        assert claim.gateway == f"127.0.0.1:{runtime._gateway.port}"
+        await claims.announce(claim.holder, claim.gateway, "0" * 64)
         async with client.connected(registry, token) as keeping:
             with pytest.raises(NotTrusted, match="another certificate"):
                 await keeping
-        await homes.announce(home.holder, "nonsense", home.certificate)
+        await claims.announce(claim.holder, "nonsense", claim.certificate)
         async with client.connected(registry, token) as keeping:
             assert "'nonsense'" in await client.next(client.said)
             assert not keeping.done()
@@ -155,16 +155,16 @@ async def test_only_certificate_that_the_registry_has_is_believed(tmp_path: Path
 
 
 @needs_postgresql
-async def test_client_needs_only_the_right_to_read_homes(db_server: PostgreSQLServer) -> None:
+async def test_client_needs_only_the_right_to_read_claims(db_server: PostgreSQLServer) -> None:
     database = open_registry(db_server.url)
-    assert await Homes(database).take({"a": "10.0.0.1"}, "one", {}) == {"a": 1}
+    assert await RobotRegistry(database).take({"a": "10.0.0.1"}, "one", {}) == {"a": 1}
     with psycopg.connect(db_server.url, autocommit=True) as connection:
         connection.execute("REVOKE CREATE ON SCHEMA public FROM PUBLIC")
         connection.execute("CREATE ROLE pupil LOGIN")
         connection.execute("GRANT SELECT ON robot_home TO pupil")
     url = db_server.url.replace("user=robots", "user=pupil")
     with contextlib.closing(read_registry(url)) as readable:
-        found = await Homes(readable).of("a")
+        found = await RobotRegistry(readable).of("a")
         assert found is not None
         assert found.address == "10.0.0.1"
     database.close()

@@ -93,7 +93,7 @@ async def dog(asked: list[Exchange]) -> None:
         (Direction.REPLY, "1001", "error_code 323"),
     ]
     assert (asked[-1].status, asked[-1].payload) == ("silent", b"")
-    assert asked[-1].refusal == "no robot of this program does that"
+    assert asked[-1].refusal == "this operation is not implemented"
 
 
 async def programs(asked: list[Exchange]) -> None:

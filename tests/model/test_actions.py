@@ -105,7 +105,7 @@ async def test_bug_in_action_aborts_it_and_is_logged(actions: Actions, caplog: p
 
     with caplog.at_level(logging.ERROR):
         assert await actions.start("go", broken, resources=[]).done() is ActionStatus.ABORTED
-    assert "go #1 broke" in caplog.text
+    assert "go #1 crashed" in caplog.text
 
 
 async def test_paused_it_brakes_and_waits(actions: Actions, clock: LockstepClock) -> None:

@@ -32,8 +32,8 @@ from roboglot.shards.cluster import ClusterFleet, _answer, join, joined, own_tok
 from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.states import State
-from roboglot.storage.homes import Home, Homes
 from roboglot.storage.opening import open_registry
+from roboglot.storage.robot_registry import Claim, RobotRegistry
 from roboglot.testing.addresses import free_addresses
 from roboglot.testing.campaign import cluster as campaigns
 from roboglot.testing.campaign.trials import Trial
@@ -84,10 +84,10 @@ def cluster(patience: None) -> Iterator[Cluster]:
     made.shutdown()
 
 
-def homes(registry: Path) -> dict[str, Home]:
+def claims(registry: Path) -> dict[str, Claim]:
     database = open_registry(str(registry))
     try:
-        return asyncio.run(Homes(database).all())
+        return asyncio.run(RobotRegistry(database).all())
     finally:
         database.close()
 
@@ -103,7 +103,7 @@ async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster
             await fleet.start()
             states = {(shard.state, shard.reason) for shard in fleet.shards.values()}
             assert states == {(State.READY, "")}
-            before = await asyncio.to_thread(homes, registry)
+            before = await asyncio.to_thread(claims, registry)
             where = {name: fleet._nodes.get(name, "") for name in fleet.shards}
             victim = where["w1"]
             began = time.monotonic()
@@ -113,7 +113,7 @@ async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster
                 lambda: all(s.state is State.READY and fleet._nodes.get(s.plan.name) != victim for s in moved)
             )
             print(f"robots of a killed node are back after {time.monotonic() - began:.1f} s")
-            after = await asyncio.to_thread(homes, registry)
+            after = await asyncio.to_thread(claims, registry)
             for shard in fleet.shards.values():
                 (robot,) = shard.plan.robots
                 lost = where[shard.plan.name] == victim

@@ -26,7 +26,7 @@ from roboglot.hosting.logs import set_up_logging
 from roboglot.text_files import named_text_of
 
 if TYPE_CHECKING:
-    from roboglot.storage.gateways import Whereabouts
+    from roboglot.storage.gateways import GatewayLookup
 
 PORT = 50090
 
@@ -126,10 +126,10 @@ def _print(line: str) -> None:
 
 
 class _Registered:
-    """Places from the registry of robots' homes, which has each gateway's certificate."""
+    """Places from the registry of robots, which has each gateway's certificate."""
 
-    def __init__(self, whereabouts: Whereabouts) -> None:
-        self._whereabouts = whereabouts
+    def __init__(self, lookup: GatewayLookup) -> None:
+        self._whereabouts = lookup
 
     async def of(self, robot: str) -> Place | None:
         """Return the robot's gateway, or None. Raises OSError."""
@@ -146,13 +146,13 @@ class _Registered:
 @contextmanager
 def registered(registry: str) -> Iterator[Places]:
     """Context to find robots by a registry: a PostgreSQL URL, or a file. Raises OSError, ValueError, sqlite3.Error."""
-    from roboglot.storage.gateways import Whereabouts
-    from roboglot.storage.homes import Homes
+    from roboglot.storage.gateways import GatewayLookup
     from roboglot.storage.opening import read_registry
+    from roboglot.storage.robot_registry import RobotRegistry
 
     database = read_registry(registry)
     try:
-        yield _Registered(Whereabouts(Homes(database)))
+        yield _Registered(GatewayLookup(RobotRegistry(database)))
     finally:
         database.close()
 

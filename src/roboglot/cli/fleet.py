@@ -191,22 +191,22 @@ def where(
     ] = "",
 ) -> None:
     """Show the program that runs a robot, on any machine, with its address and epoch."""
-    from roboglot.storage.homes import Homes
     from roboglot.storage.opening import read_registry
+    from roboglot.storage.robot_registry import RobotRegistry
     from roboglot.storage.transactions import FAILURES
 
     if not registry:
         sys.exit("roboglot fleet: give the registry's URL or file: --registry, or ROBOGLOT_REGISTRY")
     try:
         database = read_registry(registry)
-        homes = asyncio.run(Homes(database).all())
+        claims = asyncio.run(RobotRegistry(database).all())
         database.close()
     except (ValueError, OSError, sqlite3.Error, *FAILURES) as error:
         sys.exit(f"roboglot fleet: {in_words(error)}")
-    if robot and robot not in homes:
+    if robot and robot not in claims:
         sys.exit(f"roboglot fleet: the registry knows no robot {robot!r}")
-    for home in [homes[robot]] if robot else homes.values():
-        print(f"{home.robot:10} {home.address:16} epoch {home.epoch:<6} {home.holder or 'released'}")
+    for claim in [claims[robot]] if robot else claims.values():
+        print(f"{claim.robot:10} {claim.address:16} epoch {claim.epoch:<6} {claim.holder or 'released'}")
 
 
 @app.command()

@@ -54,7 +54,7 @@ class BackEnd:
         except Answer as answer:
             code, message, items = answer.code, str(answer), answer.items
         except Exception:
-            log.exception("a request broke")
+            log.exception("a request crashed")
             code, message, items = CloudCode.BROKEN, "the cloud could not do it", None
         id = frame.get("id")
         body = format_answer(code, message, id if isinstance(id, str) else "", items)

@@ -43,6 +43,6 @@ class AudioStream(Component):
                 async for block in blocks:
                     self._feed.push(encoder.encode(block))  # a twentieth of a millisecond
         except Exception:
-            log.exception("the audio broke")
+            log.exception("the audio crashed")
         self._encoding = None
         self._feed.close()

@@ -57,7 +57,7 @@ class FittedPictures:
                 async for frame in pictures:
                     self._feed.push(await beside(self._clock, partial(self.fit, frame)))
         except Exception:
-            log.exception("the fitted pictures broke")
+            log.exception("the fitted pictures crashed")
         self._fitting = None
         self._feed.close()
 

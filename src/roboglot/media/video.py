@@ -83,6 +83,6 @@ class VideoStream(Component):
                     keyframe, self._keyframe_wanted = self._keyframe_wanted, False
                     self._feed.push(await beside(self._clock, partial(encoder.encode, frame, keyframe=keyframe)))
         except Exception:
-            log.exception("the video broke")
+            log.exception("the video crashed")
         self._encoding = None
         self._feed.close()

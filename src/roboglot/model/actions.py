@@ -80,7 +80,7 @@ class Actions:
                 log.info("%s #%d failed: %s", action.name, action.id, error)
             case _:
                 action.error, status = RobotError(f"internal error: {error}"), ActionStatus.ABORTED
-                log.error("%s #%d broke", action.name, action.id, exc_info=error)
+                log.error("%s #%d crashed", action.name, action.id, exc_info=error)
         forget_stack(error)  # the error is kept for a while; its stack frames must not be
         action._task = None
         del self._running[action.id]

@@ -27,10 +27,10 @@ from roboglot.shards.actor import Condition, ShardActor
 from roboglot.shards.messages import Beat
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
-from roboglot.storage.dead_programs import Silence
-from roboglot.storage.homes import Homes
+from roboglot.storage.dead_programs import DeadProgramWatch
 from roboglot.storage.opening import open_registry
-from roboglot.storage.residence import LEASE, holder_of
+from roboglot.storage.registry_lease import LEASE, holder_of
+from roboglot.storage.robot_registry import RobotRegistry
 from roboglot.transport.log_limiter import LogLimiter
 
 TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
@@ -153,7 +153,7 @@ class ClusterFleet:
         self._nodes: dict[str, str] = {}
         self._runs: dict[str, int] = {}
         self._watch: asyncio.Task[None] | None = None
-        self._silence: asyncio.Task[None] | None = None
+        self._registry_watch: asyncio.Task[None] | None = None
         self._loop = asyncio.get_running_loop()
         self.ended: asyncio.Future[None] = self._loop.create_future()
 
@@ -176,8 +176,8 @@ class ClusterFleet:
         await self._end_strangers()
         for shard in self.shards.values():
             await self._begin(shard)
-        self._silence = self._loop.create_task(_free_the_silent(self.plan), name="watch over silent homes")
-        self._watch = self._loop.create_task(self._look_always(), name="looks at shards")
+        self._registry_watch = self._loop.create_task(_free_dead_robots(self.plan), name="watch for dead programs")
+        self._watch = self._loop.create_task(self._run(), name="looks at shards")
         try:
             await asyncio.wait_for(self.shards.settle(), START_MAX)
         except TimeoutError:
@@ -188,7 +188,7 @@ class ClusterFleet:
     async def close(self) -> None:
         """Stop all shards, unless ``lasting``, and release the folder."""
         self.shards.end()
-        tasks = [task for task in (self._watch, self._silence) if task is not None]
+        tasks = [task for task in (self._watch, self._registry_watch) if task is not None]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -273,7 +273,7 @@ class ClusterFleet:
             log.warning("killing shard %s: %s", name, type(error).__name__)
         await asyncio.to_thread(ray.kill, actor, no_restart=True)
 
-    async def _look_always(self) -> None:
+    async def _run(self) -> None:
         seldom = LogLimiter(log)
         while True:
             if self._local and (why := why_lost()) and not self.ended.done():
@@ -358,7 +358,7 @@ def _keep(path: Path, lines: list[str]) -> None:
             file.write("\n".join([*lines, ""]))
 
 
-async def _free_the_silent(plan: FleetPlan) -> None:
+async def _free_dead_robots(plan: FleetPlan) -> None:
     """Release dead shards' robots in the registry while Ray restarts the shards, which would otherwise wait for it."""
     if not (where := _registry_of(plan.shards[0])):
         return
@@ -368,7 +368,9 @@ async def _free_the_silent(plan: FleetPlan) -> None:
         log.warning("dead shards free their robots %g s later: cannot open the registry here: %s", LEASE, error)
         return
     try:
-        await Silence(Homes(database), [robot for shard in plan.shards for robot in shard.robots]).look_always()
+        await DeadProgramWatch(
+            RobotRegistry(database), [robot for shard in plan.shards for robot in shard.robots]
+        ).run()
     finally:
         database.close()
 

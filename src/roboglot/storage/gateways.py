@@ -1,11 +1,11 @@
-"""Gateways of robots, from the registry of their homes, for clients that follow a robot from program to program."""
+"""Gateways of robots, from the registry, for clients that follow a robot from program to program."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 
-from roboglot.storage.homes import Home, Homes
+from roboglot.storage.robot_registry import Claim, RobotRegistry
 from roboglot.storage.transactions import FAILURES
 from roboglot.values import dataclass
 
@@ -16,7 +16,7 @@ PORT_MAX = 65535
 
 @dataclass(frozen=True, slots=True)
 class Gateway:
-    """Gateway of a robot: address, SHA-256 of its certificate, and epoch of the robot's home."""
+    """Gateway of a robot: address, SHA-256 of its certificate, and epoch of the claim to the robot."""
 
     host: str
     port: int
@@ -24,19 +24,19 @@ class Gateway:
     epoch: int
 
 
-class Whereabouts:
+class GatewayLookup:
     """Looks gateways up in the registry."""
 
-    def __init__(self, homes: Homes) -> None:
-        self._homes = homes
+    def __init__(self, registry: RobotRegistry) -> None:
+        self._registry = registry
 
     async def of(self, robot: str) -> Gateway | None:
         """Return the robot's gateway; None if the robot does not run, or has no gateway. Raises OSError."""
         try:
-            home = await self._homes.of(robot)
+            claim = await self._registry.of(robot)
         except FAILURES as error:
             raise OSError(f"the registry: {error}") from None
-        return _gateway(home) if home is not None and home.holder and home.gateway else None
+        return _gateway(claim) if claim is not None and claim.holder and claim.gateway else None
 
     async def moved(self, robot: str, epoch: int) -> None:
         """Return when the robot has a gateway under another epoch; wait on while the registry is unreachable."""
@@ -51,9 +51,9 @@ class Whereabouts:
                 return
 
 
-def _gateway(home: Home) -> Gateway:
-    """Return a home's gateway. Raises OSError if its text in the registry is not an address."""
-    host, _, port = home.gateway.rpartition(":")
+def _gateway(claim: Claim) -> Gateway:
+    """Return the gateway of a claim's program. Raises OSError if its text in the registry is not an address."""
+    host, _, port = claim.gateway.rpartition(":")
     if not (host and port.isascii() and port.isdigit() and 0 < int(port) <= PORT_MAX):
-        raise OSError(f"the registry has no gateway of robot {home.robot}, but {home.gateway!r}")
-    return Gateway(host.strip("[]"), int(port), home.certificate, home.epoch)
+        raise OSError(f"the registry has no gateway of robot {claim.robot}, but {claim.gateway!r}")
+    return Gateway(host.strip("[]"), int(port), claim.certificate, claim.epoch)

@@ -11,7 +11,7 @@ from roboglot.storage.transactions import Transactions
 
 
 def open_registry(where: str) -> Transactions:
-    """Open the registry of robots' homes: a server's URL, or a file. Raises the errors of ``open_database``."""
+    """Open the registry of robots: a server's URL, or a file. Raises the errors of ``open_database``."""
     return open_database(Path(), where) if "://" in where else open_database(Path(where))
 
 

@@ -216,7 +216,7 @@ class PipeEnd(asyncio.Transport):
         try:
             return self._context.copy().run(method, *values)
         except Exception:
-            log.exception("a connection within the process broke")
+            log.exception("a connection within the process crashed")
             self.abort()
             return None
 

@@ -327,7 +327,7 @@ class TaskRun:
         except (RobotError, TypeError, ValueError, ArithmeticError, NotImplementedError) as error:
             self._run.calls.fail(request.id, type(error).__name__, str(error))
         except Exception as error:
-            log.exception("%s of task %s broke", request.name, self.task.id)
+            log.exception("%s of task %s crashed", request.name, self.task.id)
             self._run.calls.fail(request.id, "RuntimeError", f"{request.name} broke: {error}")
         else:
             if self._halts:

@@ -29,7 +29,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 from roboglot.wire.cyberdog.text import write
 
 log = logging.getLogger(__name__)
-seldom = LogLimiter(log)
+limited_log = LogLimiter(log)
 WILDCARDS = ("0.0.0.0", "::")
 EARLY_MAX = 0.75
 REDIAL_FIRST, REDIAL_MAX = 1.0, 16.0  # s between two attempts: first, then doubled up to the maximum
@@ -274,7 +274,7 @@ class AppLink:
             asking = self._outside.call_out(key, lambda: line.push(code, text))
             outcome = await self._clock.wait_for(asking, PUSH_DEADLINE)
         except TimeoutError:
-            seldom.warning(
+            limited_log.warning(
                 f"no end of {key}",
                 "the app did not answer push %s within %s s; until it does, it gets only one push in that time",
                 key,
@@ -288,7 +288,7 @@ class AppLink:
 def _note_error(what: str, outcome: str) -> None:
     """Log an error that the app itself returned, not the loss of the connection."""
     if outcome != DONE and outcome not in BROKEN:
-        seldom.warning(f"{outcome} of {what}", "the app answers %s with the error %s", what, outcome)
+        limited_log.warning(f"{outcome} of {what}", "the app answers %s with the error %s", what, outcome)
 
 
 @lru_cache(64)

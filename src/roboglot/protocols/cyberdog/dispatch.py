@@ -1,4 +1,4 @@
-"""Dispatch of a request to its answers: reads, calls the handler, reports errors in-band. Knows no gRPC."""
+"""Dispatch of a request: reads its parameters, calls its handler, reports errors in-band. Knows no gRPC."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from msgspec import Struct
 
 from roboglot.model.errors import ComponentMissing, RobotError
-from roboglot.model.lateness import lateness
+from roboglot.model.response_delay import response_delay
 from roboglot.model.stand_in import StandIn
 from roboglot.model.tap import SILENT
 from roboglot.operations import BadParameters, Right
@@ -37,14 +37,14 @@ from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPU
 from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_params, unknown_names, write
 
 log = logging.getLogger(__name__)
-seldom = LogLimiter(log)
+limited_log = LogLimiter(log)
 DOOR = "cyberdog"
 _NAMES = {int(row.key): row.name for row in contract("cyberdog")}
 KNOWN = (_NAMES.keys() | UNPUBLISHED) - TEXT_ONLY
 
 
 def error(code: InBandError) -> dict[str, int]:
-    """Return the answer that carries ``code``."""
+    """Return an answer with this error code."""
     return {"error_code": int(code)}
 
 
@@ -52,27 +52,27 @@ async def answer(call: Call) -> object | None:
     """Run the request; return its last answer, or None. Raises NotJson, and nothing else."""
     robot = call.context.robot
     if robot.tap.watched:
-        last = await _noted(call)
+        last = await _run_and_note(call)
     else:
-        last = await (_answered(call) if robot.stand_in is None else _stood_in(call, robot.stand_in))
-    if delay := lateness(robot):
+        last = await (_run(call) if robot.stand_in is None else _run_on_stand_in(call, robot.stand_in))
+    if delay := response_delay(robot):
         await robot.clock.sleep(delay)
     return last
 
 
-async def _noted(call: Call) -> object | None:
-    """Run the request, and note it and its outcome for subscribers of the tap."""
+async def _run_and_note(call: Call) -> object | None:
+    """Run the request; note it and its outcome for subscribers of the tap."""
     robot = call.context.robot
     tap, key = robot.tap, str(int(call.code))
     began = call.began = tap.request(DOOR, key, call.text)
     try:
-        last = await (_answered(call) if robot.stand_in is None else _stood_in(call, robot.stand_in))
+        last = await (_run(call) if robot.stand_in is None else _run_on_stand_in(call, robot.stand_in))
     except NotJson as bad:
         answered = error(InBandError.BAD_PARAMETERS)
         tap.reply(DOOR, key, write(answered), _status(answered), str(bad), began)
         raise
     except RecordedEnd as end:
-        tap.reply(DOOR, key, "", end.status, "the recorded robot ended the call so", began)
+        tap.reply(DOOR, key, "", end.status, "the recorded robot ended the call with this status", began)
         raise
     if last is not None or call.why:
         text, status = ("", SILENT) if last is None else (write(last), _status(last))
@@ -80,7 +80,7 @@ async def _noted(call: Call) -> object | None:
     return last
 
 
-async def _stood_in(call: Call, stand_in: StandIn) -> object | None:
+async def _run_on_stand_in(call: Call, stand_in: StandIn) -> object | None:
     """Return the last answer of the robot's stand-in."""
     try:
         return await _ask_stand_in(call, stand_in)
@@ -99,7 +99,7 @@ async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
     async for reply in stand_in.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
         RecordedEnd.check(reply.status)
         if reply.status == SILENT:
-            call.why = "the recorded robot said nothing, either"
+            call.why = "the recorded robot gave no answer either"
             return None
         text = reply.payload.decode("utf-8", "replace")
         if reply.last:
@@ -108,7 +108,7 @@ async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
     return None
 
 
-async def _answered(call: Call) -> object | None:
+async def _run(call: Call) -> object | None:
     operation, admission = TABLE.get(call.code), call.context.robot.admission
     wrong: list[str] = []
     try:
@@ -118,11 +118,11 @@ async def _answered(call: Call) -> object | None:
             call.context.robot.starts.check(operation.right)
         values = {} if call.code in unread else read_params(call.text)
         if operation is None:
-            call.why = "no robot of this program does that"
-            return _not_there(call.code)
+            call.why = "this operation is not implemented"
+            return _answer_unsupported(call.code)
         if values and operation.names:
-            values, wrong = _taken(call, values, operation.parameters)
-        return _logged(call, await operation.call(call, values))
+            values, wrong = _valid_values(call, values, operation.parameters)
+        return _log_refusal(call, await operation.call(call, values))
     except BadParameters as bad:
         call.why = "; ".join(wrong) or str(bad)
         log.info("%d refused: %s", call.code, call.why)
@@ -135,25 +135,27 @@ async def _answered(call: Call) -> object | None:
         return error(codes_of(refused).in_band)
     except NotJson:
         raise
-    except Exception as broken:
-        call.why = f"internal error: {broken}"
-        log.exception("%d broke", call.code)
+    except Exception as failure:
+        call.why = f"internal error: {failure}"
+        log.exception("%d crashed", call.code)
         return error(InBandError.UNAVAILABLE)
 
 
-def _taken(call: Call, values: Mapping[str, object], fields: type[Struct]) -> tuple[Mapping[str, object], list[str]]:
-    """Return the valid values, and what is wrong with the others; logs the latter and unknown names."""
-    taken, wrong = fitting(values, fields), []
-    if len(taken) < len(values):
+def _valid_values(
+    call: Call, values: Mapping[str, object], fields: type[Struct]
+) -> tuple[Mapping[str, object], list[str]]:
+    """Return the valid values, and why the others are invalid; log the reasons and unknown names."""
+    valid, wrong = fitting(values, fields), []
+    if len(valid) < len(values):
         wrong = mismatches(values, fields)
         unknown = unknown_names(values, fields, UNUSED.get(call.code, frozenset()))
         if ignored := "; ".join([*wrong, *unknown]):
-            seldom.warning(f"{call.code} {ignored}", "%d: ignored: %s", call.code, ignored)
-    return taken, wrong
+            limited_log.warning(f"{call.code} {ignored}", "%d: ignored: %s", call.code, ignored)
+    return valid, wrong
 
 
-def _logged(call: Call, last: object) -> object:
-    """Log the reason if the answer is a refusal, which may carry it; return the answer."""
+def _log_refusal(call: Call, last: object) -> object:
+    """Log the reason if the answer is a refusal; return the answer."""
     if not call.why and isinstance(last, dict) and last.get("success") is False:
         call.why = str(last.get("message", ""))
     if call.why:
@@ -170,10 +172,10 @@ def _status(answered: object) -> str:
     return f"error_code {code}" if code else "ok"
 
 
-def _not_there(code: int) -> dict[str, int] | None:
-    """Answer as a real robot whose service for ``code`` is not running; unknown codes get no answer at all."""
+def _answer_unsupported(code: int) -> dict[str, int] | None:
+    """Answer like a real robot whose service for ``code`` is not running; there is no answer to unknown codes."""
     if code not in KNOWN:
         log.info("code %d is not supported", code)
         return None
-    log.warning("code %d (%s) is not supported", code, _NAMES.get(code, "not in the text"))
+    log.warning("code %d (%s) is not supported", code, _NAMES.get(code, "not in the manual"))
     return None if code in SILENT_WITHOUT_SERVICE else error(InBandError.UNAVAILABLE)

@@ -54,7 +54,7 @@ async def _do(context: Context, request: Request) -> tuple[Level, str]:
     except RobotError as error:
         return level_of(error), str(error)
     except Exception as error:  # one message must not end the connection
-        log.exception("robot %s: %s broke", context.robot.id, request.key)
+        log.exception("robot %s: %s crashed", context.robot.id, request.key)
         return Level.ERROR, f"the robot could not do it: {error}"
     return Level.INFO, ""
 

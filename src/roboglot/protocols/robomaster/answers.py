@@ -29,5 +29,5 @@ class Answer:
         return self.explain() if self.explain else ""
 
 
-Repeated = Callable[[], bytes | Answer | None]
+FastPath = Callable[[], bytes | Answer | None]
 """Answer to a repeated line: bytes, a refusal, or None: nothing was done, and the line must be parsed."""

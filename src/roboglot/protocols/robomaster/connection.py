@@ -15,10 +15,10 @@ from typing import cast
 from roboglot.model.components.system.link import Link
 from roboglot.model.inputs.fairness import Fairness, Use
 from roboglot.model.inputs.outside import CAME, GONE
-from roboglot.model.lateness import late
-from roboglot.protocols.robomaster.answers import Answer, Repeated
+from roboglot.model.response_delay import delay_response
+from roboglot.protocols.robomaster.answers import Answer, FastPath
 from roboglot.protocols.robomaster.context import Context, act_as
-from roboglot.protocols.robomaster.dispatch import DOOR, answer, at_once
+from roboglot.protocols.robomaster.dispatch import DOOR, answer, fast_path
 from roboglot.protocols.robomaster.foreign_protocols import Greeting, turn_away_strangers
 from roboglot.protocols.robomaster.keepalive import hung_up, probe_for_life
 from roboglot.protocols.robomaster.limits import (
@@ -37,7 +37,7 @@ from roboglot.transport.eager import begin
 from roboglot.wire.robomaster.lines import END, LineSplitter
 
 log = logging.getLogger(__name__)
-NOTHING: Mapping[bytes, Repeated] = MappingProxyType({})
+NOTHING: Mapping[bytes, FastPath] = MappingProxyType({})
 
 
 class ControlConnection(asyncio.Protocol):
@@ -114,7 +114,7 @@ class ControlConnection(asyncio.Protocol):
         else:
             self._read(data)
 
-    def _repeat(self, repeated: Repeated) -> object:
+    def _repeat(self, repeated: FastPath) -> object:
         """Return the answer to a repeated line; None if the line must be parsed."""
         use = self._use
         if not use.left:
@@ -143,7 +143,7 @@ class ControlConnection(asyncio.Protocol):
     def _learn(self, data: bytes, text: str) -> None:
         """Cache the function that answers this line, for its repetitions."""
         known = self._context.repeated
-        if data not in known and (repeated := at_once(self._context, text)) is not None:
+        if data not in known and (repeated := fast_path(self._context, text)) is not None:
             if len(known) >= LINES_MAX:
                 known.clear()
             known[data] = repeated
@@ -238,7 +238,7 @@ class ControlConnection(asyncio.Protocol):
         self._join()
         result = await answer(self._context, text)
         self._join()
-        await late(self._context.robot)
+        await delay_response(self._context.robot)
         self._reply(text, result)
         if not self._commands and not self._splitter.within and self._writable.is_set():
             self._repeated = self._context.repeated

@@ -21,7 +21,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.geometry import ORIGIN
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster import readings
-from roboglot.protocols.robomaster.answers import Repeated
+from roboglot.protocols.robomaster.answers import FastPath
 from roboglot.protocols.robomaster.ports.media_port import MediaPort
 from roboglot.protocols.robomaster.pushes import Pushes
 from roboglot.wire.robomaster.replies import Profile
@@ -80,7 +80,7 @@ class Context:
         self._parts: dict[type[ChapterState], Any] = {}
         self._undo: dict[str, Callable[[], object]] = {}
         self._members: dict[Hashable, str] = {}
-        self.repeated: dict[bytes, Repeated] = {}  # by received line; cleared when SDK mode is entered or left
+        self.repeated: dict[bytes, FastPath] = {}  # by received line; cleared when SDK mode is entered or left
         self._numbers = itertools.count(1)
         self._name = ""  # each session has its own: the first part of the source of its actions
 

@@ -1,4 +1,4 @@
-"""Dispatch of a command: finds the operation, checks its parameters, runs it, words the result."""
+"""Dispatch of a command: finds its operation, checks its parameters, runs its handler, formats the reply."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.stand_in import StandIn
 from roboglot.operations import BadParameters, Operation, Right
-from roboglot.protocols.robomaster.answers import Answer, Repeated, Result, Why
+from roboglot.protocols.robomaster.answers import Answer, FastPath, Result, Why
 from roboglot.protocols.robomaster.chapters import (  # noqa: F401
     ai,
     arm,
@@ -47,34 +47,34 @@ from roboglot.wire.robomaster.replies import Profile, Reply
 log = logging.getLogger(__name__)
 
 DOOR = "robomaster"
-KEPT_MAX = 128  # command lines whose meaning is kept
-MANNERS = ("vxy", "vz", "vp", "vy", "wait_for_complete")  # parameters of how to move, not where: alone they do nothing
+PARSED_MAX = 128  # cached command lines
+MODIFIERS = ("vxy", "vz", "vp", "vy", "wait_for_complete")  # they say how to move, not where: alone they have no effect
 
 
 @dataclass(slots=True)
-class _Asked:
-    """Command being answered: its key in the contract, and when the tap noted it."""
+class _Request:
+    """A command that is being answered: its key in the contract, and the time at which the tap noted it."""
 
     key: str = ""
     began: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class _Meaning:
-    """Parsed line: its number, the command's key ("" if unknown), and its values or their refusal.
+class _ParsedLine:
+    """A parsed line: sequence number, key of the command ("" if unknown), and its values or the refusal.
 
-    The values must not be changed, as they are cached.
+    It is cached, so the values must not be changed.
     """
 
     seq: int | None
     key: str = ""
     values: Mapping[str, object] = field(default_factory=dict)
     refusal: tuple[Reply, Why] | None = None
-    warn: Why | None = None  # words in it have no effect
+    warn: Why | None = None  # which of its words have no effect
 
 
 class _Refusal(Exception):
-    """Refusal: the fixed answer, and the reason."""
+    """A command is refused with a fixed reply, for a reason."""
 
     def __init__(self, reply: Reply, why: Callable[[], str]) -> None:
         super().__init__(reply)
@@ -83,31 +83,34 @@ class _Refusal(Exception):
 
 
 async def answer(context: Context, text: str | None) -> Answer:
-    """Run one command (None: too long) and word its answer; raises nothing but cancellation."""
-    asked, tap = _Asked(), context.robot.tap
+    """Run one command (None: it was too long) and return its answer; raises only CancelledError."""
+    request, tap = _Request(), context.robot.tap
     stand_in = context.robot.stand_in
-    result = await (_answered(context, text, asked) if stand_in is None else _stood_in(context, stand_in, text, asked))
+    if stand_in is None:
+        result = await _run(context, text, request)
+    else:
+        result = await _run_on_stand_in(context, stand_in, text, request)
     if tap.watched:
-        if asked.began is None:  # refused before it was parsed
-            asked.began = tap.request(DOOR, asked.key, text or "")
+        if request.began is None:  # refused before it was parsed
+            request.began = tap.request(DOOR, request.key, text or "")
         reply = result.reply
         status = reply.decode("utf-8", "replace").rstrip(" ;") if result.explain else "ok"
-        tap.reply(DOOR, asked.key, reply, status, result.why, asked.began)
+        tap.reply(DOOR, request.key, reply, status, result.why, request.began)
     return result
 
 
-async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer:
+async def _run(context: Context, text: str | None, request: _Request) -> Answer:
     seq = None
     try:
         if text is None:
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
-        meant = _meant(text, context.active, context.profile.as_robots)
-        seq = meant.seq
-        if meant.key:
-            _enter(context, meant.key, text, asked)
-        if meant.refusal is not None:
-            raise _Refusal(*meant.refusal)
-        result = TABLE[meant.key].handler(context, **meant.values)
+        line = _parse_line(text, context.active, context.profile.as_robots)
+        seq = line.seq
+        if line.key:
+            _admit(context, line.key, text, request)
+        if line.refusal is not None:
+            raise _Refusal(*line.refusal)
+        result = TABLE[line.key].handler(context, **line.values)
         if isinstance(result, CoroutineType):
             result = await result
     except (Malformed, _Refusal) as refusal:
@@ -115,120 +118,120 @@ async def _answered(context: Context, text: str | None, asked: _Asked) -> Answer
             return Answer(context.profile.result(Reply.NOT_IN_SDK_MODE, seq), lambda: "send `command;` first")
         return Answer(context.profile.result(refusal.reply, seq), refusal.why)
     except RobotError as error:
-        return _refused(context.profile, error, seq)
+        return _format_error(context.profile, error, seq)
     except Exception as error:
-        log.exception("robomaster: %r broke", text)
-        return _refused(context.profile, error, seq)
-    return Answer(_worded(context.profile, result, seq), warn=meant.warn)
+        log.exception("robomaster: %r crashed", text)
+        return _format_error(context.profile, error, seq)
+    return Answer(_format_result(context.profile, result, seq), warn=line.warn)
 
 
-def _enter(context: Context, key: str, text: str, asked: _Asked) -> None:
-    """Have the tap note a command, and check the client's right. Raises Forbidden."""
-    asked.key = key
+def _admit(context: Context, key: str, text: str, request: _Request) -> None:
+    """Note a command for the tap, and check the client's right. Raises Forbidden, NotReady."""
+    request.key = key
     if context.robot.tap.watched:
-        asked.began = context.robot.tap.request(DOOR, key, text)
+        request.began = context.robot.tap.request(DOOR, key, text)
     if context.robot.admission.enforced:
         context.robot.admission.check(DOOR, key, TABLE[key].right)
     context.robot.starts.check(TABLE[key].right)
 
 
-def _refused(profile: Profile, error: Exception, seq: int | None) -> Answer:
-    """Word an error of a handler."""
+def _format_error(profile: Profile, error: Exception, seq: int | None) -> Answer:
+    """Return the answer to a command whose handler raised ``error``."""
     if isinstance(error, RobotError):
         return Answer(profile.result(reply_to(error), seq), partial(str, error))
     return Answer(profile.result(Reply.FAIL, seq), partial("internal error: {}".format, error))
 
 
-def _worded(profile: Profile, result: Result, seq: int | None) -> bytes:
-    """Word a handler's result."""
+def _format_result(profile: Profile, result: Result, seq: int | None) -> bytes:
+    """Return the bytes of a handler's result."""
     if result is None:
         return profile.result(Reply.OK, seq)
     return profile.result(result, seq) if isinstance(result, str) else profile.values(result, seq)
 
 
-def at_once(context: Context, text: str) -> Repeated | None:
-    """Return a function that answers repetitions of a line in this session; None if that takes more than a plain call.
+def fast_path(context: Context, text: str) -> FastPath | None:
+    """Return a function that answers a line when this session repeats it; None if that takes more than a plain call.
 
-    The function returns None, without having done anything, if this repetition has to go through ``answer``.
+    The function returns None, with no effect, if the repeated line must go through ``answer``.
     """
-    asked = context.robot
-    if not context.active or asked.admission.enforced or asked.stand_in is not None:
+    this_robot = context.robot
+    if not context.active or this_robot.admission.enforced or this_robot.stand_in is not None:
         return None
     try:
-        meant = _meant(text, context.active, context.profile.as_robots)
+        line = _parse_line(text, context.active, context.profile.as_robots)
     except Malformed:
         return None
-    if meant.refusal is not None or iscoroutinefunction(TABLE[meant.key].handler):
+    if line.refusal is not None or iscoroutinefunction(TABLE[line.key].handler):
         return None
-    handler = partial(TABLE[meant.key].handler, context, **meant.values)
-    tap, profile, seq = asked.tap, context.profile, meant.seq
-    network = asked[Network] if Network in asked else None  # noqa: SIM401 - one that comes later is real and on time
+    handler = partial(TABLE[line.key].handler, context, **line.values)
+    tap, profile, seq = this_robot.tap, context.profile, line.seq
+    network = this_robot[Network] if Network in this_robot else None  # noqa: SIM401 - a later one is real
 
     def reply() -> bytes | Answer | None:
-        if tap.watched or asked.starts.down or (network is not None and network.delay):
+        if tap.watched or this_robot.starts.down or (network is not None and network.delay):
             return None
         try:
             result = handler()
         except RobotError as error:
-            return _refused(profile, error, seq)
+            return _format_error(profile, error, seq)
         except Exception as error:
-            log.exception("robomaster: %r broke", text)
-            return _refused(profile, error, seq)
-        return _worded(profile, result, seq)
+            log.exception("robomaster: %r crashed", text)
+            return _format_error(profile, error, seq)
+        return _format_result(profile, result, seq)
 
     return reply
 
 
-async def _stood_in(context: Context, stand_in: StandIn, text: str | None, asked: _Asked) -> Answer:
-    """Return the stand-in's answer."""
+async def _run_on_stand_in(context: Context, stand_in: StandIn, text: str | None, request: _Request) -> Answer:
+    """Parse a line and return the stand-in's answer to it."""
     seq = None
     try:
         if text is None:
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
         command = parse(text)
         seq = command.seq
-        return await _ask_stand_in(context, stand_in, command, text, asked)
+        return await _ask_stand_in(context, stand_in, command, text, request)
     except (Malformed, _Refusal) as refusal:
         return Answer(context.profile.result(refusal.reply, seq), refusal.why)
     except RobotError as error:
         return Answer(context.profile.result(reply_to(error), seq), partial(str, error))
 
 
-async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, text: str, asked: _Asked) -> Answer:
+async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, text: str, request: _Request) -> Answer:
     """Return the stand-in's first answer. Raises _Refusal without one."""
     operation = next((found for key, _ in command.keys if (found := TABLE.get(key))), None)
-    asked.key = operation.key if operation else ""
+    request.key = operation.key if operation else ""
     if context.robot.tap.watched:
-        asked.began = context.robot.tap.request(DOOR, asked.key, text)
+        request.began = context.robot.tap.request(DOOR, request.key, text)
     if context.robot.admission.enforced:
-        context.robot.admission.check(DOOR, asked.key, operation.right if operation else Right.ADMIN)
+        context.robot.admission.check(DOOR, request.key, operation.right if operation else Right.ADMIN)
     try:
         reads = text.rstrip(" ;").endswith("?")
-        async for reply in stand_in.answer(DOOR, asked.key, text.encode(), reads=reads):
+        async for reply in stand_in.answer(DOOR, request.key, text.encode(), reads=reads):
             return Answer(reply.payload, None if reply.status == "ok" else partial(str, reply.status))
     except NotFound as unknown:
         raise _Refusal(Reply.FAIL, partial(str, str(unknown))) from None
     raise _Refusal(Reply.FAIL, lambda: "the recording ends before it was answered")
 
 
-@lru_cache(KEPT_MAX)
-def _meant(text: str, active: bool, as_robots: bool) -> _Meaning:
-    """Parse a line, with a cache, as clients repeat few lines. Raises Malformed."""
+@lru_cache(PARSED_MAX)
+def _parse_line(text: str, active: bool, as_robots: bool) -> _ParsedLine:
+    """Parse a line and check its values; cached, since clients repeat few lines. Raises Malformed."""
     command = parse(text)
     for key, words in command.keys:
         operation = TABLE.get(key)
         if operation is not None and (active or key in OUTSIDE_SDK_MODE):
             try:
-                values, shape = _checked(operation, words, as_robots), shape_of(operation, as_robots)
+                values, shape = _check_values(operation, words, as_robots), shape_of(operation, as_robots)
                 warn = partial(without_effect, shape, ignored) if (ignored := shape.ignored(words)) else None
-                return _Meaning(command.seq, key, values, warn=warn)
+                return _ParsedLine(command.seq, key, values, warn=warn)
             except _Refusal as refusal:
-                return _Meaning(command.seq, key, refusal=(refusal.reply, refusal.why))
-    return _Meaning(command.seq, refusal=(Reply.PARSE_ERROR, partial(_unknown, command)))
+                return _ParsedLine(command.seq, key, refusal=(refusal.reply, refusal.why))
+    return _ParsedLine(command.seq, refusal=(Reply.PARSE_ERROR, partial(_unknown, command)))
 
 
-def _checked(operation: Operation[str], words: Sequence[str], as_robots: bool) -> Mapping[str, object]:
-    """Return the handler's parameters."""
+def _check_values(operation: Operation[str], words: Sequence[str], as_robots: bool) -> Mapping[str, object]:
+    """Return the values of the handler's parameters. Raises _Refusal."""
     shape = shape_of(operation, as_robots)
     values = _values(operation.key, shape, words)
     try:
@@ -244,7 +247,7 @@ def _unknown(command: Command) -> str:
 
 
 def _values(key: str, shape: Shape, words: Sequence[str]) -> dict[str, Value]:
-    """Return the values by name; a command with missing words is answered like an unknown one."""
+    """Return the values by name. Raises _Refusal; a command that lacks words is answered like an unknown one."""
     values = shape.values(words)
     if words and not values and key.endswith((" push", " event")):
         raise _Refusal(
@@ -253,7 +256,7 @@ def _values(key: str, shape: Shape, words: Sequence[str]) -> dict[str, Value]:
         )
     if missing := [name for name in shape.required if name not in values]:
         raise _Refusal(Reply.PARSE_ERROR, lambda: f"{', '.join(missing)} missing; {completed(key, shape, values)}")
-    effective = [name for name in shape.kinds if name not in MANNERS]
+    effective = [name for name in shape.kinds if name not in MODIFIERS]
     if len(shape.kinds) > 1 and values.keys().isdisjoint(effective):
         raise _Refusal(
             Reply.PARSE_ERROR,

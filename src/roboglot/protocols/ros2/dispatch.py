@@ -48,6 +48,6 @@ async def _do(context: Context, key: str, data: bytes | None, read: Read) -> tup
     except RobotError as error:
         return level_of(error), str(error)
     except Exception as error:  # one message must not end the listening
-        log.exception("robot %s: %s broke", context.robot.id, key)
+        log.exception("robot %s: %s crashed", context.robot.id, key)
         return logging.ERROR, f"the robot could not do it: {error}"
     return logging.INFO, ""

@@ -23,7 +23,7 @@ from roboglot.model.client_context import set_client
 from roboglot.model.components.mapping.map_memory import is_settled, settle
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
-from roboglot.model.lateness import late
+from roboglot.model.response_delay import delay_response
 from roboglot.model.stand_in import StandIn
 from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.browsers import Browsers, of_rows
@@ -74,7 +74,7 @@ log = logging.getLogger(__name__)
 LOGGED_MAX = 200  # characters of a path or a refusal in a log line
 HEADS_MAX = 64  # cached heads of responses
 
-Repeated = Callable[[], bytes | None]  # a whole response, or None: the request must be parsed
+FastPath = Callable[[], bytes | None]  # a whole response, or None: the request must be parsed
 Send = Callable[[dict[str, object]], Awaitable[None]]
 Headers = list[tuple[bytes, bytes]]
 
@@ -89,8 +89,8 @@ PREFLIGHT: Headers = [
     (b"access-control-allow-private-network", b"true"),
     (b"access-control-max-age", b"86400"),
 ]
-STOPS = ("/api/core/motion/v1/actions/", "/api/delivery/v1/tasks")  # DELETE on these stops the robot
-FRAMES = (b"content-security-policy", b"frame-ancestors 'self'")  # against clickjacking by other pages
+STOP_PATHS = ("/api/core/motion/v1/actions/", "/api/delivery/v1/tasks")  # DELETE on these stops the robot
+FRAME_POLICY = (b"content-security-policy", b"frame-ancestors 'self'")  # against clickjacking by other pages
 
 
 class Application:
@@ -112,14 +112,14 @@ class Application:
         client = f"slamware {host}".strip()
         set_client(client, address)
         if fairness := self._context.robot.fairness:
-            await wait_for_turn(fairness, fairness.of(address), lambda: _stops(scope))
+            await wait_for_turn(fairness, fairness.of(address), lambda: _stops_robot(scope))
         begun = perf_counter()
-        shared: Headers = []
+        cors: Headers = []
         why = ""
         try:
-            shared = self._admit(scope)
+            cors = self._check_origin(scope)
             if self._admission.enforced and scope["method"] != "OPTIONS":  # browsers send no credentials in a preflight
-                await self._enter(scope)
+                await self._authenticate(scope)
             status, headers, body = await self._answer(scope, receive)
         except ClientGone:
             return
@@ -137,31 +137,31 @@ class Application:
             self._note_reply(scope, status, body, why)
         if fairness:
             fairness.lend(fairness.of(address), perf_counter() - begun)
-        await late(self._context.robot)
-        headers += shared
+        await delay_response(self._context.robot)
+        headers += cors
         headers += [(b"content-length", b"%d" % len(body))] if status != 204 else []
         await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": body})
 
-    def at_once(self, scope: Scope) -> Repeated | None:
-        """Return a function that answers repetitions of a client's GET; None if that takes more than a plain call.
+    def fast_path(self, scope: Scope) -> FastPath | None:
+        """Return a function that answers a GET when its client repeats it; None if that takes more than a plain call.
 
-        The function returns None, without having done anything, if this repetition has to be handled like the first:
-        for a subscriber of the tap, a slow network, a refusal.
+        The function returns None, with no effect, if the repetition must be handled like the first request: for a
+        subscriber of the tap, for a slow network, or because it is refused.
         """
         robot = self._context.robot
-        operation, match = self._found(scope)
+        operation, match = self._find_plain_read(scope)
         if operation is None or match is None or self._admission.enforced or robot.stand_in is not None:
             return None
         if log.isEnabledFor(logging.DEBUG):
             return None
         try:
             values = operation.parse(self._parameters.named(operation, match, scope))
-            shared = self._admit(scope)
+            cors = self._check_origin(scope)
         except (HttpError, BadParameters):
             return None
         handler = partial(copy_context().run, operation.handler, self._context, **values)
-        card = robot[Network] if Network in robot else None  # noqa: SIM401 - one that comes later is real and on time
+        card = robot[Network] if Network in robot else None  # noqa: SIM401 - a later one is real
         (_, address), fairness, tap, mapped = _peer(scope), robot.fairness, self._tap, concerns_map(operation)
 
         def read() -> bytes | None:
@@ -170,9 +170,9 @@ class Application:
                 if answer is NO_CONTENT or answer is None:
                     return None
                 headers, body = self._render(answer, scope)
-            except Exception:  # noqa: BLE001 - a read: the full way repeats it, reports and logs the error
+            except Exception:  # noqa: BLE001 - it changes nothing: handled in full, it fails again and is logged
                 return None
-            return head(*headers, *shared) % len(body) + body
+            return head(*headers, *cors) % len(body) + body
 
         def reply() -> bytes | None:
             if tap.watched or (card is not None and card.delay) or (mapped and not is_settled(robot)):
@@ -181,8 +181,8 @@ class Application:
 
         return reply
 
-    def _found(self, scope: Scope) -> tuple[Operation[str] | None, Match | None]:
-        """Return the operation of a GET, and its match, if its handler is a plain function."""
+    def _find_plain_read(self, scope: Scope) -> tuple[Operation[str] | None, Match | None]:
+        """Return the operation of a GET, and its match, if its handler is a plain function that only reads."""
         if scope["method"] != "GET" or (match := self._routes.find(scope["raw_path"].decode("latin-1"))) is None:
             return None, None
         operation = TABLE.get(match.methods["GET"].key) if "GET" in match.methods else None
@@ -190,21 +190,21 @@ class Application:
             return None, None
         return (None, None) if iscoroutinefunction(operation.handler) else (operation, match)
 
-    def _admit(self, scope: Scope) -> Headers:
+    def _check_origin(self, scope: Scope) -> Headers:
         """Return the CORS headers of an answer. Raises HttpError 403 for pages of other hosts."""
         method, rows = scope["method"], scope["headers"]
         if method == self._admitted[0] and rows == self._admitted[1]:  # a client that polls
             return self._admitted[2]
-        asked = of_rows(rows, method)
-        shared: Headers = []
-        if why := self._browsers.refusal(asked):
+        request = of_rows(rows, method)
+        cors: Headers = []
+        if why := self._browsers.refusal(request):
             raise HttpError(403, "Forbidden", why)
         if self._browsers.any_origin:
-            shared = [(b"access-control-allow-origin", b"*")]
-        elif asked.origin is not None:
-            shared = [(b"access-control-allow-origin", asked.origin.encode("latin-1")), (b"vary", b"Origin")]
-        self._admitted = method, rows, shared
-        return shared
+            cors = [(b"access-control-allow-origin", b"*")]
+        elif request.origin is not None:
+            cors = [(b"access-control-allow-origin", request.origin.encode("latin-1")), (b"vary", b"Origin")]
+        self._admitted = method, rows, cors
+        return cors
 
     def _log(self, client: str, scope: Scope, status: int, body: bytes, seconds: float) -> None:
         """Log a request and its outcome, for ``--verbose``."""
@@ -214,18 +214,18 @@ class Application:
         words = self._context.robot.id, client, scope["method"], path, status, ms, why
         log.debug("robot %s: %s %s %s -> %d, %.1f ms%s", *words)
 
-    async def _enter(self, scope: Scope) -> None:
-        """Act for the client's proven identity from here on. Raises HttpError 401: unknown client."""
+    async def _authenticate(self, scope: Scope) -> None:
+        """Authenticate the client, and act for its identity from here on. Raises HttpError 401."""
         _, address = _peer(scope)
-        shown = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
-        proof = Proof(ProofKind.HTTP, shown) if shown else NO_PROOF
+        header = next((value.decode("latin-1") for name, value in scope["headers"] if name == b"authorization"), "")
+        proof = Proof(ProofKind.HTTP, header) if header else NO_PROOF
         try:
             who = self._admission.cached_identity(address, proof)
             if who is None:
                 who = await self._admission.admit(address, proof)
         except Unknown as unknown:
-            more = (CHALLENGE, CLOSE) if isinstance(unknown, LockedOut) else (CHALLENGE,)  # the body is not read
-            raise HttpError(401, "Unauthorized", str(unknown), more) from None
+            headers = (CHALLENGE, CLOSE) if isinstance(unknown, LockedOut) else (CHALLENGE,)  # the body is not read
+            raise HttpError(401, "Unauthorized", str(unknown), headers) from None
         set_client(f"slamware {who}", address, who)
 
     async def _answer(self, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
@@ -241,12 +241,12 @@ class Application:
             return await self._carry_out(row, match, scope, receive)
 
     def _page(self, path: str, method: str) -> tuple[Headers, bytes]:
-        """Return a page besides the API. Raises HttpError."""
+        """Return a page that is not part of the API. Raises HttpError."""
         if (page := self._pages.find(path)) is None:
             raise HttpError(404, "Not Found")
         if method not in ("GET", "HEAD"):
             raise not_allowed(["GET"])
-        return [(b"content-type", page[0].encode()), FRAMES], page[1]
+        return [(b"content-type", page[0].encode()), FRAME_POLICY], page[1]
 
     async def _carry_out(self, row: Row, match: Match, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         scope["operation"] = row.key
@@ -277,7 +277,7 @@ class Application:
 
     async def _check_again(self, scope: Scope, key: str, right: Right | None) -> None:
         """Raise HttpError if the client lost its right, or its proof, while it sent the body."""
-        await self._enter(scope)
+        await self._authenticate(scope)
         if not self._admission.may(right or Right.ADMIN):
             self._check_right(key, right)
 
@@ -299,7 +299,7 @@ class Application:
         except HttpError:
             raise
         except Exception:
-            log.exception("%s broke", row.key)
+            log.exception("%s crashed", row.key)
             raise HttpError(500, "Internal Server Error", row.name) from None
         finally:
             if isinstance(body := values.get("body"), Upload):
@@ -308,13 +308,13 @@ class Application:
     async def _ask_stand_in(
         self, stand_in: StandIn, row: Row, scope: Scope, receive: Receive
     ) -> tuple[int, Headers, bytes]:
-        """Return the stand-in's answer. Raises HttpError 501 if it has none."""
+        """Return the answer of the robot's stand-in. Raises HttpError 501 if it has none."""
         scope["body"] = await self._parameters.whole(scope, receive)
         if self._tap.watched:
             self._note_request(scope)
         reads = scope["method"] in ("GET", "HEAD")
         try:
-            async for reply in stand_in.answer("slamware", row.key, _wire_form(scope), reads=reads):
+            async for reply in stand_in.answer("slamware", row.key, _for_tap(scope), reads=reads):
                 status = int(reply.status)
                 kind = PLAIN if status >= 400 else _kind_of(reply.payload, scope)
                 return status, [kind] if reply.payload else [], reply.payload
@@ -323,7 +323,7 @@ class Application:
         raise HttpError(501, "Not Implemented", f"the recording ends before {row.key} was answered")
 
     def _note_request(self, scope: Scope) -> None:
-        scope["began"] = self._tap.request("slamware", scope["operation"], _wire_form(scope))
+        scope["began"] = self._tap.request("slamware", scope["operation"], _for_tap(scope))
 
     def _note_reply(self, scope: Scope, status: int, body: bytes, why: str) -> None:
         if "began" not in scope:  # refused before it was parsed
@@ -337,7 +337,7 @@ class Application:
                 return [], b""
             case bytes():
                 return [BINARY], answer
-            case Text() if _only_plain(scope):
+            case Text() if _accepts_only_text(scope):
                 return [PLAIN], answer.value.encode()
             case Text():
                 return [JSON], self._encode(answer.value)
@@ -358,18 +358,18 @@ def _peer(scope: Scope) -> tuple[str, str]:
     return host, f"{host}:{port}"
 
 
-def _wire_form(scope: Scope) -> bytes:
+def _for_tap(scope: Scope) -> bytes:
     """Return a request in the tap's form: method, path and query, an empty line, the body."""
     query = b"?" + scope["query_string"] if scope["query_string"] else b""
     return b"%s %s%s\n\n%s" % (scope["method"].encode(), scope["raw_path"], query, scope.get("body", b""))
 
 
 def _kind_of(body: bytes, scope: Scope) -> tuple[bytes, bytes]:
-    """Return the Content-Type guessed from a recorded body."""
+    """Return the Content-Type of a recorded body, by its content."""
     try:
         msgspec.json.decode(body)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        return PLAIN if _only_plain(scope) else BINARY
+        return PLAIN if _accepts_only_text(scope) else BINARY
     return JSON
 
 
@@ -384,11 +384,11 @@ def not_allowed(methods: Iterable[str]) -> HttpError:
     return HttpError(405, "Method Not Allowed", words, ((b"allow", words.encode()),))
 
 
-def _only_plain(scope: Scope) -> bool:
+def _accepts_only_text(scope: Scope) -> bool:
     """Return whether the client accepts text/plain and nothing else."""
     accepted = b",".join(value for name, value in scope["headers"] if name == b"accept")
     return {entry.partition(b";")[0].strip().lower() for entry in accepted.split(b",")} == {b"text/plain"}
 
 
-def _stops(scope: Scope) -> bool:
-    return bool(scope["method"] == "DELETE" and scope["path"].startswith(STOPS))
+def _stops_robot(scope: Scope) -> bool:
+    return bool(scope["method"] == "DELETE" and scope["path"].startswith(STOP_PATHS))

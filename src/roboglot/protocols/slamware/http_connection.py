@@ -4,7 +4,7 @@ Loaded, with uvicorn, for a door's first client. Knows neither the robot nor the
 guard sockets.
 
 A request that repeats an earlier one, byte for byte, is answered without parser, ASGI and task if the application
-offers that (``at_once``).
+offers that (``fast_path``).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _TOO_LARGE = (
 class Answering(Protocol):
     """ASGI application that may answer repeated requests directly."""
 
-    def at_once(self, scope: Scope) -> Callable[[], bytes | None] | None:
+    def fast_path(self, scope: Scope) -> Callable[[], bytes | None] | None:
         """Return a function that returns the whole response to a repetition, or None if that must be parsed."""
 
 
@@ -275,7 +275,7 @@ class HttpConnection(HttpToolsProtocol):
 
     def _learn(self, request: bytes) -> None:
         """Cache the function that answers this request, which came twice in a row."""
-        if self.cycle.keep_alive and (repeated := self._application.at_once(cast(Scope, self.scope))) is not None:
+        if self.cycle.keep_alive and (repeated := self._application.fast_path(cast(Scope, self.scope))) is not None:
             if len(self._said) >= REPEATED_MAX:
                 self._said.clear()
             self._said[request] = repeated

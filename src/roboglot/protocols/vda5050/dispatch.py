@@ -41,6 +41,6 @@ async def _refusal(context: Context, name: str, data: bytes) -> Rejected | None:
     except Rejected as rejected:
         return rejected
     except Exception as error:  # one message must not end the connection to fleet control
-        log.exception("robot %s: %s broke", context.robot.id, name)
-        return Rejected(ErrorKind.NOT_AVAILABLE, f"{name} broke: {error}")
+        log.exception("robot %s: %s crashed", context.robot.id, name)
+        return Rejected(ErrorKind.NOT_AVAILABLE, f"internal error in {name}: {error}")
     return None

@@ -125,9 +125,9 @@ class Performer:
             kind = ErrorKind.INSTANT_ACTION if instant else ErrorKind.ACTION_FAILED
             context.errors.report(kind, Level.WARNING, str(error), {"actionId": action.action_id}, order=not instant)
         except Exception as error:
-            log.exception("robot %s: the action %s broke", context.robot.id, action.action_type)
-            state.status, state.result = ActionStatus.FAILED, f"it broke: {error}"
-            why = f"{action.action_type} broke: {error}"
+            log.exception("robot %s: the action %s crashed", context.robot.id, action.action_type)
+            state.status, state.result = ActionStatus.FAILED, f"internal error: {error}"
+            why = f"internal error in {action.action_type}: {error}"
             context.errors.report(ErrorKind.ACTION_FAILED, Level.WARNING, why, {"actionId": action.action_id})
         finally:
             context.touch()

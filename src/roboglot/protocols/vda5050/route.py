@@ -109,9 +109,11 @@ class Route:
             await self._run(first)
         except Exception as error:
             context = self._context
-            log.exception("robot %s: driving order %s broke", context.robot.id, context.book.order_id)
+            log.exception("robot %s: driving order %s crashed", context.robot.id, context.book.order_id)
             references = {"orderId": context.book.order_id}
-            context.errors.report(ErrorKind.UNREACHABLE, Level.CRITICAL, f"driving broke: {error}", references)
+            context.errors.report(
+                ErrorKind.UNREACHABLE, Level.CRITICAL, f"internal error while driving: {error}", references
+            )
 
     async def _run(self, first: Node | None) -> None:
         """Do the first node's actions, then leg after leg until nothing released is left."""

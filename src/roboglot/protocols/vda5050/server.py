@@ -207,7 +207,7 @@ class Vda5050Door:
         except (aiomqtt.MqttError, OSError):
             raise
         except Exception:  # noqa: BLE001 - it is logged, with its traceback
-            self._log_limiter.error(name, "robot %s: sending %s to fleet control broke", self._robot.id, name)
+            self._log_limiter.error(name, "robot %s: sending %s to fleet control crashed", self._robot.id, name)
 
     @property
     def _is_off(self) -> bool:

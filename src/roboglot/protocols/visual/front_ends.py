@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 
-from roboglot.model.lateness import lateness
+from roboglot.model.response_delay import response_delay
 from roboglot.model.robot import Robot
 from roboglot.wire.visual.relay import FrontEnd
 from roboglot.wire.visual.replies import responses
@@ -83,7 +83,7 @@ class FrontEnds:
         """Give a frame once the network lets it pass; none overtakes those before it when the network gets faster."""
         clock = self._robot.clock
         now = clock.time()
-        due = max(now + lateness(self._robot), self._due)
+        due = max(now + response_delay(self._robot), self._due)
         if not self._delayed and due <= now:
             self._give(give)
             return

@@ -197,7 +197,7 @@ class SimulatedCamera(Camera):
                 self._feed.push(await self.capture())
                 shortfall.note(now)
         except Exception:
-            log.exception("the camera broke")
+            log.exception("the camera crashed")
             self._filming = None
             self._feed.close()
 

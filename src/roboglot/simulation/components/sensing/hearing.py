@@ -115,7 +115,7 @@ async def _logged(listening: Coroutine[None, None, None]) -> None:
     try:
         await listening
     except Exception:
-        log.exception("the hearing broke")
+        log.exception("the hearing crashed")
 
 
 def own_voice(robot: str) -> bytes:

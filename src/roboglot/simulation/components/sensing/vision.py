@@ -81,7 +81,7 @@ class SimulatedDetector(Detector[T]):
                 self.looks += 1
                 ready = Sighting(stamp, tuple(self._look()))
         except Exception:
-            log.exception("the detector of %s broke", self._name)
+            log.exception("the detector of %s crashed", self._name)
             self._looking = None
             self._feed.close()
 

@@ -189,7 +189,7 @@ class Transmission:
     def _done(self, task: asyncio.Task[None]) -> None:
         self._running.discard(task)
         if not task.cancelled() and (error := task.exception()):
-            log.error("image transmission broke", exc_info=error)
+            log.error("image transmission crashed", exc_info=error)
 
 
 class _Peer:

@@ -126,7 +126,7 @@ class Tasks:
             except RobotError as error:
                 log.info("task %s failed: %s", kind.name, error)
             except Exception:
-                log.exception("task %s broke", kind.name)
+                log.exception("task %s crashed", kind.name)
             finally:
                 result = task.stopped_as if task.stopping else result
                 self.current = self._running = None

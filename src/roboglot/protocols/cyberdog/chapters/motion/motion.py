@@ -20,7 +20,7 @@ from roboglot.wire.cyberdog.chapters.motion.motion import CommandType, Motion, M
 from roboglot.wire.cyberdog.codes import Code, InBandError
 from roboglot.wire.cyberdog.text import Int32, Three, TwoOrThree
 
-seldom = LogLimiter(logging.getLogger(__name__))
+limited_log = LogLimiter(logging.getLogger(__name__))
 SERVO_RESPONSE = push(Code.SERVO_RESPONSE, depth=2)
 CALIBRATION = 4  # ``value`` of a frame
 ANSWER_MAX = 20.0  # s after which the answer is a time-out, whether or not the motion continues
@@ -61,7 +61,7 @@ async def servo(
         executed = Executed(MotionCode.UNSUPPORTED)
     if executed.code is not MotionCode.DONE:
         why = servo_reason(executed.code, motion_id, cmd_type)
-        seldom.warning(f"{motion_id} {why}", "%d refused: %s", call.code, why)
+        limited_log.warning(f"{motion_id} {why}", "%d refused: %s", call.code, why)
     response: dict[str, object] = {
         "motion_id": motion_id,
         "result": executed.code is MotionCode.DONE,

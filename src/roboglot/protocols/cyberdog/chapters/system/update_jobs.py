@@ -94,7 +94,7 @@ class UpdateJobs:
         except (RobotError, BadParameters) as error:
             code, message = next(code for kind, code in CODES if isinstance(error, kind)), str(error)
         except Exception:
-            log.exception("5010 %s broke", goal.operate)
+            log.exception("5010 %s crashed", goal.operate)
             code, message = FAILED, "internal error"
         finally:
             leave()

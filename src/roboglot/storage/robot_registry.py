@@ -1,4 +1,4 @@
-"""Registry of robots' homes: the program that runs each robot, with an epoch. Knows no robot and no clock.
+"""Registry of robots: which program claims each of them, with an epoch. Knows no robot and no clock.
 
 A program that holds robots increments its count of renewals. Another program that wants one of them compares the count
 with an earlier one, by its own clock, so that no machine's date matters. Each change of a program's robots, and each
@@ -14,8 +14,8 @@ from roboglot.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Home:
-    """One robot's home: its program, and the address of its doors.
+class Claim:
+    """Claim to one robot: its program, and the address of its doors.
 
     ``gateway``: HOST:PORT for `roboglot connect`, empty: none; ``certificate``: the gateway's SHA-256 fingerprint.
     """
@@ -28,22 +28,22 @@ class Home:
     certificate: str = ""
 
 
-class Occupied(Exception):
-    """Other programs hold some of the robots: ``homes``; ``signs``: those programs' counts of renewals."""
+class RobotsHeld(Exception):
+    """Other programs hold some of the robots: ``claims``; ``renewals``: those programs' counts of renewals."""
 
-    def __init__(self, homes: Mapping[str, Home], signs: Mapping[str, int]) -> None:
-        super().__init__(", ".join(homes))
-        self.homes, self.signs = homes, signs
+    def __init__(self, claims: Mapping[str, Claim], renewals: Mapping[str, int]) -> None:
+        super().__init__(", ".join(claims))
+        self.claims, self.renewals = claims, renewals
 
 
-class Homes:
+class RobotRegistry:
     """The registry; every call is one transaction."""
 
     def __init__(self, database: Transactions) -> None:
         self._database = database
 
     async def take(self, addresses: Mapping[str, str], holder: str, silent: Mapping[str, int]) -> dict[str, int]:
-        """Give all these robots to ``holder``; return their new epochs. Raises Occupied, and then gives none.
+        """Claim all these robots for ``holder``; return their new epochs. Raises RobotsHeld, and then claims none.
 
         A robot is free if it is new, was released, was this holder's before, or if its holder's count of renewals is
         still the one in ``silent``. Robots that ``holder`` had before and does not want any more are released: its
@@ -58,9 +58,9 @@ class Homes:
                 if (epoch := _take(connection, robot, addresses[robot], holder, free))
             }
             if left := addresses.keys() - taken.keys():
-                homes = {robot: home for robot, home in _all(connection).items() if robot in left}
-                held = {home.holder for home in homes.values()}
-                raise Occupied(homes, {name: count for name, count in _signs(connection).items() if name in held})
+                claims = {robot: claim for robot, claim in _all(connection).items() if robot in left}
+                held = {claim.holder for claim in claims.values()}
+                raise RobotsHeld(claims, {name: count for name, count in _renewals(connection).items() if name in held})
             kept = connection.execute("SELECT robot FROM robot_home WHERE holder=?", (holder,)).fetchall()
             query = "UPDATE robot_home SET holder='' WHERE robot=?"
             connection.executemany(query, sorted(row for row in kept if row[0] not in addresses))
@@ -78,9 +78,9 @@ class Homes:
 
         return await self._database.run(work)
 
-    async def signs(self) -> dict[str, int]:
+    async def renewals(self) -> dict[str, int]:
         """Return the count of renewals of each program."""
-        return await self._database.read(_signs)
+        return await self._database.read(_renewals)
 
     async def announce(self, holder: str, gateway: str, certificate: str) -> None:
         """Store the gateway of ``holder``'s robots."""
@@ -88,10 +88,10 @@ class Homes:
         values = (gateway, certificate, holder)
         await self._database.run(lambda connection: connection.execute(query, values).rowcount)
 
-    async def of(self, robot: str) -> Home | None:
-        """Return a robot's last home; None if it never had one."""
-        homes = await self._database.read(lambda connection: _rows(connection, "WHERE robot=?", (robot,)))
-        return homes.get(robot)
+    async def of(self, robot: str) -> Claim | None:
+        """Return the last claim to a robot; None if there never was one."""
+        claims = await self._database.read(lambda connection: _rows(connection, "WHERE robot=?", (robot,)))
+        return claims.get(robot)
 
     async def release(self, holder: str, epochs: Mapping[str, int]) -> None:
         """Release these robots, except those with a later epoch."""
@@ -127,8 +127,8 @@ class Homes:
 
         return await self._database.run(work)
 
-    async def all(self) -> dict[str, Home]:
-        """Return every robot's last home by name."""
+    async def all(self) -> dict[str, Claim]:
+        """Return the last claim to every robot, by its name."""
         return await self._database.read(_all)
 
 
@@ -167,15 +167,15 @@ def _take(connection: Connection, robot: str, address: str, holder: str, free: C
     return int(connection.execute("SELECT epoch FROM robot_home WHERE robot=?", (robot,)).fetchone()[0])
 
 
-def _signs(connection: Connection) -> dict[str, int]:
+def _renewals(connection: Connection) -> dict[str, int]:
     return dict(connection.execute("SELECT holder, renewals FROM robot_holder"))
 
 
-def _all(connection: Connection) -> dict[str, Home]:
+def _all(connection: Connection) -> dict[str, Claim]:
     return _rows(connection, "ORDER BY robot")
 
 
-def _rows(connection: Connection, which: str, values: Sequence[str] = ()) -> dict[str, Home]:
+def _rows(connection: Connection, which: str, values: Sequence[str] = ()) -> dict[str, Claim]:
     columns = "robot, holder, address, epoch, gateway, certificate"
     rows = connection.execute(f"SELECT {columns} FROM robot_home {which}", values)
-    return {row[0]: Home(*row) for row in rows}
+    return {row[0]: Claim(*row) for row in rows}

@@ -1,4 +1,4 @@
-"""A robot has one home: leases, epochs and fencing, in a file and on a server."""
+"""A robot has one program: leases, epochs and fencing, in a file and on a server."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.errors import Busy, RobotError
 from roboglot.model.geometry import Twist
 from roboglot.runtime import Runtime
-from roboglot.storage import residence as timing
-from roboglot.storage.dead_programs import GAP_MAX, Silence
-from roboglot.storage.homes import Homes, Occupied
+from roboglot.storage import registry_lease as timing
+from roboglot.storage.dead_programs import GAP_MAX, DeadProgramWatch
 from roboglot.storage.opening import open_database
-from roboglot.storage.residence import HOLD, LEASE, PERIOD, Residence, holder_of
+from roboglot.storage.registry_lease import HOLD, LEASE, PERIOD, RegistryLease, holder_of
+from roboglot.storage.robot_registry import RobotRegistry, RobotsHeld
 from roboglot.storage.transactions import Connection, DatabaseError, DiskFull, Transactions
 from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 
@@ -54,44 +54,44 @@ def watch(monkeypatch: pytest.MonkeyPatch) -> Watch:
     return clock
 
 
-def home(database: Transactions, holder: str, watch: Watch, lost: Callable[[str], None] = print) -> Residence:
-    return Residence(Homes(database), {"a": f"127.1.0.1#{holder}", "b": "127.1.0.2"}, holder, lost, watch)
+def leased(database: Transactions, holder: str, watch: Watch, lost: Callable[[str], None] = print) -> RegistryLease:
+    return RegistryLease(RobotRegistry(database), {"a": f"127.1.0.1#{holder}", "b": "127.1.0.2"}, holder, lost, watch)
 
 
 async def test_robot_of_a_silent_program_goes_to_next(database: Transactions, watch: Watch) -> None:
     lost = list[str]()
-    old, new = home(database, "old", watch, lost.append), home(database, "new", watch)
-    await old.take()
-    assert not old.why_not("a")
+    old, new = leased(database, "old", watch, lost.append), leased(database, "new", watch)
+    await old.acquire()
+    assert not old.refusal("a")
     began = watch.now
-    await new.take()
+    await new.acquire()
     assert watch.now == began + LEASE
-    assert old.why_not("a")
-    assert not new.why_not("a")
-    old.look()
+    assert old.refusal("a")
+    assert not new.refusal("a")
+    old.check()
     assert lost == ["a", "b"]
-    homes = await Homes(database).all()
-    assert {(h.holder, h.epoch) for h in homes.values()} == {("new", 2)}
-    assert homes["a"].address == "127.1.0.1#new"
+    registry = await RobotRegistry(database).all()
+    assert {(h.holder, h.epoch) for h in registry.values()} == {("new", 2)}
+    assert registry["a"].address == "127.1.0.1#new"
 
 
 async def test_old_program_never_comes_back_with_old_epoch(database: Transactions, watch: Watch) -> None:
-    old, new = home(database, "old", watch), home(database, "new", watch)
-    await old.take()
-    await new.take()
+    old, new = leased(database, "old", watch), leased(database, "new", watch)
+    await old.acquire()
+    await new.acquire()
     await old.renew()  # late: the registry answers with another epoch
-    assert "another program" in old.why_not("a")
+    assert "another program" in old.refusal("a")
     await old.close()
-    assert {h.holder for h in (await Homes(database).all()).values()} == {"new"}
+    assert {h.holder for h in (await RobotRegistry(database).all()).values()} == {"new"}
     await new.renew()
-    assert not new.why_not("a")
+    assert not new.refusal("a")
 
 
 async def test_robot_that_is_renewed_is_refused_to_others(
     database: Transactions, watch: Watch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    old, new = home(database, "old", watch), home(database, "new", watch)
-    await old.take()
+    old, new = leased(database, "old", watch), leased(database, "new", watch)
+    await old.acquire()
 
     async def renewed(seconds: float) -> None:
         watch.now += seconds
@@ -99,18 +99,18 @@ async def test_robot_that_is_renewed_is_refused_to_others(
 
     monkeypatch.setattr(timing.asyncio, "sleep", renewed)
     with pytest.raises(OSError, match="another program runs robot a, b"):
-        await new.take()
-    assert new.why_not("a")
-    assert not old.why_not("a")
+        await new.acquire()
+    assert new.refusal("a")
+    assert not old.refusal("a")
 
 
 async def test_program_that_wants_fewer_robots_releases_the_others(database: Transactions) -> None:
     """It was killed, and one of its robots was moved: its renewals must not hold that one for ever."""
-    homes = Homes(database)
-    await homes.take({"a": "", "b": ""}, "old", {})
-    assert await homes.take({"b": ""}, "old", {}) == {"b": 2}
-    await homes.renew("old")
-    assert await homes.take({"a": ""}, "new", {}) == {"a": 2}
+    registry = RobotRegistry(database)
+    await registry.take({"a": "", "b": ""}, "old", {})
+    assert await registry.take({"b": ""}, "old", {}) == {"b": 2}
+    await registry.renew("old")
+    assert await registry.take({"a": ""}, "new", {}) == {"a": 2}
 
 
 @pytest.mark.parametrize("failure", [DatabaseError("connection refused"), DiskFull("the disk is full")], ids=str)
@@ -125,11 +125,11 @@ async def test_failing_registry_is_logged_seldom_and_tried_again(
         tries += 1
         raise failure.again()
 
-    broken = cast("Homes", SimpleNamespace(renew=fail, signs=fail))
+    broken = cast("RobotRegistry", SimpleNamespace(renew=fail, renewals=fail))
     if keeper == "program":
-        trying = asyncio.create_task(Residence(broken, {"a": ""}, "x", print, watch)._renew_always())
+        trying = asyncio.create_task(RegistryLease(broken, {"a": ""}, "x", print, watch)._renew_periodically())
     else:
-        trying = asyncio.create_task(Silence(broken, ["a"], watch).look_always())
+        trying = asyncio.create_task(DeadProgramWatch(broken, ["a"], watch).run())
     while tries < 5:
         await asyncio.wait((trying,), timeout=0)
         assert not trying.done() or trying.result()
@@ -139,52 +139,52 @@ async def test_failing_registry_is_logged_seldom_and_tried_again(
 
 
 async def test_a_program_gives_up_before_another_may_begin(database: Transactions, watch: Watch) -> None:
-    old = home(database, "old", watch)
-    await old.take()
+    old = leased(database, "old", watch)
+    await old.acquire()
     watch.now += HOLD
-    assert "has not confirmed" in old.why_not("a")
+    assert "has not confirmed" in old.refusal("a")
     assert HOLD < LEASE
     await old.renew()  # the registry is back, and no one claimed them meanwhile
-    assert not old.why_not("a")
+    assert not old.refusal("a")
 
 
 async def test_robots_are_taken_at_once_all_or_none(database: Transactions, watch: Watch) -> None:
-    old, began = home(database, "old", watch), watch.now
-    await old.take()
-    await home(database, "old", watch).take()  # the next program of the same folder
+    old, began = leased(database, "old", watch), watch.now
+    await old.acquire()
+    await leased(database, "old", watch).acquire()  # the next program of the same folder
     await old.renew()
-    assert "another program" in old.why_not("a")  # same holder, another epoch
+    assert "another program" in old.refusal("a")  # same holder, another epoch
     await old.close()  # an earlier epoch releases nothing
-    homes = Homes(database)
-    assert {h.holder for h in (await homes.all()).values()} == {"old"}
-    await homes.release("old", {"a": 2})
-    with pytest.raises(Occupied) as occupied:
-        await homes.take({"a": "", "b": ""}, "new", {})
-    assert list(occupied.value.homes) == ["b"]
-    assert (await homes.all())["a"].holder == ""
-    assert await homes.take({"a": ""}, "new", {}) == {"a": 3}
+    registry = RobotRegistry(database)
+    assert {h.holder for h in (await registry.all()).values()} == {"old"}
+    await registry.release("old", {"a": 2})
+    with pytest.raises(RobotsHeld) as held:
+        await registry.take({"a": "", "b": ""}, "new", {})
+    assert list(held.value.claims) == ["b"]
+    assert (await registry.all())["a"].holder == ""
+    assert await registry.take({"a": ""}, "new", {}) == {"a": 3}
     assert watch.now == began
 
 
 @needs_postgresql
 async def test_robots_stand_while_the_server_is_away(db_server: PostgreSQLServer, watch: Watch) -> None:
     database, lost = open_database(Path(), db_server.url), list[str]()
-    old = home(database, "old", watch, lost.append)
-    await old.take()
+    old = leased(database, "old", watch, lost.append)
+    await old.acquire()
     db_server.stop()
     try:
         with pytest.raises(DatabaseError):
             await old.renew()
-        old.look()
+        old.check()
         assert not lost
         watch.now += HOLD
-        old.look()
+        old.check()
         assert lost == ["a", "b"]
     finally:
         db_server.start()
     await old.renew()
-    assert not old.why_not("a")
-    assert {h.epoch for h in (await Homes(database).all()).values()} == {1}
+    assert not old.refusal("a")
+    assert {h.epoch for h in (await RobotRegistry(database).all()).values()} == {1}
     database.close()
 
 
@@ -200,16 +200,16 @@ async def test_robot_that_another_program_took_stands_and_refuses(tmp_path: Path
     )
     runtime = Runtime(config, ())
     database = open_database(registry)
-    homes = Homes(database)
+    claims = RobotRegistry(database)
     await runtime.start()
     try:
         robot = runtime.fleet.robots["a"]
         driving = robot[Driving].drive(Twist(0.2, 0.0, 0.0))
-        held = (await homes.all())["a"]
+        held = (await claims.all())["a"]
         assert held.holder == holder_of(config.data)
-        await homes.take({"a": "10.0.0.2"}, "another", await homes.signs())
-        assert runtime._residence is not None
-        await runtime._residence.renew()
+        await claims.take({"a": "10.0.0.2"}, "another", await claims.renewals())
+        assert runtime._registry_lease is not None
+        await runtime._registry_lease.renew()
         assert isinstance(runtime.clock, LockstepClock)
         await runtime.clock.advance(1.0)
         assert await driving.done() is ActionStatus.CANCELED
@@ -221,7 +221,7 @@ async def test_robot_that_another_program_took_stands_and_refuses(tmp_path: Path
             robot[Driving].drive(Twist(0.2, 0.0, 0.0))
     finally:
         await runtime.close()
-    assert (await homes.all())["a"].holder == "another"
+    assert (await claims.all())["a"].holder == "another"
     database.close()
 
 
@@ -230,91 +230,91 @@ STARTED = 2.0  # s that Ray then needs to start a shard's process
 BACK_MAX = 10.0
 
 
-async def watched(silence: Silence, watch: Watch, seconds: float) -> list[str]:
+async def watched(programs: DeadProgramWatch, watch: Watch, seconds: float) -> list[str]:
     """Look every period; return what was freed."""
     freed, end = list[str](), watch.now + seconds
     while watch.now < end:
-        freed += await silence.look()
+        freed += await programs.check()
         watch.now += PERIOD
     return freed
 
 
 async def test_robots_of_dead_shards_return_within_ten_seconds(database: Transactions, watch: Watch) -> None:
-    old, new = home(database, "old", watch), home(database, "new", watch)
-    silence = Silence(Homes(database), ["a", "b"], watch)
-    await old.take()
-    assert await watched(silence, watch, PERIOD) == []
+    old, new = leased(database, "old", watch), leased(database, "new", watch)
+    programs = DeadProgramWatch(RobotRegistry(database), ["a", "b"], watch)
+    await old.acquire()
+    assert await watched(programs, watch, PERIOD) == []
     await old.renew()
     died = watch.now
-    assert await watched(silence, watch, NOTICED + STARTED) == ["a", "b"]
-    assert old.why_not("a")  # before another may claim it
-    await new.take()
+    assert await watched(programs, watch, NOTICED + STARTED) == ["a", "b"]
+    assert old.refusal("a")  # before another may claim it
+    await new.acquire()
     assert watch.now - died <= NOTICED + STARTED + PERIOD
     assert watch.now - died < BACK_MAX
-    assert {(h.holder, h.epoch) for h in (await Homes(database).all()).values()} == {("new", 2)}
+    assert {(h.holder, h.epoch) for h in (await RobotRegistry(database).all()).values()} == {("new", 2)}
     await old.renew()
-    assert "another program" in old.why_not("a")
+    assert "another program" in old.refusal("a")
 
 
 async def test_waiting_program_takes_robots_when_freed(
     database: Transactions, watch: Watch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    old, new, homes = home(database, "old", watch), home(database, "new", watch), Homes(database)
-    await old.take()
+    old, new, registry = leased(database, "old", watch), leased(database, "new", watch), RobotRegistry(database)
+    await old.acquire()
     began = watch.now
 
     async def freed_meanwhile(seconds: float) -> None:
         watch.now += seconds
         if watch.now - began > 1.0:
-            await homes.free(await homes.signs(), ["a", "b"])
+            await registry.free(await registry.renewals(), ["a", "b"])
 
     monkeypatch.setattr(timing.asyncio, "sleep", freed_meanwhile)
-    await new.take()
+    await new.acquire()
     assert watch.now - began <= 1.0 + 2 * PERIOD
-    assert not new.why_not("a")
+    assert not new.refusal("a")
 
 
 async def test_only_silence_that_was_watched_frees(database: Transactions, watch: Watch) -> None:
-    old, homes = home(database, "old", watch), Homes(database)
-    silence = Silence(homes, ["a"], watch)
-    await old.take()
+    old, registry = leased(database, "old", watch), RobotRegistry(database)
+    programs = DeadProgramWatch(registry, ["a"], watch)
+    await old.acquire()
     for _ in range(20):  # it renews late
-        await silence.look()
+        await programs.check()
         watch.now += HOLD
         await old.renew()
-        assert await silence.look() == []
-    await watched(silence, watch, LEASE - 2 * PERIOD)
+        assert await programs.check() == []
+    await watched(programs, watch, LEASE - 2 * PERIOD)
     watch.now += GAP_MAX + PERIOD  # the registry was out of reach, perhaps for the program, too
-    assert await watched(silence, watch, LEASE) == []
-    assert await watched(silence, watch, 2 * PERIOD) == ["a"]
-    assert (await homes.all())["b"].holder == "old"  # another fleet's robots
+    assert await watched(programs, watch, LEASE) == []
+    assert await watched(programs, watch, 2 * PERIOD) == ["a"]
+    assert (await registry.all())["b"].holder == "old"  # another fleet's robots
 
 
 async def test_renewal_that_comes_before_freeing_keeps_the_robot(database: Transactions, watch: Watch) -> None:
-    old, homes = home(database, "old", watch), Homes(database)
-    await old.take()
-    seen = await homes.signs()
+    old, registry = leased(database, "old", watch), RobotRegistry(database)
+    await old.acquire()
+    seen = await registry.renewals()
     await old.renew()
-    assert await homes.free(seen, ["a", "b"]) == []
-    assert {h.holder for h in (await homes.all()).values()} == {"old"}
+    assert await registry.free(seen, ["a", "b"]) == []
+    assert {h.holder for h in (await registry.all()).values()} == {"old"}
 
 
 async def test_freed_robot_returns_to_its_program_if_unclaimed(database: Transactions, watch: Watch) -> None:
     lost = list[str]()
-    old, other = home(database, "old", watch, lost.append), home(database, "other", watch)
-    homes = Homes(database)
-    await old.take()
+    old, other = leased(database, "old", watch, lost.append), leased(database, "other", watch)
+    registry = RobotRegistry(database)
+    await old.acquire()
     watch.now += HOLD
-    old.look()
-    await homes.free(await homes.signs(), ["a", "b"])
+    old.check()
+    await registry.free(await registry.renewals(), ["a", "b"])
     await old.renew()
-    assert not old.why_not("a")
-    assert {(h.holder, h.epoch) for h in (await homes.all()).values()} == {("old", 2)}
-    await homes.free(await homes.signs(), ["a", "b"])
-    await other.take()
+    assert not old.refusal("a")
+    assert {(h.holder, h.epoch) for h in (await registry.all()).values()} == {("old", 2)}
+    await registry.free(await registry.renewals(), ["a", "b"])
+    await other.acquire()
     await other.close()  # what the robot stored then is unknown to the old program
     await old.renew()
-    assert "another program" in old.why_not("a")
+    assert "another program" in old.refusal("a")
     assert lost == ["a", "b", "a", "b"]
 
 
@@ -348,12 +348,12 @@ def wait_for_a_lock(url: str) -> None:
 async def test_renewal_during_a_takeover_confirms_nothing(db_server: PostgreSQLServer, first: str) -> None:
     one, two = open_database(Path(), db_server.url), open_database(Path(), db_server.url)
     held = Held(one)
-    slow, fast = Homes(cast(Transactions, held)), Homes(two)
+    slow, fast = RobotRegistry(cast(Transactions, held)), RobotRegistry(two)
     await fast.take({"a": "", "b": ""}, "old", {})
-    signs = await fast.signs()
+    renewals = await fast.renewals()
     calls = {
-        "take": lambda homes: homes.take({"a": "", "b": ""}, "new", signs),
-        "renew": lambda homes: homes.renew("old"),
+        "take": lambda registry: registry.take({"a": "", "b": ""}, "new", renewals),
+        "renew": lambda registry: registry.renew("old"),
     }
     second = "renew" if first == "take" else "take"
     begun = asyncio.create_task(calls.pop(first)(slow))
@@ -366,7 +366,7 @@ async def test_renewal_during_a_takeover_confirms_nothing(db_server: PostgreSQLS
         assert await meanwhile == {}
     else:
         assert await begun == {"a": 1, "b": 1}
-        with pytest.raises(Occupied):
+        with pytest.raises(RobotsHeld):
             await meanwhile
     one.close()
     two.close()
