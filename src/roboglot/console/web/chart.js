@@ -18,6 +18,10 @@ export function picture(grid, colours) {
   [canvas.width, canvas.height] = [grid.width, grid.height];
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   const image = context.createImageData(grid.width, grid.height);
+  const rgb = (colour) => {
+    context.fillStyle = colour;
+    return String(context.fillStyle).match(/\w\w/g).map((part) => parseInt(part, 16)).concat(255); // "#rrggbb"
+  };
   const shades = [[0, 0, 0, 0], rgb(colours.free), rgb(colours.occupied)];
   for (let row = 0; row < grid.height; row++) {
     for (let column = 0; column < grid.width; column++) {
@@ -27,12 +31,6 @@ export function picture(grid, colours) {
   }
   context.putImageData(image, 0, 0);
   return canvas;
-}
-
-/** @param {string} hex */
-function rgb(hex) {
-  const value = parseInt(hex.slice(1), 16);
-  return [(value >> 16) & 255, (value >> 8) & 255, value & 255, 255];
 }
 
 /** A point given in `frame` ([x, y, yaw]), outside of it. @param {number[]} frame @param {number[]} p */
