@@ -90,7 +90,8 @@ def test_pages_load_nothing_from_elsewhere() -> None:
 
 
 def test_the_page_is_small_enough() -> None:
-    views = (f"/views/{name}.js" for name in ("camera", "class", "plots", "recordings", "sign"))
+    names = ("camera", "class", "clock", "maps", "plots", "recordings", "robots", "sign", "wire", "world")
+    views = (f"/views/{name}.js" for name in names)
     shown = (*views, "/copies.js", "/vendor/uplot.mjs", "/vendor/uplot.css")  # loaded when shown
     later = (*shown, "/words/server.zh.json")  # loaded after the page
     sent = {
@@ -99,7 +100,7 @@ def test_the_page_is_small_enough() -> None:
         if path not in ("/index.html", "/words/en.json", *later)
         and not path.startswith(("/studio", "/fleet/"))  # only one language is loaded
     }
-    assert sum(len(asset.packed) for asset in sent.values()) < 58 * 1024
+    assert sum(len(asset.packed) for asset in sent.values()) < 50 * 1024
 
 
 def test_pages_leave_the_tab_key_s_start_alone() -> None:

@@ -6,11 +6,11 @@ import { Button, Icon, html, lacks, language, loadWords, notice, place, robotWor
 import { age, changeWorld, choose, command, connect, current, hello, me, pace, recording, signOut, state, status, stopRobot, want } from "./link.js";
 import { Live } from "./views/live.js";
 import { later } from "./views/later.js";
-import { Robots } from "./views/robots.js";
-import { Wire } from "./views/wire.js";
-import { World } from "./views/world.js";
 
 const SignIn = later(() => import("./views/sign.js").then((m) => m.SignIn));
+const Wire = later(() => import("./views/wire.js").then((m) => m.Wire));
+const World = later(() => import("./views/world.js").then((m) => m.World));
+const Robots = later(() => import("./views/robots.js").then((m) => m.Robots));
 const Recordings = later(() => import("./views/recordings.js").then((m) => m.Recordings));
 const Class = later(() => import("./views/class.js").then((m) => m.Class));
 
