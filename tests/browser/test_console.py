@@ -37,18 +37,6 @@ WRITTEN = """() => {
     kind.clearRect = function (...all) { window.written.push(this.texts = []); clearRect.apply(this, all); };
     kind.fillText = function (text, ...all) { this.texts?.push(text); fillText.call(this, text, ...all); };
 }"""
-# The share of the map's pixels that have the theme's colour of free floor, as the browser reads that colour.
-FREE_FLOOR = """() => {
-    const probe = document.body.appendChild(document.createElement('i'));
-    probe.style.color = 'var(--map-free)';
-    const [r, g, b] = getComputedStyle(probe).color.match(/\\d+/g).map(Number);
-    probe.remove();
-    const map = document.querySelector('canvas');
-    const { data } = map.getContext('2d').getImageData(0, 0, map.width, map.height);
-    let free = 0;
-    for (let i = 0; i < data.length; i += 4) free += data[i] === r && data[i + 1] === g && data[i + 2] === b;
-    return 4 * free / data.length;
-}"""
 LABELS = "found => found.map((one) => one.getAttribute('aria-label') ?? one.innerText)"
 
 
@@ -87,17 +75,6 @@ async def test_click_on_the_map_brings_the_robot_there(served: Served, open_cons
     assert served.runtime.fleet.world.truth.pose_of("a").distance_to(before) > 0.3
     await page.click("#tab-actions")
     await page.wait_for_selector(".badge.succeeded")
-
-
-async def test_free_floor_has_the_colour_of_each_theme(served: Served, open_console: OpenConsole) -> None:
-    page = await open_console()
-    await served.clock.advance(3.0)
-    themes = set[str]()
-    for _ in range(2):
-        await page.click("[aria-label='Dark or light']")
-        themes.add(await page.locator("html").get_attribute("data-theme"))
-        await until_page(page, f"({FREE_FLOOR})() > 0.05")
-    assert themes == {"light", "dark"}
 
 
 async def test_robot_stands_when_the_driving_page_is_killed(served: Served, open_console: OpenConsole) -> None:

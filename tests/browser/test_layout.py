@@ -12,6 +12,7 @@ import pytest
 from roboglot.shards.overview import Overview
 from roboglot.shards.snapshots import Snapshots
 from tests.browser.served import PAGE_PATIENCE, PATIENCE, STILL, OpenConsole, Served, becomes
+from tests.browser.served import until as until_page
 from tests.shards.test_overview import Console, fleet_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -28,6 +29,18 @@ SMALL_TARGETS = """() => [...document.querySelectorAll('button, a, select, input
     .filter(e => !e.classList.contains('line'))
     .map(e => e.outerHTML.slice(0, 80))"""
 
+# The share of the map's pixels that have the theme's colour of free floor, as the browser reads that colour.
+FREE_FLOOR = """() => {
+    const probe = document.body.appendChild(document.createElement('i'));
+    probe.style.color = 'var(--map-free)';
+    const [r, g, b] = getComputedStyle(probe).color.match(/\\d+/g).map(Number);
+    probe.remove();
+    const map = document.querySelector('canvas');
+    const { data } = map.getContext('2d').getImageData(0, 0, map.width, map.height);
+    let free = 0;
+    for (let i = 0; i < data.length; i += 4) free += data[i] === r && data[i + 1] === g && data[i + 2] === b;
+    return 4 * free / data.length;
+}"""
 LOW = """() => import('/link.js').then((link) => {
     const { a } = link.states.value, level = 'WARNING', name = 'battery low';
     const battery = { ...a.battery, remaining: 1380 }, faults = [{ id: 1, name, level, message: name }];
@@ -55,6 +68,17 @@ COVERED_OR_CUT = """() => {
     }
     return bad;
 }"""
+
+
+async def test_free_floor_has_the_colour_of_each_theme(served: Served, open_console: OpenConsole) -> None:
+    page = await open_console()
+    await served.clock.advance(3.0)
+    themes = set[str]()
+    for _ in range(2):
+        await page.click("[aria-label='Dark or light']")
+        themes.add(await page.locator("html").get_attribute("data-theme"))
+        await until_page(page, f"({FREE_FLOOR})() > 0.05")
+    assert themes == {"light", "dark"}
 
 
 async def test_low_screens_show_everything(served: Served, open_console: OpenConsole) -> None:
