@@ -68,6 +68,7 @@ function shown(group) {
   return found;
 }
 
+const capital = (words) => words[0].toUpperCase() + words.slice(1);
 const category = (name, style, contents, id) => ({ kind: "category", toolboxitemid: id, name, ...(style.startsWith("#") ? { colour: style } : { categorystyle: style }), contents });
 
 /** What a search may find. */
@@ -91,7 +92,7 @@ export function toolbox(modules, allowed) {
   contents.push({ kind: "sep" });
   for (const group of table.groups) {
     const left = shown(group.id).filter(may);
-    if (left.length) contents.push(category(words(group), group.colour, left, `group-${group.id}`));
+    if (left.length) contents.push(category(capital(words(group)), group.colour, left, `group-${group.id}`));
   }
   return { kind: "categoryToolbox", contents };
 }
