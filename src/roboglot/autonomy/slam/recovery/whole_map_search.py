@@ -11,6 +11,7 @@ from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.contradictions import STOOD
 from roboglot.autonomy.slam.matcher import Match, places
 from roboglot.autonomy.slam.recovery.distant_places import NEAR, DistantPlaces
+from roboglot.autonomy.slam.recovery.fruitless_searches import FruitlessSearches, View, nearest_echoes
 from roboglot.autonomy.slam.recovery.whereabouts import Whereabouts
 from roboglot.autonomy.slam.scan_points import ScanPoints
 from roboglot.model.events import LostReason, PoseJumped, RecoveryMeans
@@ -18,7 +19,7 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
 
 BETTER = 0.08  # the gain in agreement that another place needs over the believed one
-LOST_PERIOD = 1.0  # s between searches
+LOST_PERIOD = 1.0  # s between searches, or decisions to leave them out
 FELL_PERIOD_MAX = 16.0  # s between searches, which become rarer, while the fit stays worse than it was
 DOUBT_SHARE = 0.85  # share of its usual agreement below which a scan fits worse
 KNOWN_SURE = 0.6  # share of known points from which agreement alone suffices
@@ -77,9 +78,9 @@ class WholeMapSearch:
         self._robot, self._belief, self._whereabouts = robot, belief, whereabouts
         self._believe, self._way = believe, way
         self._searched_at, self._searching, self._given_at = -math.inf, False, -math.inf
-        self._pause = LOST_PERIOD  # s from a search to the next
+        self._pause = LOST_PERIOD  # s from a search to the next while the robot is not lost
         self._missed, self._fell_at = 0.0, 0.0  # agreement before it fell (0: it has not), and m driven at that time
-        self._replacement = PlaceReplacement()
+        self._replacement, self._fruitless = PlaceReplacement(), FruitlessSearches()
         self._unseen = False  # whether a client gave a pose that was not compared with the whole map yet
         self._search: asyncio.Task[None] | None = None
         self.mapped_from = 0.0  # m driven from which scans are added to the map again
@@ -87,6 +88,7 @@ class WholeMapSearch:
     def note_given(self, stamp: float) -> None:
         """Note that a client gave a pose, which the next scans compare with the whole map."""
         self._given_at, self._missed, self._unseen = stamp, 0.0, True
+        self._fruitless.forget()
 
     def was_recent(self, stamp: float) -> bool:
         """Return whether the map was searched less than a lost robot's period ago."""
@@ -108,19 +110,29 @@ class WholeMapSearch:
         return not self._searching and stamp - self._searched_at >= (LOST_PERIOD if belief.lost else self._pause)
 
     def start(self, scan: ScanPoints, odometry: Pose, stamp: float, agreement: float) -> None:
-        """Search the whole map for the place of ``scan``.
+        """Search the whole map for the place of ``scan``, but more and more rarely if a lost robot only sees the same.
 
         A believed place, which the scan fits with this ``agreement``, is only given up for a much better one.
         """
         belief, grid = self._belief, self._belief.map
+        self._searched_at = stamp
+        view = View(grid, grid.scans, odometry, nearest_echoes(scan))
+        if belief.lost is None:
+            self._fruitless.forget()
+        elif self._fruitless.forbid(view, stamp):
+            return
         given, self._unseen = self._unseen and belief.lost is None, False
         anywhere = self._replacement.is_new(grid)  # on a map just loaded
-        self._searched_at, self._searching = stamp, True
+        self._searching = True
         self._pause = min(2.0 * self._pause, FELL_PERIOD_MAX)
 
         def then(found: list[Match]) -> None:
             self._searching = False
             self._whereabouts.forget_places()
+            if len(found) == 1:  # a distant place has to be found once more, soon
+                self._fruitless.forget()
+            else:
+                self._fruitless.add(view, stamp)
             if found and belief.map is grid and belief.localizing and self._given_at <= stamp:
                 self._judge(found, odometry, stamp, agreement, given=given, anywhere=anywhere)
 
