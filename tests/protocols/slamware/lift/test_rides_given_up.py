@@ -75,7 +75,6 @@ class RideWalk:
 
 
 @pytest.mark.slow  # rides take minutes of robot time; in short: test_ride_given_up_in_the_car
-@pytest.mark.timeout(600)  # a hang: lost in the car, the robot searches its map each second, 100 s of a processor
 @pytest.mark.parametrize("seed", range(8))
 async def test_rides_given_up_at_any_moment(
     seed: int, robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
