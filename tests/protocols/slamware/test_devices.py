@@ -23,7 +23,7 @@ from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.sensing.depth_camera import DepthCamera
 from roboglot.model.components.sensing.sensor_masks import SensorMasks
-from roboglot.model.components.system.firmware import Firmware, Module
+from roboglot.model.components.system.firmware import Firmware, FirmwarePackage, Module
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
@@ -237,6 +237,17 @@ async def test_a_module_restarts_and_the_door_stays(
     assert robot[Base].velocity.x > 0.05
 
 
+async def test_a_refused_restart_stops_nothing(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    update = robot[Firmware].download(FirmwarePackage("9", 10**9, "0" * 32, {}, url="maker:9"))
+    drive = robot[Driving].move_by(Pose(3.0))
+    await forward(seconds=1)
+    for mode in ("Soft", "Base", "Hard"):
+        refused = await client.post(f"{SYSTEM}/power/:restartmodule", json={"mode": f"RestartMode{mode}"})
+        assert refused.status_code == 403
+    await forward(seconds=1)
+    assert [update.status.ended, drive.status.ended] == [False, False]
+
+
 async def test_metres_and_seconds_count_over_the_robots_life(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
 ) -> None:
@@ -341,9 +352,11 @@ async def test_emergency_stop_of_another_door_shows_in_health(
     robot[Legs].go_limp()
     await forward(seconds=0.5)
     assert (await client.get(HEALTH)).json()["hasSystemEmergencyStop"] is True
+    assert await put(client, "base.emergency_stop", "off") == 403  # only standing up ends it
     robot[Legs].stand()
     await forward(seconds=4)
     assert (await client.get(HEALTH)).json()["hasSystemEmergencyStop"] is False
+    assert await put(client, "base.emergency_stop", "off") == 200
 
 
 async def test_jack_and_doors_are_refused_while_stopped(

@@ -122,7 +122,10 @@ class Firmware(Component):
 
     @abstractmethod
     def reboot(self, *, source: str = "", after: float = 0.0) -> Action:
-        """Restart in ``after`` s: all actions are cancelled, and the installed version becomes the running one."""
+        """Restart in ``after`` s: all actions are cancelled, and the installed version becomes the running one.
+
+        Raises Busy while an update is downloaded or installed.
+        """
 
     @property
     @abstractmethod

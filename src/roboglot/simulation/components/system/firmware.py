@@ -42,6 +42,7 @@ PACKAGE = "firmware package"  # the entry that occupies its space on the disk
 CHARGE_MIN = 0.3  # required for an installation
 LOOK_EVERY = 60.0  # s between checks for a newer version
 AFTER_MAX = 86_400.0  # s
+UPDATING = (FirmwareState.DOWNLOADING, FirmwareState.INSTALLING)
 RESTART_SECONDS = {Module.SOFTWARE: 8.0, Module.BASE: 3.0}
 
 
@@ -195,6 +196,8 @@ class SimulatedFirmware(Firmware):
     def reboot(self, *, source: str = "", after: float = 0.0) -> Action:
         if not 0.0 <= after <= AFTER_MAX:
             raise InvalidGoal("a reboot is at most a day away")
+        if self._progress.state in UPDATING:
+            self._check_unused()
 
         async def run(action: Action) -> None:
             await self._clock.sleep(after)
@@ -239,9 +242,12 @@ class SimulatedFirmware(Firmware):
                 let_move(self._robot, self._base.locks, lock)
                 robot.events.publish(ModuleRestarted(stamp=self._clock.time(), module=module))  # also if called off
 
+        self._check_unused()
+        return self._robot.actions.start(f"restart {module}", run, resources=[FIRMWARE], source=source)
+
+    def _check_unused(self) -> None:
         for holder in self._robot.actions.running(FIRMWARE):
             raise Busy(f"{holder.name} is under way")
-        return self._robot.actions.start(f"restart {module}", run, resources=[FIRMWARE], source=source)
 
     def sense(self, stamp: float, _seconds: float) -> None:
         """Check periodically for an update, and begin it on a robot that updates itself, is docked and idle."""

@@ -39,9 +39,9 @@ def wakeup(context: Context) -> None:
 @TABLE.on(f"POST {API}/:restartmodule", right=Right.ADMIN, needs=(Firmware,))
 def restart_module(context: Context, body: Restart) -> bool:
     """Restart the robot (without answers meanwhile), its software, or its base; 403 during an update."""
-    context.actions.abort()
     if body.mode is RestartMode.HARD:
         context.robot[Firmware].reboot(source=SOURCE)
     else:
         context.robot[Firmware].restart(MODULES[body.mode], source=SOURCE)
+    context.actions.abort()  # only now: a refusal stops nothing
     return True
