@@ -19,7 +19,7 @@ from roboglot.model.components.sensing.depth_camera import DepthCamera
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.disk import LOW, Disk
 from roboglot.model.components.system.firmware import Firmware, FirmwarePackage, FirmwareState
-from roboglot.model.errors import Blocked, InvalidGoal, NotFound, Refused
+from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotFound, Refused
 from roboglot.model.events import DiskLow, FirmwareChanged, PowerModeChanged, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.geometry import Pose, Twist
 
@@ -264,3 +264,31 @@ def switches(robot):
     return [
         stop.engaged, stop.brake_released, braking.enabled, depth.enabled, skin.enabled, skin.pattern, eyes.effect
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("way", [lambda robot: robot[Firmware].reboot(), lambda r: r[Power].shut_down(restart_after=1)])
+async def test_every_restart_ends_awake_and_lying(dog, way):
+    robot = dog.robot
+    robot[Legs].go_limp()
+    await dog.clock.advance(1.0)
+    asleep = robot[Power].sleep()  # limp legs lie already
+    await dog.clock.advance(1.0)
+    assert (asleep.status, robot[Power].mode) == (ActionStatus.SUCCEEDED, PowerMode.ASLEEP)
+    way(robot)
+    await dog.clock.advance(40.0)
+    assert (robot[Power].mode, robot[Legs].posture) == (PowerMode.AWAKE, Posture.LYING)
+    standing = robot[Legs].stand()
+    await dog.clock.advance(4.0)
+    assert standing.status is ActionStatus.SUCCEEDED
+
+
+@pytest.mark.parametrize("installs", [False, True])
+async def test_no_reboot_breaks_an_update(dog, installs):
+    firmware = dog.robot[Firmware]
+    if installs:
+        await downloaded(dog)
+    updating = firmware.install(DIGEST) if installs else firmware.download(package())
+    await dog.clock.advance(5.0)
+    with pytest.raises(Busy, match="firmware is under way"):
+        firmware.reboot()
+    assert not updating.status.ended

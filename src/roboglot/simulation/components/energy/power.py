@@ -54,6 +54,7 @@ class SimulatedPower(Power):
         self._kept = section.automatic
         self._lying_since: float | None = None
         self._switching: asyncio.Task[None] | None = None
+        robot.events.listen(Rebooted, lambda _: self._become(PowerMode.AWAKE))
 
     @property
     def mode(self) -> PowerMode:
@@ -82,7 +83,7 @@ class SimulatedPower(Power):
                 return
             if self._mode is PowerMode.OFF or (self._mode is not PowerMode.AWAKE and mode is PowerMode.LOW_POWER):
                 raise Refused(f"the robot is {self._mode}")
-            if Legs in self._robot and self._robot[Legs].posture is not Posture.LYING:
+            if Legs in self._robot and self._robot[Legs].posture not in (Posture.LYING, Posture.LIMP):
                 await self._robot[Legs].lie_down(source=source).succeeded()
             self._become(mode)
 

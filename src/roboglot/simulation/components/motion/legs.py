@@ -26,7 +26,7 @@ from roboglot.model.components.motion.legs import (
 )
 from roboglot.model.components.motion.motions import MOTIONS, Motion, MotionSpec
 from roboglot.model.errors import Collided, EmergencyStopped, InvalidGoal, Refused
-from roboglot.model.events import PostureChanged
+from roboglot.model.events import PostureChanged, Rebooted
 from roboglot.model.geometry import STILL, Orientation
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import LegsSection
@@ -77,6 +77,15 @@ class SimulatedLegs(Legs):
         self.off = ""  # why the motors lack power; empty: they have it
         torso.put(section.standing)
         self.walk(section.gait)
+
+        def power_up(_: Rebooted) -> None:
+            """Give limp legs their torque again, as every start of a robot does: they lie."""
+            if self._posture is Posture.LIMP:
+                torso.body = lying = Body(section.lying)
+                torso.take(lying)
+                self._become(Posture.LYING)
+
+        robot.events.listen(Rebooted, power_up)
 
     @property
     def posture(self) -> Posture:
