@@ -11,6 +11,7 @@ import pytest
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.system.file_store import FileStore
+from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.errors import NotFound
 from roboglot.model.tap import Direction
 from roboglot.protocols.vda5050.chapters.sensing import REPORTS, REPORTS_MAX
@@ -179,6 +180,7 @@ async def test_wakes_up_by_itself_at_the_set_time(yard: Opened) -> None:
     await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "HIBERNATING")
     await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "ONLINE")
     assert one.clock.epoch() >= then
+    assert states(one)["sleep"][0] == "FINISHED"
 
 
 async def test_earlier_wake_up_time_wakes_no_later_sleep(yard: Opened) -> None:
@@ -198,6 +200,21 @@ async def test_earlier_wake_up_time_wakes_no_later_sleep(yard: Opened) -> None:
     await one.clock.advance(40)
     control.hear()
     assert connection() == "HIBERNATING"
+
+
+async def test_hibernation_ends_when_others_wake_the_robot(yard: Opened) -> None:
+    one = await yard()
+    control = one.control
+    for number, wake in enumerate((lambda: one.robot[Power].wake(), lambda: one.robot[Firmware].reboot())):
+        then = datetime.fromtimestamp(one.clock.epoch() + 60, UTC).isoformat()
+        control.send("instantActions", instant(action("startHibernation", f"sleep {number}", wakeUpTime=then)))
+        await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "HIBERNATING")
+        wake()
+        await one.until(lambda: one.robot[Power].mode is PowerMode.AWAKE)
+        await one.until(lambda: control.heard["connection"][-1]["connectionState"] == "ONLINE")
+    one.robot[Power].sleep()
+    await one.clock.advance(80)  # the set time has passed
+    assert one.robot[Power].mode is PowerMode.ASLEEP
 
 
 async def test_a_robot_that_is_switched_off_takes_leave(yard: Opened) -> None:

@@ -20,6 +20,7 @@ from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from roboglot.protocols.vda5050.error_book import ErrorBook
 from roboglot.protocols.vda5050.errors import Rejected
+from roboglot.protocols.vda5050.hibernation import Hibernation
 from roboglot.protocols.vda5050.maps import Maps
 from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, OrderBook, forget_oldest
 from roboglot.protocols.vda5050.order_check import check_order
@@ -47,8 +48,7 @@ class Context:
         self.book = OrderBook(measure=self._metres)
         self.instant: dict[str, ActionState] = {}
         self.paused = False
-        self.hibernating = False  # this door hibernates: no states, and only stopHibernation is accepted
-        self.alarm: asyncio.Future[None] | None = None  # wakes the robot at the given time
+        self.hibernation = Hibernation(robot, self.touch)
         self.leaving = False  # the robot is switching off: the door disconnects from the broker
         self.load: dict[str, str] = {}  # fleet control's description of the picked load
         self.changed = asyncio.Event()
@@ -82,7 +82,7 @@ class Context:
 
     def take_order(self, payload: bytes) -> None:
         """Take an order or an update and drive it. Raises Rejected."""
-        if self.hibernating:
+        if self.hibernation.on:
             log.info("robot %s hibernates: refused an order", self.robot.id)
             return
         order = self._read(payload, OrderMessage)
@@ -114,7 +114,7 @@ class Context:
         for action in message.actions:
             if action.action_id in self.instant:
                 continue  # already known
-            if self.hibernating and action.action_type != "stopHibernation":
+            if self.hibernation.on and action.action_type != "stopHibernation":
                 log.info("robot %s hibernates: refused %s", self.robot.id, action.action_type)
                 continue
             state = self.instant[action.action_id] = ActionState(action)

@@ -162,7 +162,7 @@ class Vda5050Door:
     async def _report(self) -> None:
         """Send the state after each change and periodically."""
         async for now in self._robot.clock.every(LOOK_PERIOD):
-            if self._rests and self._context.hibernating:
+            if self._rests and self._context.hibernation.on:
                 continue
             async with self._surviving("state"):
                 await self._report_at(now)
@@ -182,7 +182,7 @@ class Vda5050Door:
             context.changed.clear()
             self._sent, self._sent_at = _coarse(state), now
             await self._send("state", state)
-        if context.hibernating:
+        if context.hibernation.on:
             self._rests = True
             await self._send_connection("HIBERNATING")
 

@@ -15,24 +15,22 @@ SLEEP_MAX = 31 * 24 * 3600.0  # s
 
 @TABLE.on("startHibernation", right=Right.ADMIN)
 async def start_hibernation(context: Context, *, wakeUpTime: str = "") -> str:  # noqa: N803 - the standard's word
-    """Drop the order, save power, and send no state until stopHibernation or the wake-up time (ISO 8601, UTC)."""
+    """Drop the order, save power, and send no state until the robot is awake: ``wakeUpTime`` is ISO 8601, UTC."""
     seconds = _seconds_until(wakeUpTime, context.robot.clock.epoch()) if wakeUpTime else None
     if not context.book.idle:
         await context.clear_order()
     if Power in context.robot:
         await context.performer.carry_out(context.robot[Power].save(source=SOURCE))
-    context.hibernating = True
-    if seconds is not None:
-        context.alarm = context.run_beside(_wake_in(context, seconds))
+    context.hibernation.begin(None if seconds is None else context.run_beside(_wake_in(context, seconds)))
     return ""
 
 
 @TABLE.on("stopHibernation", right=Right.ADMIN)
 async def stop_hibernation(context: Context) -> str:
     """Leave hibernation and accept orders again."""
-    if context.alarm is not None:
-        context.alarm.cancel()
-    await _wake(context)
+    if Power in context.robot:
+        await context.performer.carry_out(context.robot[Power].wake(source=SOURCE))
+    context.hibernation.end()
     return ""
 
 
@@ -47,16 +45,12 @@ async def shut_down(context: Context) -> str:
 
 
 async def _wake_in(context: Context, seconds: float) -> None:
+    """Wake the robot after so many seconds; one that cannot be woken, its battery being empty, sleeps on."""
     await context.robot.clock.sleep(seconds)
-    context.alarm = None
-    await _wake(context)
-
-
-async def _wake(context: Context) -> None:
     if Power in context.robot:
-        await context.performer.carry_out(context.robot[Power].wake(source=SOURCE))
-    context.hibernating = False
-    context.touch()
+        context.robot[Power].wake(source=SOURCE)  # hibernation ends when it is awake
+    else:
+        context.hibernation.end()
 
 
 def _seconds_until(text: str, now: float) -> float:
