@@ -126,7 +126,7 @@ class Tools:
     async def where_am_i(self, robot: Robot = DEFAULT) -> dict[str, object]:
         """Return a robot's pose, actions, battery and faults, and who controls it."""
         state: dict[str, object] = await _answer_of(self._console.get(dict, "robots", robot))
-        keys = ("name", "pose", "velocity", "actions", "control", "faults", "battery", "place", "safety")
+        keys = ("name", "pose", "velocity", "actions", "control", "faults", "battery", "place", "safety", "body")
         return {key: state[key] for key in keys if key in state}
 
     async def look(self, robot: Robot = DEFAULT) -> Image:

@@ -8,6 +8,7 @@ import pytest
 
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.energy.power import Power
+from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import ComponentMissing
@@ -96,6 +97,8 @@ async def test_a_sleeping_robot_has_its_motors_off(caller: Caller) -> None:
     names = ("batt_st", "power_motor_shutdown", "power_soft_shutdown", "key_val")
     data = await caller("cyberdog.bms.data")
     assert [field(data, name) for name in names][1:] == [False, False, 0]
+    caller.robot[Legs].go_limp()
+    assert field(await caller("cyberdog.bms.data"), "power_motor_shutdown")
     caller.robot[Power].sleep()
     await caller.clock.advance(10.0)
     data = await caller("cyberdog.bms.data")

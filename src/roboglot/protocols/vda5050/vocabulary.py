@@ -11,7 +11,7 @@ from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.motion.emergency_stop import is_stopped
 from roboglot.model.components.sensing.bumper import Bumper
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
@@ -97,10 +97,9 @@ def power(robot: Robot, version: Version) -> dict[str, object]:
 
 def safety(robot: Robot, version: Version) -> dict[str, object]:
     """Return emergency stop and contact."""
-    stopped = EmergencyStop in robot and robot[EmergencyStop].engaged
     name = "activeEmergencyStop" if version.new_words else "eStop"
     touched = Bumper in robot and bool(robot[Bumper].pressed)
-    return {"safetyState": {name: "MANUAL" if stopped else "NONE", "fieldViolation": touched}}
+    return {"safetyState": {name: "MANUAL" if is_stopped(robot) else "NONE", "fieldViolation": touched}}
 
 
 def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, object]:

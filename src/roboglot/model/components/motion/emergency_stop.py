@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 
 from roboglot.model.components.component import Component
+from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.robot import Robot
 
 
 class EmergencyStop(Component):
@@ -36,3 +38,9 @@ class EmergencyStop(Component):
     @abstractmethod
     def release_brake(self, released: bool) -> None:
         """Let the wheels run free, or hold them again."""
+
+
+def is_stopped(robot: Robot) -> bool:
+    """Return whether an emergency stop holds the robot: the button, an application, or limp legs (a dog's own stop)."""
+    engaged = EmergencyStop in robot and robot[EmergencyStop].engaged
+    return engaged or (Legs in robot and robot[Legs].posture is Posture.LIMP)

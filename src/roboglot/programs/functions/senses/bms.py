@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.energy.power import Power, PowerMode
-from roboglot.model.components.motion.emergency_stop import EmergencyStop
+from roboglot.model.components.motion.emergency_stop import is_stopped
 from roboglot.model.components.system.link import require_heard
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState, Supply
@@ -74,4 +74,4 @@ def _measured(battery: BatteryState) -> dict[str, object]:
 def _motors_off(robot: Robot) -> bool:
     """Return whether the motors have no power: the robot sleeps, or its emergency stop is engaged."""
     asleep = Power in robot and robot[Power].mode is not PowerMode.AWAKE
-    return asleep or (EmergencyStop in robot and robot[EmergencyStop].engaged)
+    return asleep or is_stopped(robot)

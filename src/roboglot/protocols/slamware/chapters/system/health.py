@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from roboglot.model.components.motion.emergency_stop import EmergencyStop
-from roboglot.model.components.motion.legs import Legs, Posture
+from roboglot.model.components.motion.emergency_stop import is_stopped
 from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.components.system.health import Fault, FaultLevel, Health
 from roboglot.model.components.system.link import Link, LinkState
@@ -65,7 +64,7 @@ def get_robot_health(context: Context) -> BaseHealthInfo:
         has_error=Level.ERROR in levels,
         has_fatal=Level.FATAL in levels,
         base_error=records,
-        has_system_emergency_stop=_stopped(robot),
+        has_system_emergency_stop=is_stopped(robot),
         has_lidar_disconnected=Lidar not in robot or _has(robot, "lidar lost"),
         has_sdp_disconnected=Link in robot and robot[Link].state is not LinkState.UP,  # its driver's link is down
         has_depth_camera_disconnected=_has(robot, "depth camera lost"),
@@ -75,7 +74,7 @@ def get_robot_health(context: Context) -> BaseHealthInfo:
 def _records(robot: Robot) -> list[BaseError]:
     """Return faults not dismissed. Limp legs are an emergency stop that the model has no fault for."""
     records = [record_of(fault) for fault in (robot[Health].faults if Health in robot else ())]
-    if _stopped(robot) and not _has(robot, STOP):
+    if is_stopped(robot) and not _has(robot, STOP):
         records.append(health_record(*NUMBERS[STOP], "emergency stop: the legs are limp"))
     return records
 
@@ -83,12 +82,6 @@ def _records(robot: Robot) -> list[BaseError]:
 def _has(robot: Robot, name: str) -> bool:
     """Return whether a fault is present, dismissed or not."""
     return Health in robot and robot[Health].has(name)
-
-
-def _stopped(robot: Robot) -> bool:
-    """Return whether an emergency stop holds the robot: the button, an application, or another door (limp legs)."""
-    engaged = EmergencyStop in robot and robot[EmergencyStop].engaged
-    return engaged or (Legs in robot and robot[Legs].posture is Posture.LIMP)
 
 
 @TABLE.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)

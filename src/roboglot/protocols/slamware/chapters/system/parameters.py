@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
-from roboglot.model.components.motion.emergency_stop import EmergencyStop
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.components.motion.emergency_stop import EmergencyStop, is_stopped
+from roboglot.model.errors import InvalidGoal, Refused
+from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE, Text
@@ -39,10 +40,18 @@ def set_system_parameter(context: Context, body: Parameter) -> bool:
         case "base.emergency_stop" if _switch(body.value):
             context.robot[EmergencyStop].engage()
         case "base.emergency_stop":
-            context.robot[EmergencyStop].release()
+            _release(context.robot)
         case "base.brake_release":
             context.robot[EmergencyStop].release_brake(_switch(body.value))
     return True
+
+
+def _release(robot: Robot) -> None:
+    """End the emergency stop. Raises Refused if only limp legs hold the robot, which standing up ends."""
+    stop = robot[EmergencyStop]
+    if is_stopped(robot) and not stop.engaged:
+        raise Refused("the robot is limp after an emergency stop: it has to stand up first")
+    stop.release()
 
 
 def _number(value: str | float) -> float:
