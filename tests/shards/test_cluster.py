@@ -6,13 +6,16 @@ import asyncio
 import errno
 import os
 import signal
+import subprocess
+import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from functools import partialmethod
 from pathlib import Path
+from subprocess import PIPE
 from types import SimpleNamespace
 
 import msgspec
@@ -25,18 +28,20 @@ os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 import ray
 from ray.cluster_utils import Cluster
+from ray.exceptions import NodeDiedError, WorkerCrashedError
 
 from roboglot.shards import cluster as cluster_module
 from roboglot.shards.actor import Condition
 from roboglot.shards.cluster import ClusterFleet, _answer, join, joined, own_token, refuse_unfenced
 from roboglot.shards.messages import Beat, Ready
 from roboglot.shards.plan import plan_fleet
+from roboglot.shards.ray_processes import RayProcesses
 from roboglot.shards.states import State
 from roboglot.storage.opening import open_registry
 from roboglot.storage.robot_registry import Claim, RobotRegistry
 from roboglot.testing.addresses import free_addresses
 from roboglot.testing.campaign import cluster as campaigns
-from roboglot.testing.campaign.trials import Trial
+from roboglot.testing.campaign.trials import Outcome, Result, Trial
 
 STORE = 80 << 20
 PATIENCE = 300.0  # s
@@ -178,9 +183,6 @@ class FakeRay(SimpleNamespace):
     def __init__(self, *names: str) -> None:
         super().__init__(names=list(names), util=SimpleNamespace(list_named_actors=lambda: list(self.names)))
         self.failure: Exception | None = None
-        self.dead: list[tuple[str, object]] = []
-        node = SimpleNamespace(dead_processes=lambda: self.dead)
-        self._private = SimpleNamespace(worker=SimpleNamespace(_global_node=node))
 
     def remote(self, _: type) -> FakeRay:
         return self
@@ -228,24 +230,52 @@ async def test_shards_of_an_earlier_plan_end(tmp_path: Path, monkeypatch: pytest
     assert len(await up(2, "127.16.6.1", tmp_path / "of another fleet")) == 5
 
 
+@contextmanager
+def child(name: str) -> Iterator[subprocess.Popen[str]]:
+    """A process of this name, as one that Ray has started from this program."""
+    work = f"open('/proc/self/comm', 'w').write({name!r}); print(flush=True); input()"
+    with subprocess.Popen([sys.executable, "-Sc", work], stdin=PIPE, stdout=PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "\n"
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
 @pytest.mark.parametrize("part", ["raylet", "gcs_server"])
 async def test_a_lost_ray_ends_the_fleet(part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ray itself would report that its only node is gone after a minute, and never start another."""
-    fake = FakeRay()
-    fake.dead = [("log_monitor", None)]
-    monkeypatch.setattr(cluster_module, "ray", fake)
+    monkeypatch.setattr(cluster_module, "ray", FakeRay())
     monkeypatch.setattr(cluster_module, "PERIOD", 0.001)
-    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
-    await fleet.start()
-    assert not fleet.ended.done()
-    fake.dead.append((part, None))
-    with pytest.raises(OSError, match=f"^{part}, a process of Ray, has ended, and Ray with it; start again$"):
-        await asyncio.wait_for(fleet.ended, PATIENCE)
-    await fleet.close()
+    with child("log_monitor") as beside, child(part) as process:
+        fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+        await fleet.start()
+        beside.kill()
+        beside.wait()
+        assert not fleet.ended.done()
+        process.kill()
+        with pytest.raises(OSError, match=f"^{part}, a process of Ray, has ended, and Ray with it; start again$"):
+            await asyncio.wait_for(fleet.ended, PATIENCE)
+        await fleet.close()
 
 
 def test_ray_that_was_never_started_has_lost_nothing() -> None:
-    assert cluster_module.why_lost() == ""
+    assert RayProcesses().why_lost() == ""
+
+
+@pytest.mark.parametrize("kind", ["joins", "works", "ends"])
+def test_rays_reports_leave_the_output_alone(
+    kind: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Ray prints errors of its processes, with a dump of their state, on standard output."""
+    report = {kind: lambda **_: print("(raylet) [state-dump]")}
+    monkeypatch.setattr(ray, "init", report.get("joins", lambda **_: None))
+    monkeypatch.setattr(ray, "shutdown", report.get("ends", lambda: None))
+    with joined("local"):
+        report.get("works", lambda: None)()
+    print("ready")
+    assert capsys.readouterr() == ("ready\n", "(raylet) [state-dump]\n")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -296,12 +326,80 @@ async def test_a_failed_look_is_not_the_last(
     assert fake.names == []
 
 
-def test_a_lost_ray_ends_a_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
-    task = SimpleNamespace(options=lambda **_: SimpleNamespace(remote=lambda *_, **__: object()))
-    fake = SimpleNamespace(remote=lambda _: task, cluster_resources=lambda: {"CPU": 1}, put=lambda _: None)
-    monkeypatch.setattr(campaigns, "ray", fake)
+class Tasks:
+    """Stand-in for Ray: tasks of a campaign, which end with one of ``ends`` after the other."""
+
+    exceptions = ray.exceptions
+
+    def __init__(self, ends: Iterable[Exception | Result]) -> None:
+        self.begun = 0
+        self._ends = iter(ends)
+
+    def remote(self, _: object) -> SimpleNamespace:
+        return SimpleNamespace(options=lambda **_: SimpleNamespace(remote=self._begin))
+
+    def _begin(self, *_: object, **__: object) -> object:
+        self.begun += 1
+        return object()
+
+    def cluster_resources(self) -> dict[str, float]:
+        return {"CPU": 1.0}
+
+    def put(self, files: object) -> object:
+        return files
+
+    def wait(self, waiting: list[object], **_: object) -> tuple[list[object], list[object]]:
+        return waiting, []
+
+    def get(self, _: object) -> tuple[bytes, dict[str, bytes]]:
+        end = next(self._ends)
+        if isinstance(end, Exception):
+            raise end
+        return msgspec.json.encode(end), {}
+
+
+def played(tasks: Tasks, seeds: int, monkeypatch: pytest.MonkeyPatch) -> list[Result]:
+    """Play a trial with each of ``seeds`` seeds by these tasks; return the results."""
+    results = list[Result]()
+    monkeypatch.setattr(campaigns, "ray", tasks)
     monkeypatch.setattr(campaigns, "joined", lambda _: nullcontext())
-    monkeypatch.setattr(campaigns, "why_lost", lambda: "raylet has ended")
-    trials = iter([Trial("/", "a.yaml", "a", 1, "f")])
-    with pytest.raises(OSError, match=r"^raylet has ended$"):
-        campaigns.play_on("local", trials, [], 1, 60.0, lambda _: None, lambda *_: None)
+    trials = (Trial("/", "a.yaml", "a", seed, "f") for seed in range(seeds))
+    campaigns.play_on("local", trials, [], 1, 60.0, lambda _: None, lambda _, result: results.append(result))
+    return results
+
+
+@pytest.mark.parametrize(
+    ("ends", "outcome", "attempts"),
+    [
+        ([Result(Outcome.PASSED)], Outcome.PASSED, 1),
+        ([WorkerCrashedError(), Result(Outcome.FAILED, "no")], Outcome.FAILED, 2),
+        ([WorkerCrashedError(), Result(Outcome.PASSED, attempts=2)], Outcome.PASSED, 3),
+        ([WorkerCrashedError(), NodeDiedError("gone"), WorkerCrashedError()], Outcome.CRASHED, 3),
+    ],
+)
+def test_attempts_count_tasks_whose_process_died(
+    ends: list[Exception | Result], outcome: Outcome, attempts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (result,) = played(Tasks(ends), 1, monkeypatch)
+    assert (result.outcome, result.attempts) == (outcome, attempts)
+
+
+def test_a_task_that_fails_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk of its node, say."""
+    tasks = Tasks([ray.exceptions.RayTaskError("_play", "OSError: No space left on device", OSError())])
+    (result,) = played(tasks, 1, monkeypatch)
+    assert (result.outcome, result.attempts, tasks.begun) == (Outcome.CRASHED, 1, 1)
+
+
+def test_a_lost_ray_ends_a_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
+    with child("raylet") as process:
+
+        def ends() -> Iterator[Result]:
+            process.kill()
+            process.wait()
+            yield Result(Outcome.PASSED)
+
+        tasks = Tasks(ends())
+        with pytest.raises(OSError, match=r"^raylet, a process of Ray, has ended, and Ray with it; start again$"):
+            played(tasks, 2, monkeypatch)
+        assert tasks.begun == 1

@@ -106,7 +106,7 @@ def _play(left: list[Trial], table: Table, player: Player) -> bool:
     from roboglot.testing.campaign.trials import Outcome
 
     kept: Counter[str] = Counter()
-    number = 0
+    number, output = 0, sys.stdout  # a cluster has it print to standard error
 
     def leave(trial: Trial) -> Path | None:
         return table.path.parent / "failures" / f"seed-{trial.seed}" if kept[trial.scenario] < KEPT_MAX else None
@@ -117,7 +117,11 @@ def _play(left: list[Trial], table: Table, player: Player) -> bool:
         table.add(trial, result)
         if result.outcome is not Outcome.PASSED:
             kept[trial.scenario] += 1
-            print(f"{result.outcome:7} {visible(trial.label)} seed {trial.seed}: {visible(result.why)}", flush=True)
+            print(
+                f"{result.outcome:7} {visible(trial.label)} seed {trial.seed}: {visible(result.why)}",
+                file=output,
+                flush=True,
+            )
         if sys.stderr.isatty():
             print(f"\r{number} of {len(left)}", end="", file=sys.stderr, flush=True)
 

@@ -89,7 +89,7 @@ def up(
             if memory_max and on:
                 raise ValueError("--memory-max is for shards without --on: Ray places and limits its own")
             where = _Where(on, detached, memory_max << 20, nursery)
-            say = partial(print, flush=True)
+            say = partial(print, file=sys.stdout, flush=True)  # also where a cluster has it print to standard error
             with _joined(plan, on):
                 asyncio.run(serve(lambda: _fleet_host(plan, folder, where), folder, say, began, lasting=detached))
         except Interrupted as early:

@@ -1,4 +1,4 @@
-"""Settings of the process, made before the event loop starts, and its guaranteed end."""
+"""Settings of the process, made before the event loop starts, its guaranteed end, and the end of others."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import ctypes
 import os
 import sys
 import threading
+from pathlib import Path
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # from malloc.h
 SWITCH_SECONDS = 0.001  # s for which other threads (database, pictures) may block the main thread
@@ -28,6 +29,14 @@ def end_in_any_case() -> None:
     timer = threading.Timer(LAST_SECONDS, _cut_short)
     timer.daemon = True
     timer.start()
+
+
+def has_ended(pid: int) -> bool:
+    """Return True for a process that has ended, also if its parent does not know yet; and for 0."""
+    try:
+        return not pid or Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return True
 
 
 def _cut_short() -> None:

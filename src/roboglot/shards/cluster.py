@@ -11,10 +11,11 @@ import logging
 import os
 import signal
 import sqlite3
+import sys
 import warnings
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Protocol
 
@@ -26,6 +27,7 @@ from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.actor import Condition, ShardActor
 from roboglot.shards.messages import Beat
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
+from roboglot.shards.ray_processes import RayProcesses
 from roboglot.shards.states import LOG_FILE, Shard, Shards, State, rotate
 from roboglot.storage.dead_programs import DeadProgramWatch
 from roboglot.storage.opening import open_registry
@@ -50,7 +52,6 @@ with explaining("--on", "fleet"):
 
 log = logging.getLogger(__name__)
 LOCAL = "local"
-PARTS = "raylet", "gcs_server"  # processes that Ray does not start again
 NAMESPACE = "roboglot"
 CLIENT_PORT = 10001  # default port of ray://HOST
 STORE_BYTES = 80 << 20  # of a cluster that we start: actors share no objects
@@ -91,13 +92,17 @@ def join(where: str) -> None:
 
 @contextmanager
 def joined(where: str) -> Iterator[None]:
-    """Context in which this program is part of a cluster; one that it started ends with the context."""
-    join(where)
-    try:
-        yield
-    finally:
-        with _undisturbed():
-            ray.shutdown()
+    """Context in which this program is part of a cluster; one that it started ends with the context.
+
+    Meanwhile Ray prints its reports, such as dumps of its state, on standard error: the output is the caller's.
+    """
+    with redirect_stdout(sys.stderr):
+        join(where)
+        try:
+            yield
+        finally:
+            with _undisturbed():
+                ray.shutdown()
 
 
 @contextmanager
@@ -109,14 +114,6 @@ def _undisturbed() -> Iterator[None]:
     finally:
         for number, handler in before:
             signal.signal(number, handler)
-
-
-def why_lost() -> str:
-    """Return why the Ray that this program started no longer works; "" if it works, or was started elsewhere."""
-    node = ray._private.worker._global_node  # only Ray's own health checks are public, which take a minute
-    ended = node.dead_processes() if node is not None else []
-    lost = [kind for kind, _ in ended if kind in PARTS]
-    return f"{lost[0]}, a process of Ray, has ended, and Ray with it; start again" if lost else ""
 
 
 class Reference(Protocol):
@@ -149,6 +146,7 @@ class ClusterFleet:
         self._lock = lock_folder(folder)
         self.shards = Shards(plan, folder)
         self._mark = holder_of(folder)[:8]  # a folder of this name may be there on other machines
+        self._ray = RayProcesses()
         self._actors: dict[str, Actor] = {}
         self._nodes: dict[str, str] = {}
         self._runs: dict[str, int] = {}
@@ -276,7 +274,7 @@ class ClusterFleet:
     async def _run(self) -> None:
         seldom = LogLimiter(log)
         while True:
-            if self._local and (why := why_lost()) and not self.ended.done():
+            if (why := self._ray.why_lost()) and not self.ended.done():
                 self.ended.set_exception(OSError(why))
             ends = await asyncio.gather(*map(self._look, self.shards.values()), return_exceptions=True)
             for shard, error in zip(self.shards.values(), ends, strict=True):

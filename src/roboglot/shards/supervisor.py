@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from roboglot.hosting.folder_lock import lock_folder
+from roboglot.hosting.process import has_ended
 from roboglot.shards.messages import MESSAGE_MAX, Beat, News, Ready, Refusal
 from roboglot.shards.nursery_client import NotWarm, NurseryClient, StartedNursery
 from roboglot.shards.plan import FleetPlan, save
@@ -228,7 +229,7 @@ class Supervisor:
             log.error("shard %s has been silent for %.0f s while %s: killed", shard.plan.name, silent, shard.state)
             shard.cause = shard.cause or f"it hung while {shard.state}"
             shard.killed_at = self._loop.time()
-        elif self._loop.time() - shard.killed_at > REPORT_MAX and _has_ended(shard.pid):
+        elif self._loop.time() - shard.killed_at > REPORT_MAX and has_ended(shard.pid):
             log.error("the nursery hangs: it does not report the end of shard %s: killed", shard.plan.name)
             self._nursery.kill()
             return
@@ -254,14 +255,6 @@ class Supervisor:
             self._loop.remove_reader(shard.link)
             shard.link.close()
             shard.link = None
-
-
-def _has_ended(pid: int) -> bool:
-    """Return True for the process of a shard that has ended, also if its parent does not know yet; and for 0."""
-    try:
-        return not pid or Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
-    except FileNotFoundError:
-        return True
 
 
 def _open_log(path: Path) -> int:

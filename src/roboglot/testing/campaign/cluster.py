@@ -1,4 +1,4 @@
-"""Plays trials on a Ray cluster: each is a task, placed on a free processor and tried again if its node dies.
+"""Plays trials on a Ray cluster: each is a task, placed on a free processor and repeated if its node dies.
 
 A task plays its trial like a campaign on one machine: in its own process, forked from a preloaded one. The folders
 of the scenarios travel with the tasks, for nodes without those files; the artifacts of failed trials come back.
@@ -10,12 +10,13 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import msgspec
 
 from roboglot.extras import explaining
-from roboglot.shards.cluster import LOCAL, joined, why_lost
+from roboglot.shards.cluster import LOCAL, joined
+from roboglot.shards.ray_processes import RayProcesses
 from roboglot.testing.campaign.local import ATTEMPTS_MAX, Ended, Leave, interruptions, play_here
 from roboglot.testing.campaign.trials import Outcome, Result, Trial
 from roboglot.testing.scenarios.files import shown_below
@@ -39,6 +40,14 @@ class Reference(Protocol):
         """Return a future of the task's result."""
 
 
+class _Begun(NamedTuple):
+    """A trial that is a task now; ``place``: folder for its artifacts."""
+
+    trial: Trial
+    attempt: int
+    place: Path | None
+
+
 def play_on(
     where: str,
     trials: Iterator[Trial],
@@ -53,38 +62,51 @@ def play_on(
     ``paths``: files and folders that they need. Raises KeyboardInterrupt at SIGINT, once running trials are
     cancelled; OSError if there is no such cluster, or not any more; TooLarge.
     """
-    waiting: dict[Reference, tuple[Trial, Path | None]] = {}
+    waiting: dict[Reference, _Begun] = {}
+    files: object = None
     with joined(where), interruptions() as interrupted:
-        task = ray.remote(_play).options(num_cpus=1, max_retries=ATTEMPTS_MAX - 1)
-        workers = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
-        files: object = None
+        task = ray.remote(_play).options(num_cpus=1, max_retries=0)  # tried again here, where attempts are counted
+        processes, workers = RayProcesses(), workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
+
+        def begin(trial: Trial, attempt: int) -> None:
+            nonlocal files
+            files = files or ray.put({} if where == LOCAL else pack(Path(trial.folder), paths))
+            place = leave(trial)
+            waiting[task.remote(trial, files, seconds_max, keep=place is not None)] = _Begun(trial, attempt, place)
+
         while not interrupted.poll():
+            if why := processes.why_lost():
+                raise OSError(why)
             while len(waiting) < workers and (trial := next(trials, None)) is not None:
-                files = files or ray.put({} if where == LOCAL else pack(Path(trial.folder), paths))
-                place = leave(trial)
-                waiting[task.remote(trial, files, seconds_max, keep=place is not None)] = trial, place
+                begin(trial, 1)
             if not waiting:
                 return
-            if where == LOCAL and (why := why_lost()):
-                raise OSError(why)
             done, _ = ray.wait(list(waiting), timeout=LOOK_SECONDS)
             for reference in done:
-                trial, place = waiting.pop(reference)
-                ended(trial, _result(reference, place))
+                begun = waiting.pop(reference)
+                if (result := _result(reference, begun)) is None:
+                    begin(begun.trial, begun.attempt + 1)
+                else:
+                    ended(begun.trial, result)
         for reference in waiting:
             ray.cancel(reference)
         ray.wait(list(waiting), num_returns=len(waiting), timeout=10.0)
     raise KeyboardInterrupt
 
 
-def _result(reference: Reference, place: Path | None) -> Result:
+def _result(reference: Reference, begun: _Begun) -> Result | None:
+    """Return the result of a task that is done; None if its process or node died, and it shall be tried again."""
     try:
         encoded, left = ray.get(reference)
     except ray.exceptions.RayError as error:
-        return Result(Outcome.CRASHED, str(error).strip().splitlines()[0], attempts=ATTEMPTS_MAX)
-    if place is not None:
-        unpack(left, place)
-    return msgspec.json.decode(encoded, type=Result)
+        own = isinstance(error, ray.exceptions.RayTaskError)  # raised by the task, and would be again
+        if not own and begun.attempt < ATTEMPTS_MAX:
+            return None
+        return Result(Outcome.CRASHED, str(error).strip().splitlines()[0], attempts=begun.attempt)
+    if begun.place is not None:
+        unpack(left, begun.place)
+    result = msgspec.json.decode(encoded, type=Result)
+    return msgspec.structs.replace(result, attempts=begun.attempt - 1 + result.attempts)
 
 
 def _play(trial: Trial, files: Files, seconds_max: float, *, keep: bool) -> tuple[bytes, Files]:
