@@ -152,6 +152,12 @@ def test_a_plan_is_kept(tmp_path: Path) -> None:
         load(tmp_path)
 
 
+def test_plan_below_a_file_is_refused_in_words(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(ValueError, match=f"^{tmp_path}/file/fleet.json: Not a directory$"):
+        load(tmp_path / "file")
+
+
 @pytest.mark.slow  # a start of its own: the nursery of test_fleet_served warms itself, too
 def test_warming_starts_no_thread() -> None:
     """Raises Threaded otherwise; a fork would copy the thread's locks without the thread."""

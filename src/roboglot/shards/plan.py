@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 
 from roboglot.config import RECORDING, ROBOTS_MAX, Config, ConsoleConfig, is_loopback, refuse_unguarded
+from roboglot.hosting.error_text import in_words
 from roboglot.shards.shard import settings_of
 from roboglot.spelling import instead, meant
 from roboglot.validation import host_and_port
@@ -184,7 +185,9 @@ def load(folder: Path) -> FleetPlan | None:
         return msgspec.json.decode((folder / PLAN).read_bytes(), type=FleetPlan)
     except FileNotFoundError:
         return None
-    except (OSError, msgspec.DecodeError) as error:
+    except OSError as error:
+        raise ValueError(in_words(error)) from None
+    except msgspec.DecodeError as error:
         raise ValueError(f"{folder / PLAN} cannot be read: {error}") from None
 
 
