@@ -33,7 +33,7 @@ from ray.exceptions import NodeDiedError, WorkerCrashedError
 from roboglot.shards import cluster as cluster_module
 from roboglot.shards.actor import Condition
 from roboglot.shards.cluster import ClusterFleet, _answer, join, joined, own_token, refuse_unfenced
-from roboglot.shards.messages import Beat, Ready
+from roboglot.shards.messages import Beat, Ready, Refusal
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.ray_processes import RayProcesses
 from roboglot.shards.states import State
@@ -183,6 +183,8 @@ class FakeRay(SimpleNamespace):
     def __init__(self, *names: str) -> None:
         super().__init__(names=list(names), util=SimpleNamespace(list_named_actors=lambda: list(self.names)))
         self.failure: Exception | None = None
+        self.refusal: Refusal | None = None
+        self.looks = 0
 
     def remote(self, _: type) -> FakeRay:
         return self
@@ -204,7 +206,9 @@ class FakeRay(SimpleNamespace):
         if self.failure is not None:
             raise self.failure
         answer = Future[bytes]()
-        condition = Condition(1, "node", 7, True, True, Ready({}), Beat(1.0, 1, 1.0), None, ["a line"])
+        self.looks += 1
+        ready, beat = (Ready({}), Beat(1.0, 1, 1.0)) if self.refusal is None else (None, None)
+        condition = Condition(1, "node", 7, ready is not None, ready is not None, ready, beat, self.refusal, ["a line"])
         answer.set_result(msgspec.json.encode(condition))
         return SimpleNamespace(future=lambda: answer)
 
@@ -228,6 +232,24 @@ async def test_shards_of_an_earlier_plan_end(tmp_path: Path, monkeypatch: pytest
     assert {*new} < {*old}, "those with the same settings"
     assert {*await up(2, "127.16.6.1")} & {*new} == {"another:w1:1234"}
     assert len(await up(2, "127.16.6.1", tmp_path / "of another fleet")) == 5
+
+
+async def test_a_shard_that_cannot_start_is_logged_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Its actor goes on, since another try would fail, too, and reports the same at each look."""
+    fake = FakeRay()
+    fake.refusal = Refusal("no body is named 'herms'", lasting=True)
+    monkeypatch.setattr(cluster_module, "ray", fake)
+    monkeypatch.setattr(cluster_module, "PERIOD", 0.001)
+    fleet = ClusterFleet(plan_fleet(1, 1, {}, tmp_path), tmp_path, "local")
+    await fleet.start()
+    async with asyncio.timeout(PATIENCE):
+        while fake.looks < 10:  # noqa: ASYNC110 - there is no event of it
+            await asyncio.sleep(0.001)
+    assert (fleet.shards["w1"].state, fleet.shards["w1"].hopeless) == (State.FAILED, True)
+    assert caplog.messages == ["shard w1 did not start: no body is named 'herms'"]
+    await fleet.close()
 
 
 @contextmanager

@@ -316,9 +316,10 @@ class ClusterFleet:
         shard.ready = (condition.ready or shard.ready) if condition.up else None
         shard.beat = condition.beat or shard.beat
         if condition.refusal is not None:
+            if condition.refusal.reason != shard.reason:  # it reports the same each time, until it is started again
+                log.warning("shard %s did not start: %s", name, condition.refusal.reason)
             shard.reason, shard.hopeless = condition.refusal.reason, condition.refusal.lasting
             state = State.FAILED if condition.refusal.lasting else State.STARTING  # Ray retries it
-            log.warning("shard %s did not start: %s", name, shard.reason)
         else:
             state = State.READY if shard.ready and condition.serving else State.STARTING
         if state is State.READY:
