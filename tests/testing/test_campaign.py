@@ -103,6 +103,7 @@ def test_trials_are_all_tabulated_and_never_played_twice(folder: Path) -> None:
     assert found.keys() == {"st\\xe9ys.yaml", "dies.yaml"}, said
     assert found["st\\xe9ys.yaml"]["outcome"] == "passed", said
     assert (found["dies.yaml"]["outcome"], found["dies.yaml"]["attempts"]) == ("crashed", "3")
+    assert float(found["dies.yaml"]["seconds"]) > 0.0
     assert "1 of 2 trials passed" in (folder / "campaign/report.md").read_text()
     (folder / "scenarios/dies.yaml").unlink()
     again = begin(folder, "--seeds", "2")

@@ -131,7 +131,8 @@ def _result(one: _Running, seconds_max: float) -> Result:
         return msgspec.json.decode(one.ear.recv_bytes(), type=Result)
     except (EOFError, OSError):
         one.process.join(5.0)
-        return Result(Outcome.CRASHED, f"its process ended with {one.process.exitcode}")
+        seconds = seconds_max - (one.deadline - _now())
+        return Result(Outcome.CRASHED, f"its process ended with {one.process.exitcode}", seconds)
     finally:
         one.ear.close()
         _end(one)
