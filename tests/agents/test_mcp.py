@@ -11,8 +11,11 @@ from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
 from roboglot.agents.console import ConsoleClient
+from roboglot.cli.mcp import command
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
 from roboglot.testing.addresses import free_port
@@ -118,6 +121,22 @@ async def test_the_command_serves_streamable_http(shown: Shown) -> None:
     finally:
         process.terminate()
         await process.communicate()
+
+
+def test_a_taken_port_is_named_in_words() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(SystemExit, match=f"^roboglot mcp: port {port} of 127.0.0.1: Address already in use; "):
+            command(http=port)
+
+
+@pytest.mark.parametrize("port", ["-1", "65536"])
+def test_a_port_that_cannot_be_is_refused(port: str) -> None:
+    app = typer.Typer()
+    app.command()(command)
+    done = CliRunner().invoke(app, ["--http", port])
+    assert done.exit_code == 2
+    assert "is not in the range" in done.output
 
 
 async def test_go_to_drives_there_and_reports_the_end(shown: Shown) -> None:

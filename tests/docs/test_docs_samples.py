@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 import yaml
 
-from roboglot.config import Config, load_config
+from roboglot.config import Config, config_of, load_config
 from roboglot.console.studio import lessons
-from roboglot.protocols import sections
+from roboglot.protocols import DOORS, sections
 from roboglot.recording.comparing.masks import read_mask
 from roboglot.simulation.world.world_files import load_world
 from roboglot.testing.scenarios import files as scenarios
@@ -88,6 +88,16 @@ def check_json(code: str, file: Path) -> None:
 def test_sample_is_accepted(language: str, code: str, tmp_path: Path) -> None:
     check = {"toml": check_toml, "yaml": check_yaml, "json": check_json}[language]
     check(code, tmp_path / f"sample.{language}")
+
+
+def test_an_agents_port_is_no_doors() -> None:
+    """`up` has its doors open on the same address."""
+    config = config_of({}, doors=sections(), origin="")
+    taken = {port for door in DOORS for port in door.numbers(config).values()}
+    assert 8765 in taken
+    ports = re.findall(r"--http (\d+)", (ROOT / "docs/operation/mcp.md").read_text("utf-8"))
+    assert ports
+    assert not {*map(int, ports)} & taken
 
 
 def test_a_wrong_sample_is_found(tmp_path: Path) -> None:
