@@ -6,10 +6,12 @@ import sqlite3
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 from unittest.mock import Mock
 
 import click
 import pytest
+import typer
 from rich.text import Text
 from typer.main import get_command
 
@@ -115,3 +117,29 @@ def test_collector_scans_nothing_loaded_before_a_command(monkeypatch: pytest.Mon
     before, loaded_before = gc.get_freeze_count(), [[number] for number in range(10_000)]
     cli.main()
     assert kept[0] - before > len(loaded_before) / 2
+
+
+def numbers(kind: str) -> dict[str, Any]:
+    """Return the options of all commands that are numbers of a kind, by the command's and their own name."""
+    found = {}
+    for name in COMMANDS:
+        command: Any = get_command(loaded(name))
+        for each in getattr(command, "commands", {name: command}).values():
+            found |= {f"{name} {part.name}": part for part in each.params if part.type.name.startswith(kind)}
+    return found
+
+
+def test_floating_options_refuse_what_is_no_number() -> None:
+    """Speeds are left out: a clock refuses a wrong one itself."""
+    floats = {name: option for name, option in numbers("float").items() if not name.endswith(" speed")}
+    assert len(floats) > 2
+    for option in floats.values():
+        for word in ("nan", "inf", "-1e300", "1e300"):
+            with pytest.raises(typer.BadParameter):
+                option.process_value(Mock(resilient_parsing=False), word)
+
+
+def test_options_for_ports_are_ports() -> None:
+    ports = {name: option for name, option in numbers("int").items() if name.endswith((" http", "port"))}
+    assert len(ports) > 2
+    assert {name: option.type.max for name, option in ports.items()} == dict.fromkeys(ports, 65535)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboglot.cli.numbers import finite
 from roboglot.extras import MissingExtra
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import visible
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     Player = Callable[[Iterator[Trial], Leave, Ended], None]
 
 SEEDS_MAX = 100_000
+FIRST_SEED_MAX = 1 << 53  # the table for data tools has 64 bits
+LONGEST_MAX = 7 * 86_400.0  # s
 OUT = Path("campaign")
 SHOWN_MAX = 10  # scenarios that are listed
 KEPT_MAX = 10  # trials per scenario that keep recordings, maps and messages
@@ -32,7 +35,7 @@ KEPT_MAX = 10  # trials per scenario that keep recordings, maps and messages
 def command(
     paths: Annotated[list[Path], typer.Argument(help="Scenario files, or folders with them.")],
     seeds: Annotated[int, typer.Option(min=1, max=SEEDS_MAX, help="Number of seeds for each scenario.")] = 100,
-    first_seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 1,
+    first_seed: Annotated[int, typer.Option(min=0, max=FIRST_SEED_MAX, help="First seed.")] = 1,
     workers: Annotated[
         int, typer.Option(min=0, max=10_000, help="Number of trials at once; 0: one for each processor.")
     ] = 0,
@@ -45,7 +48,10 @@ def command(
     out: Annotated[
         Path, typer.Option(help="Folder for table and report; trials already in it are not repeated.")
     ] = OUT,
-    longest: Annotated[float, typer.Option(min=1, help="Longest duration of a trial, in real seconds.")] = 600.0,
+    longest: Annotated[
+        float,
+        typer.Option(min=1, max=LONGEST_MAX, callback=finite, help="Longest duration of a trial, in real seconds."),
+    ] = 600.0,
 ) -> None:
     """Play scenarios with many seeds. Ctrl-C (or SIGTERM) keeps the results so far; the same command resumes."""
     from roboglot.testing.campaign.table import OtherCampaign, Table

@@ -48,7 +48,7 @@ def command(
         typer.Option(envvar="ROBOGLOT_DATA", help="Data folder whose certificates are used without --certs."),
     ] = None,
     plaintext: Annotated[bool, typer.Option("--plaintext", help="Connect without TLS.")] = False,
-    app_port: Annotated[int, typer.Option(help="The port that the robot calls.")] = 8981,
+    app_port: Annotated[int, typer.Option(min=0, max=65535, help="The port that the robot calls.")] = 8981,
 ) -> None:
     """Talk to a CyberDog 2 as its phone app does.
 

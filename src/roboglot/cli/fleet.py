@@ -17,6 +17,7 @@ import msgspec
 import typer
 
 from roboglot.cli.control import running
+from roboglot.cli.numbers import finite
 from roboglot.cli.suggestions import Group
 from roboglot.config import default_data_folder
 from roboglot.extras import MissingExtra, refuse_without
@@ -122,7 +123,10 @@ def top(
         typer.Option("--once/--watch", help="Print one table and exit (the default in a pipe), or go on."),
     ] = None,
     period: Annotated[
-        float, typer.Option(min=0.5, help="Seconds between tables, over which processor time is measured.")
+        float,
+        typer.Option(
+            min=0.5, max=3600, callback=finite, help="Seconds between tables, over which processor time is measured."
+        ),
     ] = 2.0,
 ) -> None:
     """Show each shard's processor time and memory, and whether it keeps up with robot time."""

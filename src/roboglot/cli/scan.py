@@ -16,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from roboglot.cli.numbers import finite
 from roboglot.clients.errors import ClientError
 from roboglot.clients.robomaster.datagrams import discover
 from roboglot.clients.slamware import SlamwareClient
@@ -43,7 +44,9 @@ def command(
         list[str] | None,
         typer.Argument(help="Addresses or networks (10.0.0.0/24) to probe; RoboMasters broadcast by themselves."),
     ] = None,
-    seconds: Annotated[float, typer.Option(help="Seconds to listen for RoboMasters.")] = 3.0,
+    seconds: Annotated[
+        float, typer.Option(min=0, max=600, callback=finite, help="Seconds to listen for RoboMasters.")
+    ] = 3.0,
 ) -> None:
     """Find robots on the network."""
     try:

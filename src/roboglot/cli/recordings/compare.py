@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboglot.cli.numbers import finite
 from roboglot.hosting.error_text import in_words
 
 if TYPE_CHECKING:
@@ -44,7 +45,9 @@ def command(
     strict: Annotated[bool, typer.Option("--strict", help="Compare every number and time exactly.")] = False,
     html: Annotated[Path | None, typer.Option(help="Write an HTML report to this file.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write a JUnit report to this file.")] = None,
-    at_least: Annotated[float, typer.Option(min=0, max=100, help="Exit with 1 if fewer percent agree.")] = 100.0,
+    at_least: Annotated[
+        float, typer.Option(min=0, max=100, callback=finite, help="Exit with 1 if fewer percent agree.")
+    ] = 100.0,
 ) -> None:
     """Compare two recordings or robots. A robot gets the recording's requests, or all that change nothing."""
     from roboglot.clients.errors import ClientError

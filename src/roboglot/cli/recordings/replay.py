@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from roboglot.cli.numbers import finite
 from roboglot.hosting.error_text import in_words
 
 
@@ -26,7 +27,9 @@ def command(
     mask: Annotated[Path | None, typer.Option(help="TOML file with rules for the comparison of fields.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write an HTML report to this file.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write a JUnit report to this file.")] = None,
-    at_least: Annotated[float, typer.Option(min=0, max=100, help="Exit with 1 if fewer percent agree.")] = 100.0,
+    at_least: Annotated[
+        float, typer.Option(min=0, max=100, callback=finite, help="Exit with 1 if fewer percent agree.")
+    ] = 100.0,
 ) -> None:
     """Send the requests of a recording to a robot, in order and on time. It obeys them: mind where it stands."""
     from roboglot.clients.errors import ClientError
