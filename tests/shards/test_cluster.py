@@ -6,16 +6,12 @@ import asyncio
 import errno
 import os
 import signal
-import subprocess
-import sys
 import time
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager, nullcontext
 from functools import partialmethod
 from pathlib import Path
-from subprocess import PIPE
 from types import SimpleNamespace
 
 import msgspec
@@ -28,7 +24,6 @@ os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 import ray
 from ray.cluster_utils import Cluster
-from ray.exceptions import NodeDiedError, WorkerCrashedError
 
 from roboglot.shards import cluster as cluster_module
 from roboglot.shards.actor import Condition
@@ -40,8 +35,7 @@ from roboglot.shards.states import State
 from roboglot.storage.opening import open_registry
 from roboglot.storage.robot_registry import Claim, RobotRegistry
 from roboglot.testing.addresses import free_addresses
-from roboglot.testing.campaign import cluster as campaigns
-from roboglot.testing.campaign.trials import Outcome, Result, Trial
+from tests.shards.children import child
 
 STORE = 80 << 20
 PATIENCE = 300.0  # s
@@ -252,19 +246,6 @@ async def test_a_shard_that_cannot_start_is_logged_once(
     await fleet.close()
 
 
-@contextmanager
-def child(name: str) -> Iterator[subprocess.Popen[str]]:
-    """A process of this name, as one that Ray has started from this program."""
-    work = f"open('/proc/self/comm', 'w').write({name!r}); print(flush=True); input()"
-    with subprocess.Popen([sys.executable, "-Sc", work], stdin=PIPE, stdout=PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "\n"
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
 @pytest.mark.parametrize("part", ["raylet", "gcs_server"])
 async def test_a_lost_ray_ends_the_fleet(part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ray itself would report that its only node is gone after a minute, and never start another."""
@@ -346,82 +327,3 @@ async def test_a_failed_look_is_not_the_last(
     assert len([record for record in caplog.records if record.levelname == "WARNING"]) == 1
     await fleet.close()
     assert fake.names == []
-
-
-class Tasks:
-    """Stand-in for Ray: tasks of a campaign, which end with one of ``ends`` after the other."""
-
-    exceptions = ray.exceptions
-
-    def __init__(self, ends: Iterable[Exception | Result]) -> None:
-        self.begun = 0
-        self._ends = iter(ends)
-
-    def remote(self, _: object) -> SimpleNamespace:
-        return SimpleNamespace(options=lambda **_: SimpleNamespace(remote=self._begin))
-
-    def _begin(self, *_: object, **__: object) -> object:
-        self.begun += 1
-        return object()
-
-    def cluster_resources(self) -> dict[str, float]:
-        return {"CPU": 1.0}
-
-    def put(self, files: object) -> object:
-        return files
-
-    def wait(self, waiting: list[object], **_: object) -> tuple[list[object], list[object]]:
-        return waiting, []
-
-    def get(self, _: object) -> tuple[bytes, dict[str, bytes]]:
-        end = next(self._ends)
-        if isinstance(end, Exception):
-            raise end
-        return msgspec.json.encode(end), {}
-
-
-def played(tasks: Tasks, seeds: int, monkeypatch: pytest.MonkeyPatch) -> list[Result]:
-    """Play a trial with each of ``seeds`` seeds by these tasks; return the results."""
-    results = list[Result]()
-    monkeypatch.setattr(campaigns, "ray", tasks)
-    monkeypatch.setattr(campaigns, "joined", lambda _: nullcontext())
-    trials = (Trial("/", "a.yaml", "a", seed, "f") for seed in range(seeds))
-    campaigns.play_on("local", trials, [], 1, 60.0, lambda _: None, lambda _, result: results.append(result))
-    return results
-
-
-@pytest.mark.parametrize(
-    ("ends", "outcome", "attempts"),
-    [
-        ([Result(Outcome.PASSED)], Outcome.PASSED, 1),
-        ([WorkerCrashedError(), Result(Outcome.FAILED, "no")], Outcome.FAILED, 2),
-        ([WorkerCrashedError(), Result(Outcome.PASSED, attempts=2)], Outcome.PASSED, 3),
-        ([WorkerCrashedError(), NodeDiedError("gone"), WorkerCrashedError()], Outcome.CRASHED, 3),
-    ],
-)
-def test_attempts_count_tasks_whose_process_died(
-    ends: list[Exception | Result], outcome: Outcome, attempts: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (result,) = played(Tasks(ends), 1, monkeypatch)
-    assert (result.outcome, result.attempts) == (outcome, attempts)
-
-
-def test_a_task_that_fails_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A full disk of its node, say."""
-    tasks = Tasks([ray.exceptions.RayTaskError("_play", "OSError: No space left on device", OSError())])
-    (result,) = played(tasks, 1, monkeypatch)
-    assert (result.outcome, result.attempts, tasks.begun) == (Outcome.CRASHED, 1, 1)
-
-
-def test_a_lost_ray_ends_a_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
-    with child("raylet") as process:
-
-        def ends() -> Iterator[Result]:
-            process.kill()
-            process.wait()
-            yield Result(Outcome.PASSED)
-
-        tasks = Tasks(ends())
-        with pytest.raises(OSError, match=r"^raylet, a process of Ray, has ended, and Ray with it; start again$"):
-            played(tasks, 2, monkeypatch)
-        assert tasks.begun == 1
