@@ -1,11 +1,13 @@
-"""The nursery's handle when the nursery ends, and when no other can be started at first; without processes."""
+"""The nursery's handle when the nursery ends, when no other can be started at first, and while one loads."""
 
 from __future__ import annotations
 
 import asyncio
+import os
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import cast
 
@@ -13,7 +15,7 @@ import pytest
 
 from roboglot.shards import nursery_client as module
 from roboglot.shards.messages import Warm, encode, pair
-from roboglot.shards.nursery_client import NurseryClient, StartedNursery
+from roboglot.shards.nursery_client import NurseryClient, StartedNursery, launch
 
 
 class FakeProcess:
@@ -85,3 +87,38 @@ async def test_failed_fork_leaves_no_socket(tmp_path: Path, monkeypatch: pytest.
     with ours, pytest.raises(OSError, match="Broken pipe"):
         client.fork(3, tmp_path, sys.stderr.fileno())
     assert [end.fileno() for end in made] == [-1, -1]
+
+
+def test_ctrl_c_does_not_reach_a_loading_nursery() -> None:
+    """Python would print where it was while it starts."""
+    nursery = launch()
+    try:
+        assert os.getpgid(nursery.process.pid) == nursery.process.pid
+    finally:
+        nursery.abandon()
+
+
+@pytest.fixture
+def loading() -> Iterator[subprocess.Popen[bytes]]:
+    """A nursery that loads for ever, by a process of its own."""
+    work = "import subprocess, sys; subprocess.run([sys.executable, '-c', 'print(1, flush=True); input()'])"
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", work], stdin=pipe, stdout=pipe, process_group=0) as process:
+        yield process
+        process.kill()
+
+
+async def test_closing_does_not_wait_for_loading(
+    loading: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may compile kernels for a minute."""
+    ours, theirs = pair()
+    monkeypatch.setattr(module, "launch", lambda: StartedNursery(loading, ours))
+    client = NurseryClient(lambda *_: None, lambda *_: None)
+    client.open()
+    assert loading.stdout is not None
+    assert loading.stdout.readline() == b"1\n"
+    with theirs:
+        async with asyncio.timeout(20.0):
+            await client.close()
+    assert loading.stdout.read() == b"", "read to its end: nobody can write any more"

@@ -131,7 +131,6 @@ def _take_descriptors(link: int, output: int) -> None:
 def main(descriptor: int) -> None:
     """Warm up, report that, and serve on an inherited socket."""
     began = time.monotonic()
-    os.setpgid(0, 0)  # the terminal's Ctrl-C is for the supervisor, which stops us in order
     for kind in (signal.SIGINT, signal.SIGTERM):  # sent to a whole group or unit: the supervisor's socket ends us
         signal.signal(kind, signal.SIG_IGN)
     control = socket.socket(fileno=descriptor)

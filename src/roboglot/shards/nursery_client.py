@@ -38,7 +38,13 @@ class StartedNursery(NamedTuple):
     def abandon(self) -> None:
         """End it, if it has not ended."""
         with self.process, self.control:
-            self.process.kill()
+            _kill(self.process)
+
+
+def _kill(nursery: subprocess.Popen[bytes]) -> None:
+    """Kill a nursery, if it has not ended, and what compiles its kernels."""
+    if nursery.poll() is None:
+        os.killpg(nursery.pid, signal.SIGKILL)
 
 
 def launch() -> StartedNursery:
@@ -50,6 +56,7 @@ def launch() -> StartedNursery:
             pass_fds=[theirs.fileno()],
             env=os.environ | ENVIRONMENT,
             stdin=subprocess.DEVNULL,
+            process_group=0,  # the terminal's Ctrl-C is for the supervisor, which stops it in order
         )
     return StartedNursery(process, ours)
 
@@ -134,6 +141,8 @@ class NurseryClient:
         self._closed = True
         if self._again is not None:
             self._again.cancel()
+        if self._process is not None and not self._warm.done():
+            _kill(self._process)  # it has no shards yet, and would load to the end
         self._let_go()
         if self._process is not None:
             await asyncio.to_thread(self._process.wait)
