@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.kernels.depth import FLOOR, LOW, NEAR, STEEP, remember_low, seen_since, sort_out, sort_out_all
+from roboglot.kernels.depth import FLOOR, LOW, NEAR, STEEP, remember_low, seen_since, segment_ground, segment_ground_all
 
 HEIGHT, INNER = 0.6, 0.2
 
@@ -26,7 +26,7 @@ def test_each_place_is_sorted_by_its_lower_neighbour(seed: int, rows: int, colum
     away, up = np.hypot(places[..., 0], places[..., 1]), places[..., 2]
     rise, farther = up[:-1] - up[1:], away[:-1] - away[1:]
     stands = (rise > STEEP * np.maximum(farther, 0.0)) & (up[:-1] > LOW) & (up[:-1] < HEIGHT) & (away[:-1] < NEAR)
-    obstacles, floor = sort_out(rays, ways, eye, HEIGHT, INNER)
+    obstacles, floor = segment_ground(rays, ways, eye, HEIGHT, INNER)
     assert obstacles == pytest.approx(places[:-1][stands & (away[:-1] > INNER)])
     lies = (np.abs(up) < FLOOR) & (away < NEAR)
     assert floor[:, :2] == pytest.approx(places[lies][:, :2])
@@ -83,8 +83,8 @@ def test_sensors_are_sorted_one_after_the_other() -> None:
     random = np.random.default_rng(5)
     rays, ways = random.uniform(-1, 1, (3, 8, 8, 3)), random.uniform(0.1, 3.0, (3, 8, 8))
     eyes = random.uniform(0.0, 0.4, (3, 3))
-    each = [sort_out(*of, HEIGHT, INNER) for of in zip(rays, ways, eyes, strict=True)]
-    for part, found in enumerate(sort_out_all(rays, ways, eyes, HEIGHT, INNER)):
+    each = [segment_ground(*of, HEIGHT, INNER) for of in zip(rays, ways, eyes, strict=True)]
+    for part, found in enumerate(segment_ground_all(rays, ways, eyes, HEIGHT, INNER)):
         assert len(found)
         assert (found == np.concatenate([one[part] for one in each])).all()
 

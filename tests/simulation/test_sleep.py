@@ -14,7 +14,7 @@ from .conftest import Simulate, Simulation
 def asleep(simulation: Simulation) -> bool:
     """True if the last tick did without a step."""
     physics = simulation.world._physics
-    return physics._meetings.off and physics._sleep.lasts
+    return physics._contact_switch.off and physics._sleep.lasts
 
 
 async def resting(simulation: Simulation) -> bool:

@@ -25,7 +25,7 @@ NAVIGATION = (
     "placing",
     "search",
 )
-WORLD = ("sweep", "rays", "together", "gliding", "ticks")
+WORLD = ("sweep", "rays", "batch", "free_motion", "ticks")
 CAMERA = ("raster", "raster_shading", "posing")
 MODULES = (*NAVIGATION, *CAMERA[:2], *WORLD, *CAMERA[2:])
 

@@ -1,4 +1,4 @@
-"""Obstacles and floor in a grid of depths."""
+"""Ground segmentation of depth images: obstacles and floor, and a memory of low obstacles in a grid."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ NEAR = 2.5  # m from base_link within which depth is accurate enough
 
 
 @kernel("Tuple((float64[:,::1], float64[:,::1]))(float64[:,:,::1], float64[:,::1], float64[::1], float64, float64)")
-def sort_out(
-    rays: FloatArray, ways: FloatArray, eye: FloatArray, height: float, inner: float
+def segment_ground(
+    rays: FloatArray, depths: FloatArray, eye: FloatArray, height: float, inner: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return obstacles, with their heights, and floor, with the heights seen above it: (n, 3) in base_link, m.
+    """Return the points of obstacles (x, y, height) and of the floor (x, y, lowest height seen above it): (n, 3), m.
 
-    ``rays`` (rows from above, columns, 3) go out from ``eye`` (3), both in base_link; ``ways`` (rows, columns) is how
-    many of its lengths each goes, not finite where nothing was seen. What is above ``height`` (m) is passed below; what
-    stands within ``inner`` (m) is left out.
+    All in base_link. ``rays`` (rows from the top, columns, 3) begin at ``eye`` (3); ``depths`` (rows, columns) of the
+    pixels, in lengths of their rays, not finite where nothing was seen. Left out are obstacles above ``height`` (m),
+    under which the robot fits, and those within ``inner`` (m).
     """
-    rows, columns = ways.shape
+    rows, columns = depths.shape
     away, up = np.empty((rows, columns)), np.empty((rows, columns))
     obstacles, floor = np.empty((rows * columns, 3)), np.empty((rows * columns, 3))
     standing = lying = 0
     for row in range(rows):
         for column in range(columns):
-            way = ways[row, column] if np.isfinite(ways[row, column]) else np.nan
+            way = depths[row, column] if np.isfinite(depths[row, column]) else np.nan
             x, y = rays[row, column, 0] * way + eye[0], rays[row, column, 1] * way + eye[1]
             up[row, column], away[row, column] = rays[row, column, 2] * way + eye[2], np.sqrt(x * x + y * y)
             if abs(up[row, column]) < FLOOR and away[row, column] < NEAR:
@@ -44,8 +44,8 @@ def sort_out(
             here, below = up[row, column], up[row + 1, column]  # each pixel against the one below it
             farther = max(away[row, column] - away[row + 1, column], 0.0)
             if here - below > STEEP * farther and LOW < here < height and inner < away[row, column] < NEAR:
-                obstacles[standing, 0] = rays[row, column, 0] * ways[row, column] + eye[0]
-                obstacles[standing, 1] = rays[row, column, 1] * ways[row, column] + eye[1]
+                obstacles[standing, 0] = rays[row, column, 0] * depths[row, column] + eye[0]
+                obstacles[standing, 1] = rays[row, column, 1] * depths[row, column] + eye[1]
                 obstacles[standing, 2] = here
                 standing += 1
     return obstacles[:standing].copy(), floor[:lying].copy()
@@ -54,14 +54,14 @@ def sort_out(
 @kernel(
     "Tuple((float64[:,::1], float64[:,::1]))(float64[:,:,:,::1], float64[:,:,::1], float64[:,::1], float64, float64)"
 )
-def sort_out_all(
-    rays: FloatArray, ways: FloatArray, eyes: FloatArray, height: float, inner: float
+def segment_ground_all(
+    rays: FloatArray, depths: FloatArray, eyes: FloatArray, height: float, inner: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return obstacles and floor of several equal sensors, one after the other; see ``sort_out``."""
-    obstacles, floor = np.empty((ways.size, 3)), np.empty((ways.size, 3))
+    """Return obstacles and floor of several sensors of one kind; see ``segment_ground``."""
+    obstacles, floor = np.empty((depths.size, 3)), np.empty((depths.size, 3))
     standing = lying = 0
-    for k in range(len(ways)):
-        some, flat = sort_out(rays[k], ways[k], eyes[k], height, inner)
+    for k in range(len(depths)):
+        some, flat = segment_ground(rays[k], depths[k], eyes[k], height, inner)
         for i in range(len(some)):
             for part in range(3):
                 obstacles[standing, part] = some[i, part]

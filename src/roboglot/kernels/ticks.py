@@ -9,37 +9,47 @@ from __future__ import annotations
 import math
 
 from roboglot.kernels.arrays import FloatArray, IntArray
+from roboglot.kernels.batch import (
+    all_below,
+    dead_reckon,
+    drive_wheels,
+    find_docks,
+    measure_imus,
+    read_motion,
+    turn_gimbals,
+    watch_motion,
+)
 from roboglot.kernels.compiled import kernel
-from roboglot.kernels.gliding import clear, glide
+from roboglot.kernels.free_motion import advance, clear
 from roboglot.kernels.layouts import (
     ACTS,
-    ALONE,
     COUNT_UNIT,
     DONE,
     GIMBALS,
     HULL_FLOOR,
-    HULL_LEANS,
+    HULL_TILTED,
     HULL_X,
     HULL_Y,
     MEASURED,
     NEAR,
     PEOPLE,
     PERSON_BODY,
+    PERSON_DISTANCE,
     PERSON_FLOOR,
     PERSON_GOAL_X,
     PERSON_GOAL_Y,
     PERSON_IDLE,
     PERSON_SPEED,
     PERSON_STATE,
-    PERSON_STRIDES,
     PERSON_WAITED,
-    PERSON_WAY,
+    PERSON_WALKED,
     PERSON_X,
     PERSON_Y,
     PERSON_YAW,
     RECKONED,
     SEEN,
     SETTLING,
+    SINGLE,
     STAGE_UNIT,
     STANDS,
     STUCK,
@@ -49,7 +59,6 @@ from roboglot.kernels.layouts import (
     WAITS,
     WATCHED,
 )
-from roboglot.kernels.together import dead_reckon, drive, follow, measure, see, still, touch, watch
 
 LINES, TABLES = "UniTuple(float64[::1], {})", "UniTuple(float64[:,::1], {})"
 
@@ -94,12 +103,12 @@ def walk(
         if state == ACTS:
             return i
         if state == STANDS:
-            person[PERSON_STRIDES] = 0.0
+            person[PERSON_WALKED] = 0.0
             continue
         if state == WAITS:
             if person[PERSON_IDLE] == 0.0:
                 return i
-            person[PERSON_STRIDES] = 0.0
+            person[PERSON_WALKED] = 0.0
             person[PERSON_IDLE] -= 1.0
             continue
         x, y, step = person[PERSON_X], person[PERSON_Y], person[PERSON_SPEED] * seconds
@@ -110,8 +119,8 @@ def walk(
         c, s = math.cos(heading), math.sin(heading)
         if _hindered(person, hulls, c, s, manners, side, near):
             return i
-        person[PERSON_STRIDES], person[PERSON_WAITED] = 1.0, 0.0
-        person[PERSON_WAY] += step
+        person[PERSON_WALKED], person[PERSON_WAITED] = 1.0, 0.0
+        person[PERSON_DISTANCE] += step
         person[PERSON_X], person[PERSON_Y] = x + step * c, y + step * s
         body = int(person[PERSON_BODY])
         places[body, 0], places[body, 1] = person[PERSON_X], person[PERSON_Y]
@@ -125,7 +134,7 @@ def walk(
 def _all_follow(hulls: FloatArray, gimbals: FloatArray) -> bool:
     """Return whether every gimbal only turns after its body."""
     for i in range(hulls.shape[0]):
-        if gimbals[i, USE] == ALONE or (gimbals[i, USE] != 0.0 and hulls[i, HULL_LEANS] != 0.0):
+        if gimbals[i, USE] == SINGLE or (gimbals[i, USE] != 0.0 and hulls[i, HULL_TILTED] != 0.0):
             return False
     return True
 
@@ -163,14 +172,14 @@ def _move(
     positions, velocities, controls, accelerations, forces, masses, slack, stiffness, damping = state
     uprights, ranges, gains, biases, limits = servos
     _, _, step, rests, storey, lifted, _, _, weight = settings[:9]
-    if not free or not glide(
+    if not free or not advance(
         hulls, uprights, positions, velocities, controls, accelerations, forces, masses, ranges, slack,
         stiffness, damping, gains, biases, limits, weight, step, steps,
     ):  # fmt: skip
         return STUCK * STAGE_UNIT
-    if still(velocities, rests):
+    if all_below(velocities, rests):
         return SETTLING * STAGE_UNIT
-    count = see(hulls, positions, velocities, storey, lifted, others)
+    count = read_motion(hulls, positions, velocities, storey, lifted, others)
     return int(count * COUNT_UNIT + SEEN * STAGE_UNIT if count else DONE)
 
 
@@ -179,11 +188,14 @@ def _sense(robots: tuple[FloatArray, ...], settings: tuple[float, ...], stamp: f
     """Sense with all parts that are sensed together; return the same."""
     hulls, _, contacts, docks, imus, shakes, statuses, odometries, slips = robots
     seconds, gravity, blow_gravity, speed_square, turn_rate = settings[1], *settings[14:]
-    stage, count = TOUCHED, touch(hulls, contacts, docks, others)
+    stage, count = TOUCHED, find_docks(hulls, contacts, docks, others)
     if not count:
-        stage, count = MEASURED, measure(hulls, imus, shakes, stamp, seconds, gravity, others)
+        stage, count = MEASURED, measure_imus(hulls, imus, shakes, stamp, seconds, gravity, others)
     if not count:
-        stage, count = WATCHED, watch(hulls, imus, statuses, stamp, blow_gravity, speed_square, turn_rate, others)
+        stage, count = (
+            WATCHED,
+            watch_motion(hulls, imus, statuses, stamp, blow_gravity, speed_square, turn_rate, others),
+        )
     if not count:
         stage, count = RECKONED, dead_reckon(hulls, imus, odometries, slips, stamp, seconds, others)
     return int(count * COUNT_UNIT + stage * STAGE_UNIT if count else DONE)
@@ -214,7 +226,7 @@ def run(
 ) -> int:
     """Do up to ``ticks`` ticks after tick ``number``; return the ticks, the stage that is left, and who is.
 
-    ``followed``: the gimbals have had their turn in the first; ``known``: see ``gliding.clear``, for the first;
+    ``followed``: the gimbals have had their turn in the first; ``known``: see ``free_motion.clear``, for the first;
     ``asleep``: while ``now`` is as ``kept``, nothing moves; ``free``: no contact is left from the last step. The
     answer: ticks * TICKS_UNIT + count * COUNT_UNIT + stage * STAGE_UNIT + moved. A tick that is not ended counts, but
     one that waits for its gimbals.
@@ -229,9 +241,9 @@ def run(
             if not _all_follow(hulls, gimbals):
                 left = 0 if tick > 0 else GIMBALS * STAGE_UNIT
                 break
-            follow(hulls, gimbals, pull, settled, seconds, others)
+            turn_gimbals(hulls, gimbals, pull, settled, seconds, others)
         tick += 1
-        drive(hulls, state[2], seconds)
+        drive_wheels(hulls, state[2], seconds)
         person = walk(people, hulls, places, turns, 0, seconds, manners, side, near)
         if person < people.shape[0]:
             left = person * COUNT_UNIT + PEOPLE * STAGE_UNIT

@@ -48,7 +48,7 @@ async def test_kernel_ramps_as_the_base_does(simulate):
         sim = simulate(start=Pose(5, 5))
         base, seen = sim.robot[Base], []
         if compiled:
-            sim.world._physics.rows.load_kernels()
+            sim.world._physics.tables.load_kernels()
         sim.world.start()
         for twist in (Twist(0.3, 0.2, 1.0), Twist(-0.2, 0.1, -2.0), Twist(0.1), STILL):
             base.set_velocity(twist)

@@ -26,7 +26,7 @@ TOUCHED = np.linspace(-0.6, 0.6, 9)  # rad around a zone's middle
 BESIDE = 0.03  # m beyond the hull that what touches it may be
 
 Points = NDArray[np.float64]
-Sorting = Callable[[Points, Points, Points, float, float], tuple[Points, Points]]
+Segmentation = Callable[[Points, Points, Points, float, float], tuple[Points, Points]]
 NONE: Points = np.empty((0, 3))
 
 
@@ -42,15 +42,15 @@ class LowSight:
     """Detection of low obstacles from the sensors' present readings."""
 
     def __init__(self, robot: Robot) -> None:
-        from roboglot.kernels.depth import sort_out, sort_out_all  # it needs Numba
+        from roboglot.kernels.depth import segment_ground, segment_ground_all  # it needs Numba
 
         self._robot, self._height, self._radius = robot, robot.description.height, robot.description.radius
         self._last: tuple[DepthImage, tuple[Points, Points]] | None = None  # the newest image and its points
         self._eyes: list[object] = []  # rays and places of the zones' sensors at the last look
         self._rays, self._places = np.empty((0, 0, 0, 3)), np.empty((0, 3))  # … the same as arrays
         self._distances = np.empty((0, 0, 0))  # room for theirs
-        self._sort_out: Sorting = sort_out
-        self._sort_out_all: Sorting = sort_out_all
+        self._segment: Segmentation = segment_ground
+        self._segment_all: Segmentation = segment_ground_all
 
     def look(self) -> LowView:
         """Return the obstacles and floor of all sensors; empty without sensors."""
@@ -79,7 +79,7 @@ class LowSight:
         """Return obstacle and floor points of a depth image; a slow camera's image is sorted only once."""
         if self._last is None or self._last[0] is not image:
             mount, depths = np.array((image.mount.x, image.mount.y, image.mount.z)), image.depths.astype(np.float64)
-            self._last = image, self._sort_out(image.rays, depths, mount, self._height, self._radius)
+            self._last = image, self._segment(image.rays, depths, mount, self._height, self._radius)
         return self._last[1]
 
     def _in_zones(self, readings: list[ZoneDistances]) -> tuple[Points, Points]:
@@ -93,7 +93,7 @@ class LowSight:
             self._distances = np.empty(self._rays.shape[:3])
         for row, reading in zip(self._distances, readings, strict=True):
             row[:] = reading.distances
-        return self._sort_out_all(self._rays, self._distances, self._places, self._height, self._radius)
+        return self._segment_all(self._rays, self._distances, self._places, self._height, self._radius)
 
 
 def _joined(parts: list[Points]) -> Points:

@@ -9,8 +9,8 @@ from typing import TypeVar
 
 from roboglot.model.client_context import context_of
 from roboglot.simulation.bodies.part import Fitting, Part, ordered, parts
-from roboglot.simulation.bodies.rows import Control, Sense
 from roboglot.simulation.bodies.schedule import Job, Schedule
+from roboglot.simulation.bodies.tables import Control, Sense
 
 P = TypeVar("P")
 
@@ -40,24 +40,24 @@ class SimulatedRobot:
                 fitting.robot.add(part.interface, component)
             fitted.append((part, component))
         made = {part.name: component for part, component in fitted}
-        alone = (part for part, _ in fitted if part.control and part.control_together is None)
+        alone = (part for part, _ in fitted if part.control and part.control_all is None)
         controlled = ordered(alone, lambda part: part.control_after)
         tick = fitting.tick
         self.controls = Schedule([_job(part, made[part.name], part.control) for part in controlled], tick)
         sensed = [
-            _periodic(part, component, turn) for part, component in fitted if part.sense and part.together is None
+            _periodic(part, component, turn) for part, component in fitted if part.sense and part.sense_all is None
         ]
         self.senses = Schedule(sensed, tick)
-        self._together = {
+        self._batched_senses = {
             part.name: (component, MethodType(part.sense, component))
             for part, component in fitted
-            if part.together is not None and part.sense is not None
+            if part.sense_all is not None and part.sense is not None
         }
         self._ahead = {part.name: component for part, component in fitted if part.ahead is not None}
-        self._control_together = {
+        self._batched_controls = {
             part.name: (component, MethodType(part.control, component))
             for part, component in fitted
-            if part.control_together is not None and part.control is not None
+            if part.control_all is not None and part.control is not None
         }
         self._displaced = [MethodType(part.displaced, component) for part, component in fitted if part.displaced]
         self._detach = [MethodType(part.detach, component) for part, component in fitted if part.detach]
@@ -71,16 +71,16 @@ class SimulatedRobot:
         self._context.run(self.controls.run, tick - (self.before or 0))
 
     def sense(self, tick: int, stamp: float) -> None:
-        """Run the sensing that is due of the parts that are not sensed together, after the physics of a tick."""
+        """Run the sensing that is due, without that of ``sense_all``, after the physics of a tick."""
         self._context.run(self.senses.run_at, tick - (self.before or 0), stamp)
 
-    def together(self, name: str) -> tuple[object, Sense] | None:
+    def batched_sense(self, name: str) -> tuple[object, Sense] | None:
         """Return the part of this name with its sensing, to be sensed for all robots at once; None: there is none."""
-        return self._together.get(name)
+        return self._batched_senses.get(name)
 
-    def control_together(self, name: str) -> tuple[object, Control] | None:
-        """Return the same with its control."""
-        return self._control_together.get(name)
+    def batched_control(self, name: str) -> tuple[object, Control] | None:
+        """Return the part of this name with its control, to be controlled for all robots at once, or None."""
+        return self._batched_controls.get(name)
 
     def ahead(self, name: str) -> object | None:
         """Return the part of this name, if it is computed ahead for all robots."""

@@ -12,28 +12,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.kernels.layouts import (
-    HULL_BEFORE,
-    HULL_BELLY,
-    HULL_COUNTED,
     HULL_DRIVE_X,
     HULL_DRIVE_YAW,
     HULL_FLOOR,
-    HULL_FREE,
+    HULL_FLOOR_CHECK_Z,
     HULL_HELD,
-    HULL_LOOKED_X,
-    HULL_TURNED,
+    HULL_LAST_V,
+    HULL_LOOKUP_RANGE,
+    HULL_LOOKUP_X,
+    HULL_UNDERSIDE,
     HULL_VX,
     HULL_WALLS,
     HULL_X,
+    HULL_YAW,
 )
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Point, Pose, wrap_angle
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull_legs import HullLegs
 from roboglot.simulation.bodies.hull_state import LEVEL, HullState
-from roboglot.simulation.bodies.rows import Seat
 from roboglot.simulation.bodies.schedule import Duty
 from roboglot.simulation.bodies.support import GRAVITY, SETTLED, Nearness, Support
+from roboglot.simulation.bodies.tables import RobotRows
 from roboglot.simulation.building.terrain import Ground
 
 if TYPE_CHECKING:
@@ -93,9 +93,9 @@ class Hull(HullState):
         body: Body,
         elevations: list[float],
         ground: Ground,
-        seat: Seat,
+        robot_rows: RobotRows,
     ) -> None:
-        super().__init__(seat)
+        super().__init__(robot_rows)
         self._model, self._data, self._elevations, self._ground = model, data, elevations, ground
         self.name, self.body = name, body
         self._q, self._v = int(model.joint(f"{name} x").qposadr[0]), int(model.joint(f"{name} x").dofadr[0])
@@ -176,22 +176,22 @@ class Hull(HullState):
         x, y, z, turned = positions[place]
         vx, vy, vz, turn = velocities[way]
         rising = vz
-        row[HULL_X], row[HULL_X + 1], row[HULL_X + 2], row[HULL_TURNED] = x, y, z, turned
-        row[HULL_BEFORE : HULL_BEFORE + 4] = row[HULL_VX : HULL_VX + 4]
+        row[HULL_X], row[HULL_X + 1], row[HULL_X + 2], row[HULL_YAW] = x, y, z, turned
+        row[HULL_LAST_V : HULL_LAST_V + 4] = row[HULL_VX : HULL_VX + 4]
         if self.tilts and not self.overturned:
             q, v = self._q, self._v
             self.tilt = positions[q + 5], positions[q + 4]
             self.tilting = velocities[v + 5], velocities[v + 4]
         self.loose = self.tilts or not -FALLING <= vz <= FALLING or self.standing < 1.0 or self.hand is not None
         if self._torso >= 0:
-            row[HULL_BELLY] = positions[self._torso]
+            row[HULL_UNDERSIDE] = positions[self._torso]
             vz += velocities[self._sinking]
         row[HULL_VX], row[HULL_VX + 1], row[HULL_VX + 2], row[HULL_VX + 3] = vx, vy, vz, turn
-        if not -STOREY <= z - row[HULL_COUNTED] <= STOREY:
-            row[HULL_COUNTED] = z
+        if not -STOREY <= z - row[HULL_FLOOR_CHECK_Z] <= STOREY:
+            row[HULL_FLOOR_CHECK_Z] = z
             self.floor = max((i for i, height in enumerate(self._elevations) if height <= z + 0.5), default=0)
-        away = abs(x - row[HULL_LOOKED_X]) + abs(y - row[HULL_LOOKED_X + 1])
-        if self._looked != self.floor or away > row[HULL_FREE]:
+        away = abs(x - row[HULL_LOOKUP_X]) + abs(y - row[HULL_LOOKUP_X + 1])
+        if self._looked != self.floor or away > row[HULL_LOOKUP_RANGE]:
             self._look_round(x, y)
         support, edge = self.support, self.edges.near
         if support.sprung:
@@ -208,9 +208,9 @@ class Hull(HullState):
         if walls.look(x, y, floor):
             self.support.walls(walls.near)
         self._looked, row = floor, self._row
-        row[HULL_LOOKED_X], row[HULL_LOOKED_X + 1] = x, y
+        row[HULL_LOOKUP_X], row[HULL_LOOKUP_X + 1] = x, y
         row[HULL_FLOOR], row[HULL_WALLS] = floor, walls.away(x, y, floor)
-        row[HULL_FREE] = min(edges.left(x, y, floor), walls.left(x, y, floor))
+        row[HULL_LOOKUP_RANGE] = min(edges.left(x, y, floor), walls.left(x, y, floor))
 
     @property
     def rise(self) -> float:

@@ -6,23 +6,22 @@ import math
 
 from roboglot.kernels.layouts import (
     HULL_A,
-    HULL_ANGULAR,
-    HULL_BEFORE,
-    HULL_BELLY,
+    HULL_ANGULAR_STEP,
     HULL_DRIVE_X,
     HULL_DRIVE_YAW,
-    HULL_GAZE_PITCH,
+    HULL_GIMBAL_PITCH,
     HULL_GOAL_X,
     HULL_HELD,
-    HULL_LEANS,
-    HULL_LINEAR,
+    HULL_LAST_V,
+    HULL_LINEAR_STEP,
     HULL_Q,
     HULL_RADIUS,
-    HULL_SERVO,
-    HULL_SINKING,
-    HULL_SLACK,
+    HULL_TILTED,
     HULL_TORSO,
-    HULL_TURNED,
+    HULL_TORSO_CONTROL,
+    HULL_TORSO_V,
+    HULL_UNDERSIDE,
+    HULL_UNDRIVEN,
     HULL_V,
     HULL_VX,
     HULL_WALLS,
@@ -30,11 +29,12 @@ from roboglot.kernels.layouts import (
     HULL_WIDTH,
     HULL_X,
     HULL_Y,
+    HULL_YAW,
     HULL_Z,
 )
 from roboglot.model.geometry import LEVEL as STRAIGHT
 from roboglot.model.geometry import Orientation, Pose, Twist, wrap_angle
-from roboglot.simulation.bodies.rows import Seat
+from roboglot.simulation.bodies.tables import RobotRows
 
 LEVEL = (0.0, 0.0)
 TABLE = "hull"
@@ -44,9 +44,9 @@ Motion = tuple[float, float, float, float]
 class HullState:
     """Numbers of a hull. Kernels may update them, so the properties read them each time."""
 
-    def __init__(self, seat: Seat) -> None:
-        self.seat = seat
-        self._row = seat.row(TABLE, HULL_WIDTH)
+    def __init__(self, robot_rows: RobotRows) -> None:
+        self.robot_rows = robot_rows
+        self._row = robot_rows.row(TABLE, HULL_WIDTH)
         self._posed: tuple[float, Pose] | None = None  # yaw without wrapping, and the pose made of it
         self._tilt, self._attitude = LEVEL, STRAIGHT
         self._hand: float | None = None
@@ -56,8 +56,8 @@ class HullState:
         """Enter its places in the physics: first position, velocity and control; torso (-1: no legs); sizes, m."""
         row = self._row
         row[HULL_Q], row[HULL_V], row[HULL_A] = first
-        row[HULL_TORSO], row[HULL_SINKING], row[HULL_SERVO] = torso
-        row[HULL_BELLY], row[HULL_RADIUS], row[HULL_WALLS] = belly, radius, -math.inf
+        row[HULL_TORSO], row[HULL_TORSO_V], row[HULL_TORSO_CONTROL] = torso
+        row[HULL_UNDERSIDE], row[HULL_RADIUS], row[HULL_WALLS] = belly, radius, -math.inf
 
     @property
     def x(self) -> float:
@@ -77,18 +77,18 @@ class HullState:
     @property
     def belly(self) -> float:
         """Height of the torso's underside above the floor, m."""
-        return self._row[HULL_BELLY]
+        return self._row[HULL_UNDERSIDE]
 
     @property
     def turned(self) -> float:
         """Yaw without wrapping, rad."""
-        return self._row[HULL_TURNED]
+        return self._row[HULL_YAW]
 
     @property
     def pose(self) -> Pose:
         """Pose of base_link in world (m, rad)."""
         row, posed = self._row, self._posed
-        x, y, turned = row[HULL_X], row[HULL_Y], row[HULL_TURNED]
+        x, y, turned = row[HULL_X], row[HULL_Y], row[HULL_YAW]
         if posed is None or posed[0] != turned or posed[1].x != x or posed[1].y != y:
             self._posed = posed = turned, Pose(x, y, wrap_angle(turned))
         return posed[1]
@@ -102,7 +102,7 @@ class HullState:
     @property
     def before(self) -> Motion:
         """The same one step earlier."""
-        vx, vy, vz, turn = self._row[HULL_BEFORE : HULL_BEFORE + 4]
+        vx, vy, vz, turn = self._row[HULL_LAST_V : HULL_LAST_V + 4]
         return vx, vy, vz, turn
 
     @property
@@ -114,11 +114,11 @@ class HullState:
     @property
     def gaze(self) -> tuple[float, float]:
         """Pitch and yaw of the gimbal, rad; zero without one."""
-        return self._row[HULL_GAZE_PITCH], self._row[HULL_GAZE_PITCH + 1]
+        return self._row[HULL_GIMBAL_PITCH], self._row[HULL_GIMBAL_PITCH + 1]
 
     @gaze.setter
     def gaze(self, gaze: tuple[float, float]) -> None:
-        self._row[HULL_GAZE_PITCH], self._row[HULL_GAZE_PITCH + 1] = gaze
+        self._row[HULL_GIMBAL_PITCH], self._row[HULL_GIMBAL_PITCH + 1] = gaze
 
     @property
     def tilt(self) -> tuple[float, float]:
@@ -141,7 +141,7 @@ class HullState:
         self._note_leaning()
 
     def _note_leaning(self) -> None:
-        self._row[HULL_LEANS] = float(self._tilt is not LEVEL or self._attitude != STRAIGHT)
+        self._row[HULL_TILTED] = float(self._tilt is not LEVEL or self._attitude != STRAIGHT)
 
     @property
     def hand(self) -> float | None:
@@ -170,18 +170,18 @@ class HullState:
         """Drive the wheels at ``twist`` (base_link) from now on, if they are on the ground."""
         row = self._row
         row[HULL_DRIVE_X], row[HULL_DRIVE_X + 1], row[HULL_DRIVE_YAW] = twist.x, twist.y, twist.yaw
-        row[HULL_LINEAR] = 0.0
+        row[HULL_LINEAR_STEP] = 0.0
 
     def approach(self, goal: Twist, linear: float, angular: float) -> None:
         """Let the kernel drive the wheels towards ``goal``, by these steps (m/s, rad/s) a tick, until ``drive``."""
         row = self._row
         row[HULL_GOAL_X], row[HULL_GOAL_X + 1], row[HULL_GOAL_X + 2] = goal.x, goal.y, goal.yaw
-        row[HULL_LINEAR], row[HULL_ANGULAR] = linear, angular
+        row[HULL_LINEAR_STEP], row[HULL_ANGULAR_STEP] = linear, angular
 
     @property
     def approaches(self) -> bool:
         """True while the kernel does so."""
-        return self._row[HULL_LINEAR] > 0.0
+        return self._row[HULL_LINEAR_STEP] > 0.0
 
     @property
     def wheels_velocity(self) -> Twist:
@@ -192,4 +192,4 @@ class HullState:
         """Note the wheels' present velocity (base_link) for sensors; ``slack``: some are dead, or all roll freely."""
         row = self._row
         row[HULL_WHEEL_X], row[HULL_WHEEL_X + 1], row[HULL_WHEEL_X + 2] = twist.x, twist.y, twist.yaw
-        row[HULL_SLACK] = float(slack)
+        row[HULL_UNDRIVEN] = float(slack)

@@ -21,8 +21,8 @@ from roboglot.model.components.component import Component
 from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.bodies.rows import Control, Rows, Sense, SharedControl, SharedSense
 from roboglot.simulation.bodies.schedule import Duty
+from roboglot.simulation.bodies.tables import BatchedControl, BatchedSense, Control, RobotTables, Sense
 from roboglot.values import dataclass
 
 if TYPE_CHECKING:
@@ -71,13 +71,13 @@ class Part(Generic[P]):
     control: called before the physics of every tick with its length (s), after the control of ``control_after``.
     sense: called after the physics with the stamp and the time since the last call (s), every ``every`` ticks (or
         as many as this answers for the part), the first time in tick ``first`` (0: when ``every`` have passed).
-    together: makes of all robots' parts of this kind one function that does for all what ``sense`` does for one, in
-        every tick, before all other parts sense; it gets all rows, and the parts with their own ``sense``. It changes
-        nothing but these parts.
-    control_together: the same for ``control``, before that of all other parts.
-    ahead: makes of all robots' parts of this kind one function that computes in advance, after all that is sensed
-        together in a tick, what each part's own ``sense`` takes up in its turn. It gets the tick's number, and may be
-        left out in ticks in which none of them senses.
+    sense_all: makes of all robots' parts of this kind one function that does for all what ``sense`` does for one, in
+        every tick, before all other parts sense; it gets all tables, and the parts with their own ``sense``. It changes
+        only these parts.
+    control_all: the same for ``control``, before that of all other parts.
+    ahead: makes of all robots' parts of this kind one function that computes in advance, after all ``sense_all`` of a
+        tick, what each part's own ``sense`` then uses. It gets the tick's number, and may be left out in ticks in which
+        none of them senses.
     duty: answers whether the part has something to do; without one ``control`` and ``sense`` are always called.
     displaced: called when the robot was lifted and put elsewhere. ``detach``: called when the world ends.
     """
@@ -91,9 +91,9 @@ class Part(Generic[P]):
     control: Callable[[P, float], None] | None = None
     control_after: tuple[str, ...] = ()
     sense: Callable[[P, float, float], None] | None = None
-    together: Callable[[Rows, Sequence[tuple[P, Sense]]], SharedSense] | None = None
-    control_together: Callable[[Rows, Sequence[tuple[P, Control]]], SharedControl] | None = None
-    ahead: Callable[[Rows, Sequence[P]], Callable[[int], None]] | None = None
+    sense_all: Callable[[RobotTables, Sequence[tuple[P, Sense]]], BatchedSense] | None = None
+    control_all: Callable[[RobotTables, Sequence[tuple[P, Control]]], BatchedControl] | None = None
+    ahead: Callable[[RobotTables, Sequence[P]], Callable[[int], None]] | None = None
     every: int | Callable[[P], int] = 1
     first: int = 1
     duty: Callable[[P], Duty] | None = None

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from roboglot.kernels.layouts import HULL_REST, HULL_SPRUNG
+from roboglot.kernels.layouts import HULL_ON_SPRING, HULL_REST_Z
 from roboglot.simulation.bodies.schedule import Duty
 
 if TYPE_CHECKING:
@@ -92,12 +92,12 @@ class Support:
     @property
     def sprung(self) -> bool:
         """True while the spring supports it."""
-        return self._row[HULL_SPRUNG] != 0.0
+        return self._row[HULL_ON_SPRING] != 0.0
 
     def rest(self, z: float) -> None:
         """Support the robot by a spring, at its present height ``z`` (m)."""
         model = self._model
-        self._row[HULL_SPRUNG], self._row[HULL_REST] = 1.0, z
+        self._row[HULL_ON_SPRING], self._row[HULL_REST_Z] = 1.0, z
         model.jnt_stiffness[self._joint] = self._mass * SPRING
         model.dof_damping[self._v] = self._mass * DAMPER
         model.qpos_spring[self._q] = z + GRAVITY / SPRING
@@ -105,12 +105,12 @@ class Support:
 
     def lifted(self, z: float) -> bool:
         """True if the robot was moved off the floor or into it."""
-        return not -LIFTED <= z - self._row[HULL_REST] <= LIFTED
+        return not -LIFTED <= z - self._row[HULL_REST_Z] <= LIFTED
 
     def release(self) -> None:
         """Support the robot by contacts again: the floor may end, or a hand lifts it."""
         if self.sprung:
-            self._row[HULL_SPRUNG] = 0.0
+            self._row[HULL_ON_SPRING] = 0.0
             self._model.jnt_stiffness[self._joint] = self._model.dof_damping[self._v] = 0.0
             self._meet()
 

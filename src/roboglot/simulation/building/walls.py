@@ -36,7 +36,7 @@ class Walls:
     def load_kernel(self) -> None:
         """Use the compiled kernel from now on, which gives the same numbers."""
         with loading():
-            from roboglot.kernels.gliding import room
+            from roboglot.kernels.free_motion import room
 
         self._room = room
 

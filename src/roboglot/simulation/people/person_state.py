@@ -5,14 +5,14 @@ from __future__ import annotations
 from roboglot.kernels.layouts import (
     ACTS,
     PERSON_BODY,
+    PERSON_DISTANCE,
     PERSON_FLOOR,
     PERSON_GOAL_X,
     PERSON_IDLE,
     PERSON_SPEED,
     PERSON_STATE,
-    PERSON_STRIDES,
     PERSON_WAITED,
-    PERSON_WAY,
+    PERSON_WALKED,
     PERSON_WIDTH,
     PERSON_X,
     STANDS,
@@ -66,20 +66,20 @@ class PersonState:
     @property
     def walking(self) -> bool:
         """True if they walked in the last tick."""
-        return self._row[PERSON_STRIDES] != 0.0
+        return self._row[PERSON_WALKED] != 0.0
 
     @walking.setter
     def walking(self, walking: bool) -> None:
-        self._row[PERSON_STRIDES] = float(walking)
+        self._row[PERSON_WALKED] = float(walking)
 
     @property
     def way(self) -> float:
         """Metres walked so far."""
-        return self._row[PERSON_WAY]
+        return self._row[PERSON_DISTANCE]
 
     @way.setter
     def way(self, way: float) -> None:
-        self._row[PERSON_WAY] = way
+        self._row[PERSON_DISTANCE] = way
 
     @property
     def waited(self) -> float:

@@ -11,27 +11,29 @@ import mujoco
 
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.building.props import Props
-from roboglot.simulation.world.gliding import Gliding
+from roboglot.simulation.world.free_motion import FreeMotion
 
 STILL = 1e-6  # m/s
 NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 
 
-class Meetings:
-    """Search for contacts. ``off``: whether it is switched off; without the kernels it never is."""
+class ContactSwitch:
+    """Switch of the search. ``off``: whether it is off; without the kernels it never is."""
 
-    def __init__(self, model: mujoco.MjModel, hulls: Sequence[Hull], props: Props, gliding: Gliding | None) -> None:
-        """``gliding``: None if this world cannot be without contacts at all."""
-        self._model, self._hulls, self._props, self._gliding = model, hulls, props, gliding
+    def __init__(
+        self, model: mujoco.MjModel, hulls: Sequence[Hull], props: Props, free_motion: FreeMotion | None
+    ) -> None:
+        """``free_motion``: None if this world cannot be without contacts at all."""
+        self._model, self._hulls, self._props, self._free_motion = model, hulls, props, free_motion
         self._revision = -1
         self.off = False
 
     def look(self, seconds: float, *, touched: bool = False) -> None:
         """Decide whether the physics searches for contacts in a step of ``seconds``; ``touched``: some hull is."""
-        if self._gliding is None or not self._gliding.loaded:
+        if self._free_motion is None or not self._free_motion.loaded:
             return
         if not touched:
-            touched = not self._gliding.clear(seconds, known=(known := self.known))
+            touched = not self._free_motion.clear(seconds, known=(known := self.known))
             if not known:
                 self.note()
         self.switch(off=not touched)

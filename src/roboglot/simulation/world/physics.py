@@ -18,9 +18,9 @@ from roboglot.model.geometry import Pose
 from roboglot.simulation.bodies.body import Body
 from roboglot.simulation.bodies.hull import STOREY, Hull, HullContact
 from roboglot.simulation.bodies.hull_state import TABLE
-from roboglot.simulation.bodies.rows import Rows, Seat
 from roboglot.simulation.bodies.sleep import RESTS, Sleep, tiny
 from roboglot.simulation.bodies.support import LIFTED
+from roboglot.simulation.bodies.tables import RobotRows, RobotTables
 from roboglot.simulation.building.blueprint import Solid, SolidKind
 from roboglot.simulation.building.props import AWAY, OBSTACLES_MAX, Props
 from roboglot.simulation.building.terrain import Ground
@@ -28,9 +28,9 @@ from roboglot.simulation.building.things import Things
 from roboglot.simulation.building.walls import Walls
 from roboglot.simulation.people.people import keyed
 from roboglot.simulation.people.person_state import STRIDE_MAX
-from roboglot.simulation.world.contact_switch import Meetings, rests
+from roboglot.simulation.world.contact_switch import ContactSwitch, rests
 from roboglot.simulation.world.description import WorldDescription
-from roboglot.simulation.world.gliding import Gliding
+from roboglot.simulation.world.free_motion import FreeMotion
 from roboglot.simulation.world.rays import Rays
 from roboglot.simulation.world.scene import TIMESTEP, VISITORS_MAX, build, visitors
 
@@ -57,14 +57,14 @@ class Physics:
         model = self._model
         self._elevations = [world.elevation(number) for number in range(len(world.floors))]
         self.ground = Ground(world)
-        self.rows = Rows(len(bodies))
-        seats = (Seat(self.rows, index) for index in range(len(bodies)))
+        self.tables = RobotTables(len(bodies))
+        each_robots_rows = (RobotRows(self.tables, index) for index in range(len(bodies)))
         self.hulls = {
-            name: Hull(model, self._data, name, body, self._elevations, self.ground, next(seats))
+            name: Hull(model, self._data, name, body, self._elevations, self.ground, next(each_robots_rows))
             for name, body in bodies.items()
         }
         self._all_hulls = list(self.hulls.values())
-        self._hull_rows = self.rows.table(TABLE, HULL_WIDTH)
+        self._hull_rows = self.tables.table(TABLE, HULL_WIDTH)
         self._state = self._data.qpos, self._data.qvel, self._data.ctrl  # views of the current values
         self._hull_of = {geom: hull for hull in self.hulls.values() for geom in hull.geoms}
         self._hulls_of = np.isin(np.arange(model.ngeom), list(self._hull_of))  # whether a geom belongs to a hull
@@ -96,10 +96,10 @@ class Physics:
         self.things = Things(model, self._data, world)
         calm = not (self.ground.uneven or any(floor.things for floor in world.floors))
         self.walls = Walls(world)
-        self._gliding: Gliding | None = None
+        self._free_motion: FreeMotion | None = None
         if calm and self.hulls:
-            self._gliding = Gliding(model, self._data, self._hull_rows, self.walls, car=world.lift is not None)
-        self._meetings = Meetings(model, self._all_hulls, self.props, self._gliding)
+            self._free_motion = FreeMotion(model, self._data, self._hull_rows, self.walls, car=world.lift is not None)
+        self._contact_switch = ContactSwitch(model, self._all_hulls, self.props, self._free_motion)
         self._sleep = Sleep(model, self._data)
 
     def step(self, seconds: float, after_substep: Callable[[float], None] | None = None) -> None:
@@ -107,12 +107,12 @@ class Physics:
 
         ``after_substep`` is called after every small step with its length (s), for objects too fast for a whole tick.
         """
-        self._meetings.look(seconds, touched=self._pressed)
-        if after_substep is None and self._meetings.off:
+        self._contact_switch.look(seconds, touched=self._pressed)
+        if after_substep is None and self._contact_switch.off:
             if self._sleep.lasts:
                 self.rays.outdate()
                 return
-            if self._gliding is not None and self._gliding.step(round(seconds / TIMESTEP)):
+            if self._free_motion is not None and self._free_motion.step(round(seconds / TIMESTEP)):
                 self.rays.outdate()
                 self._see()
                 return
@@ -121,7 +121,7 @@ class Physics:
     def _step_mujoco(self, seconds: float, after_substep: Callable[[float], None] | None = None) -> None:
         """Do MuJoCo's steps; touches last only if they are searched for."""
         if self._touched:
-            self._meetings.switch(off=False)
+            self._contact_switch.switch(off=False)
         for hull in self._all_hulls:
             if hull.hand is not None:
                 hull.handle()
@@ -135,29 +135,29 @@ class Physics:
         self._see()
 
     @property
-    def glides(self) -> bool:
+    def moves_freely(self) -> bool:
         """True if a kernel may move the robots."""
-        return self._gliding is not None and self._gliding.loaded
+        return self._free_motion is not None and self._free_motion.loaded
 
     def course(self) -> Course | None:
         """Return what a kernel needs to do several ticks; None: the next one needs MuJoCo, or there are no kernels."""
-        if self._gliding is None or not self.glides or self._pressed:
+        if self._free_motion is None or not self.moves_freely or self._pressed:
             return None
-        return Course(self._gliding, self._sleep, self._meetings.known)
+        return Course(self._free_motion, self._sleep, self._contact_switch.known)
 
     @property
     def _pressed(self) -> bool:
         """True if contacts must be searched for: something presses on a hull, moves at it, or was put there."""
         if not self._touched:
             return False
-        return bool(self._data.nefc) or not (all(map(_leans, self._touched)) and self._meetings.known)
+        return bool(self._data.nefc) or not (all(map(_leans, self._touched)) and self._contact_switch.known)
 
     def moved(self, *, awake: bool, known: bool) -> None:
         """Note that a kernel moved everything, or (not ``awake``) nothing moves; ``known``: as in the course."""
         self.rays.outdate()
-        self._meetings.switch(off=True)
+        self._contact_switch.switch(off=True)
         if not known:
-            self._meetings.note()
+            self._contact_switch.note()
         if awake:
             self._sleep.wake()
         for hull, places in self._touched.items():  # it may turn
@@ -167,7 +167,7 @@ class Physics:
     def end(self, stage: int, count: int, seconds: float) -> None:
         """Do the rest of a tick's physics after the kernel has stopped at ``stage`` and returned ``count``."""
         if stage in (NEAR, STUCK):
-            self._meetings.switch(off=stage == STUCK)
+            self._contact_switch.switch(off=stage == STUCK)
             self._step_mujoco(seconds)
         elif stage == SETTLING:
             self._see()
@@ -176,14 +176,14 @@ class Physics:
 
     def load_kernels(self) -> None:
         """Move robots that nothing can touch without MuJoCo from now on."""
-        if self._gliding is not None:
-            self._gliding.load_kernels()
+        if self._free_motion is not None:
+            self._free_motion.load_kernels()
             self.walls.load_kernel()
 
     def drive(self, seconds: float) -> None:
         """Turn the wheels of all robots as commanded, for the next ``seconds``."""
-        if (kernels := self.rows.kernels) is not None and not self.ground.uneven:
-            kernels.drive(self._hull_rows, self._state[2], seconds)
+        if (kernels := self.tables.kernels) is not None and not self.ground.uneven:
+            kernels.drive_wheels(self._hull_rows, self._state[2], seconds)
             return
         for hull in self._all_hulls:
             hull.turn_wheels(seconds)
@@ -191,12 +191,12 @@ class Physics:
     def _see(self) -> None:
         """Read positions, velocities and touches after a step."""
         positions, velocities, _ = self._state
-        kernels = self.rows.kernels
-        rests = kernels.still(velocities, RESTS) if kernels is not None else tiny(velocities.tolist())
+        kernels = self.tables.kernels
+        rests = kernels.all_below(velocities, RESTS) if kernels is not None else tiny(velocities.tolist())
         self._sleep.settle(rests=rests)
         count = -1
         if kernels is not None:
-            count = kernels.see(self._hull_rows, positions, velocities, STOREY, LIFTED, self.rows.others)
+            count = kernels.read_motion(self._hull_rows, positions, velocities, STOREY, LIFTED, self.tables.others)
         self._look(count)
 
     def _look(self, count: int) -> None:
@@ -205,7 +205,7 @@ class Physics:
         if self._touched or self._data.nefc:  # others cannot touch anything
             standing -= sum(len(hull.wheels) for hull in hulls if hull.support.sprung)
         if count >= 0:
-            hulls = [hulls[index] for index in self.rows.others[:count].tolist()] if count else []
+            hulls = [hulls[index] for index in self.tables.others[:count].tolist()] if count else []
         if hulls:
             positions, velocities, _ = self._state
             places, rates = positions.tolist(), velocities.tolist()
@@ -235,7 +235,7 @@ class Physics:
         person = self._people[body]
         spots, at = self._spots, 3 * person.mocap
         if not (person.there and max(abs(pose.x - spots[at]), abs(pose.y - spots[at + 1])) < STRIDE_MAX):
-            self._meetings.switch(off=False)
+            self._contact_switch.switch(off=False)
         spots[at], spots[at + 1], spots[at + 2] = pose.x, pose.y, self._elevations[floor] + person.half
         turns, at = self._attitudes, 4 * person.mocap  # a quaternion around the vertical axis
         turns[at], turns[at + 3] = math.cos(pose.yaw / 2), math.sin(pose.yaw / 2)
@@ -340,7 +340,7 @@ def _leans(hull: Hull) -> bool:
 class Course(NamedTuple):
     """Objects whose arrays a kernel moves on. ``known``: nothing but people has jumped since the last step."""
 
-    gliding: Gliding
+    free_motion: FreeMotion
     sleep: Sleep
     known: bool
 

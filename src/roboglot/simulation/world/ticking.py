@@ -24,16 +24,16 @@ from roboglot.kernels.layouts import (
     WATCHED,
 )
 from roboglot.simulation.bodies.hull import STOREY
-from roboglot.simulation.bodies.rounds import Rounds
 from roboglot.simulation.bodies.sleep import RESTS
 from roboglot.simulation.bodies.support import LIFTED
+from roboglot.simulation.bodies.ticks import RobotTicks
 from roboglot.simulation.people.crowd import HABITS, Crowd
 from roboglot.values import dataclass
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.physics import Physics
 
-LEGS = [GIMBALS, TOUCHED, MEASURED, WATCHED, RECKONED]  # stages of parts, as the kernel takes their tables
+STAGES = [GIMBALS, TOUCHED, MEASURED, WATCHED, RECKONED]  # stages of parts, as the kernel takes their tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,14 +48,14 @@ class Left:
 class Ticking:
     """Ticks of one world. ``seconds``: length of one."""
 
-    def __init__(self, physics: Physics, crowd: Crowd, rounds: Rounds, seconds: float) -> None:
-        self._physics, self._crowd, self._rounds, self._seconds = physics, crowd, rounds, seconds
+    def __init__(self, physics: Physics, crowd: Crowd, rounds: RobotTicks, seconds: float) -> None:
+        self._physics, self._crowd, self._robot_ticks, self._seconds = physics, crowd, rounds, seconds
         self._run: Callable[..., int] | None = None
         self._gathered = 0  # count of the rounds from which these are
         self._arrays: tuple[object, ...] = ()
         self._settings: tuple[float, ...] = ()
         self._refresh: list[Callable[[], None]] = []
-        self._steps, self._others = 0, physics.rows.others
+        self._steps, self._others = 0, physics.tables.others
 
     def load_kernels(self) -> None:
         """Do several ticks at once from now on, where that is possible; results stay the same, to the last bit."""
@@ -67,7 +67,7 @@ class Ticking:
     @property
     def lean(self) -> bool:
         """True if ``run`` may do the gimbals of the next tick."""
-        return self._run is not None and self._physics.glides
+        return self._run is not None and self._physics.moves_freely
 
     def run(self, ticks: int, number: int, origin: float, *, followed: bool) -> Left:
         """Begin up to ``ticks`` ticks after tick ``number`` (0: one, without the kernel); ``end`` finishes the last.
@@ -76,7 +76,7 @@ class Ticking:
         """
         if not ticks:
             return Left(1, DRIVE, 0)
-        if self._gathered != self._rounds.gathered:
+        if self._gathered != self._robot_ticks.gathered:
             self._gather()
         course = self._physics.course() if self._arrays else None
         if course is None or self._run is None:
@@ -85,7 +85,7 @@ class Ticking:
             self._settings = origin, *self._settings[1:]
         for refresh in self._refresh:
             refresh()
-        gliding, sleep, known = course
+        free_motion, sleep, known = course
         answer = self._run(
             *self._arrays,
             self._settings,
@@ -93,9 +93,9 @@ class Ticking:
             number,
             ticks,
             followed,
-            known and gliding.parted,
+            known and free_motion.parted,
             sleep.holds,
-            gliding.free,
+            free_motion.free,
             self._others,
         )
         begun, rest = divmod(answer, TICKS_UNIT)
@@ -107,20 +107,25 @@ class Ticking:
 
     def _gather(self) -> None:
         """Take the arrays of the robots' parts and of the physics; none if there are parts that the kernel lacks."""
-        rounds, self._arrays, course = self._rounds, (), self._physics.course()
-        every = [control.leg for control in rounds.controls] + [sense.leg for sense in rounds.senses]
-        legs = [leg for leg in every if leg is not None]
-        if self._run is None or course is None or [leg.stage for leg in legs] != LEGS or len(legs) < len(every):
+        rounds, self._arrays, course = self._robot_ticks, (), self._physics.course()
+        every = [control.stage for control in rounds.controls] + [sense.stage for sense in rounds.senses]
+        stages = [stage for stage in every if stage is not None]
+        if (
+            self._run is None
+            or course is None
+            or [stage.number for stage in stages] != STAGES
+            or len(stages) < len(every)
+        ):
             return
         self._gathered = rounds.gathered
-        gliding, sleep, _ = course
-        tables = self._physics.around_people[0], *(table for leg in legs for table in leg.tables)
-        scene, geoms = (self._crowd.table, *gliding.scene), gliding.geoms
-        self._arrays = tables, scene, geoms, gliding.state, gliding.servos, sleep.now, sleep.kept
-        self._refresh = [leg.refresh for leg in legs if leg.refresh is not None]
-        step, *physical = gliding.settings
+        free_motion, sleep, _ = course
+        tables = self._physics.around_people[0], *(table for stage in stages for table in stage.tables)
+        scene, geoms = (self._crowd.table, *free_motion.scene), free_motion.geoms
+        self._arrays = tables, scene, geoms, free_motion.state, free_motion.servos, sleep.now, sleep.kept
+        self._refresh = [stage.refresh for stage in stages if stage.refresh is not None]
+        step, *physical = free_motion.settings
         limits = self._seconds, step, RESTS, STOREY, LIFTED
-        self._settings = 0.0, *limits, *physical, *HABITS, *(number for leg in legs for number in leg.settings)
+        self._settings = 0.0, *limits, *physical, *HABITS, *(number for stage in stages for number in stage.settings)
         self._steps = round(self._seconds / step)
 
     def end(self, left: Left, stamp: float, after_substep: Callable[[float], None] | None = None) -> None:
@@ -135,8 +140,8 @@ class Ticking:
             physics.step(seconds, after_substep)
         elif stage <= SEEN:
             physics.end(stage, count, seconds)
-        for sense in self._rounds.senses:
-            if sense.leg is None or sense.leg.stage > stage:
+        for sense in self._robot_ticks.senses:
+            if sense.stage is None or sense.stage.number > stage:
                 sense(stamp, seconds)
-            elif sense.leg.stage == stage:
+            elif sense.stage.number == stage:
                 sense.end(count, stamp, seconds)

@@ -30,7 +30,7 @@ from roboglot.model.sound import claps
 from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.files import load_body
 from roboglot.simulation.bodies.part import Fitting
-from roboglot.simulation.bodies.rounds import Rounds
+from roboglot.simulation.bodies.ticks import RobotTicks
 from roboglot.simulation.building.building import Building
 from roboglot.simulation.detectors.glance import Surroundings
 from roboglot.simulation.faults.faults import Faults
@@ -135,8 +135,8 @@ class World:
         self.outside = Outside("", clock)
         self.hands = noted(self.own_hands, self.outside)
         self.faults = Faults(self, description.faults)
-        self._rounds = Rounds(self._physics.rows, TICK)
-        self._ticking = Ticking(self._physics, self._crowd, self._rounds, TICK)
+        self._robot_ticks = RobotTicks(self._physics.tables, TICK)
+        self._ticking = Ticking(self._physics, self._crowd, self._robot_ticks, TICK)
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
@@ -220,7 +220,7 @@ class World:
     def _use_kernels(self) -> None:
         self._environment.sight.load_kernel()
         self._environment.rays.load_kernel()
-        self._physics.rows.load_kernels()
+        self._physics.tables.load_kernels()
         self._physics.load_kernels()
         self._crowd.load_kernels()
         self._ticking.load_kernels()
@@ -281,7 +281,7 @@ class World:
         """Do a tick, and those after it until a robot has something due or anything else happens."""
         self._ticks += 1
         robots = tuple(self._population.simulated.values())  # steps lie apart: one may join meanwhile
-        beads, rounds, ticking = self._environment.beads, self._rounds, self._ticking
+        beads, rounds, ticking = self._environment.beads, self._robot_ticks, self._ticking
         followed = rounds.control(robots, lean=ticking.lean and not beads.flying)
         if followed:
             yield
@@ -306,7 +306,7 @@ class World:
         """Return how many ticks may be done at once, the present one included; 0: it takes small steps."""
         if self._environment.beads.flying:
             return 0
-        most = self._rounds.free(AHEAD_MAX) if self.building.rests else 1
+        most = self._robot_ticks.free(AHEAD_MAX) if self.building.rests else 1
         until = min(self._clock.free_until, self.faults.next) if most > 1 else -math.inf
         if until <= self.time:
             return 1

@@ -10,13 +10,13 @@ import numpy as np
 from msgspec import Struct
 
 from roboglot.kernels.layouts import (
+    BATCHED,
     CONTACT_ANGLE,
     CONTACT_DISTANCE,
     CONTACT_MADE,
     CONTACT_WIDTH,
     DOCK_WIDTH,
     HULL_WIDTH,
-    TOGETHER,
     TOUCHED,
     USE,
 )
@@ -27,7 +27,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
-from roboglot.simulation.bodies.rows import Kernels, Leg, Rows, Sense, SharedSense
+from roboglot.simulation.bodies.tables import BatchedSense, Kernels, RobotTables, Sense, TickStage
 
 TABLE = "dock contact"
 
@@ -46,15 +46,15 @@ class SimulatedDockContact(DockContact):
         self, section: DockContactSection, hull: Hull, docks: Sequence[Sequence[Pose]], events: EventStream
     ) -> None:
         self._section, self._hull, self._events, self.docks = section, hull, events, docks
-        self._row = hull.seat.row(TABLE, CONTACT_WIDTH)
-        self._row[USE] = TOGETHER
+        self._row = hull.robot_rows.row(TABLE, CONTACT_WIDTH)
+        self._row[USE] = BATCHED
         self._row[CONTACT_DISTANCE], self._row[CONTACT_ANGLE] = section.distance, section.angle
         self._row[CONTACT_MADE] = float(self._touches())
 
     @property
     def index(self) -> int:
         """Row of this part in the table of all robots."""
-        return self._hull.seat.index
+        return self._hull.robot_rows.index
 
     @property
     def docked(self) -> bool:
@@ -78,9 +78,9 @@ class SimulatedDockContact(DockContact):
         return False
 
 
-def _together(rows: Rows, parts: Sequence[tuple[SimulatedDockContact, Sense]]) -> SharedSense:
+def _sense_all(tables: RobotTables, parts: Sequence[tuple[SimulatedDockContact, Sense]]) -> BatchedSense:
     """Return a function that checks for all robots in one call of the kernel, which leaves those that change."""
-    hulls, contacts = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, CONTACT_WIDTH)
+    hulls, contacts = tables.table(HULLS, HULL_WIDTH), tables.table(TABLE, CONTACT_WIDTH)
     docks = parts[0][0].docks if parts else ()
     known: list[Pose] = []
     table = np.zeros((sum(map(len, docks)), DOCK_WIDTH))
@@ -96,10 +96,10 @@ def _together(rows: Rows, parts: Sequence[tuple[SimulatedDockContact, Sense]]) -
 
     def touch(kernels: Kernels, _stamp: float, _seconds: float) -> int:
         refresh()
-        return kernels.touch(hulls, contacts, table, rows.others)
+        return kernels.find_docks(hulls, contacts, table, tables.others)
 
-    leg = Leg(TOUCHED, (contacts, table), refresh=refresh)
-    return rows.sense({contact.index: sense for contact, sense in parts}, touch, leg)
+    leg = TickStage(TOUCHED, (contacts, table), refresh=refresh)
+    return tables.sense({contact.index: sense for contact, sense in parts}, touch, leg)
 
 
 def _fit(fit: Fitting) -> SimulatedDockContact:
@@ -112,5 +112,5 @@ PART = Part(
     section=DockContactSection,
     fit=_fit,
     sense=SimulatedDockContact.sense,
-    together=_together,
+    sense_all=_sense_all,
 )

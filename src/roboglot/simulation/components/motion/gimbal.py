@@ -20,7 +20,7 @@ from roboglot.simulation.bodies.axis_motors import move
 from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.motion.base import SimulatedBase
-from roboglot.simulation.components.motion.gimbal_axes import Aim, GimbalAxes, GimbalSection, reaches, together
+from roboglot.simulation.components.motion.gimbal_axes import Aim, GimbalAxes, GimbalSection, control_all, reaches
 
 Floats = NDArray[np.float64]
 
@@ -194,6 +194,6 @@ PART = Part(
     fit=_fit,
     after=("base",),
     control=lambda gimbal, seconds: gimbal.axes.control(seconds),
-    control_together=lambda rows, found: together(rows, [(gimbal.axes, control) for gimbal, control in found]),
+    control_all=lambda tables, found: control_all(tables, [(gimbal.axes, control) for gimbal, control in found]),
     displaced=lambda gimbal: gimbal.axes.displaced(),
 )

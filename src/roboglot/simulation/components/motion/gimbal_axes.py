@@ -9,19 +9,19 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from roboglot.kernels.layouts import (
-    ALONE,
+    BATCHED,
     GIMBAL_ACCELERATION,
     GIMBAL_HIGHEST,
+    GIMBAL_HULL_TURNS,
+    GIMBAL_HULL_YAW,
     GIMBAL_LOWEST,
     GIMBAL_RATE,
-    GIMBAL_SINCE,
-    GIMBAL_TOP,
-    GIMBAL_TURNED,
+    GIMBAL_SPEED_MAX,
     GIMBAL_WIDTH,
     GIMBAL_YAW,
     GIMBALS,
     HULL_WIDTH,
-    TOGETHER,
+    SINGLE,
     USE,
 )
 from roboglot.model.components.motion.base import WheelSpeeds
@@ -36,7 +36,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.hull_state import LEVEL
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.quantities import Offset, Positive
-from roboglot.simulation.bodies.rows import Control, Leg, Rows, SharedControl
+from roboglot.simulation.bodies.tables import BatchedControl, Control, RobotTables, TickStage
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.values import dataclass
 
@@ -81,9 +81,9 @@ class GimbalAxes:
         self._top_speed = section.speed
         self.pitch = Axis(-section.up, section.down, section.acceleration)
         self._yaw = Axis(-section.sideways, section.sideways, section.acceleration)
-        self.index = hull.seat.index
-        self._row = row = hull.seat.row(TABLE, GIMBAL_WIDTH)
-        row[USE], row[GIMBAL_TOP], row[GIMBAL_ACCELERATION] = ALONE, section.speed, section.acceleration
+        self.index = hull.robot_rows.index
+        self._row = row = hull.robot_rows.row(TABLE, GIMBAL_WIDTH)
+        row[USE], row[GIMBAL_SPEED_MAX], row[GIMBAL_ACCELERATION] = SINGLE, section.speed, section.acceleration
         row[GIMBAL_LOWEST], row[GIMBAL_HIGHEST] = self._yaw.lowest, self._yaw.highest
         self._aims: tuple[Aim | None, Aim | None] = UNAIMED  # of pitch and yaw
         self.mode = FollowMode.CHASSIS_LEAD
@@ -102,11 +102,11 @@ class GimbalAxes:
     @property
     def _since_start(self) -> float:
         """The body's true rotation since the start, to count whole turns, rad."""
-        return self._row[GIMBAL_SINCE]
+        return self._row[GIMBAL_HULL_TURNS]
 
     def _disturb(self) -> None:
         """Have the next tick computed alone: what the gimbal does has changed."""
-        self._resting, self._row[USE] = False, ALONE
+        self._resting, self._row[USE] = False, SINGLE
 
     def set_mode(self, mode: FollowMode) -> None:
         """Set which of gimbal and chassis follows the other."""
@@ -180,10 +180,10 @@ class GimbalAxes:
     def control(self, seconds: float) -> None:
         """Compensate the body's motion, follow or steer the chassis, turn to the aims; before the base's control."""
         hull, row, yaw = self._hull, self._row, self.yaw
-        turn, row[GIMBAL_TURNED] = hull.turned - row[GIMBAL_TURNED], hull.turned
-        if self._resting and row[USE] == ALONE and not turn and hull.tilt is LEVEL:
+        turn, row[GIMBAL_HULL_YAW] = hull.turned - row[GIMBAL_HULL_YAW], hull.turned
+        if self._resting and row[USE] == SINGLE and not turn and hull.tilt is LEVEL:
             return
-        row[GIMBAL_SINCE] += turn
+        row[GIMBAL_HULL_TURNS] += turn
         if hull.tilt is LEVEL and self._plain and not self.lean:
             self._follow_body(yaw, turn, seconds)
         elif not self._move(yaw, turn, seconds):
@@ -195,7 +195,7 @@ class GimbalAxes:
 
     def _move(self, yaw: Axis, turn: float, seconds: float) -> bool:
         """Turn both axes by a tick, while the body has turned by ``turn`` (rad); return whether they have power."""
-        hull, self._row[USE] = self._hull, ALONE
+        hull, self._row[USE] = self._hull, SINGLE
         lean = 0.0 if hull.tilt is LEVEL else _lean(hull.tilt, yaw.position)
         leaning, self.lean = lean - self.lean, lean
         if self._limp:
@@ -219,11 +219,11 @@ class GimbalAxes:
     def _follow_body(self, yaw: Axis, turn: float, seconds: float) -> None:
         """Compensate a turn of the body (rad) and return to its front; so does the kernel from now on."""
         yaw.trail(-turn, FOLLOWING, self._top_speed, seconds)
-        self._resting, self._row[USE] = not yaw.position and not yaw.rate, TOGETHER
+        self._resting, self._row[USE] = not yaw.position and not yaw.rate, BATCHED
 
     def displaced(self) -> None:
         """Note that the robot was put elsewhere, together with its axes."""
-        self._row[GIMBAL_TURNED] = self._hull.turned
+        self._row[GIMBAL_HULL_YAW] = self._hull.turned
 
     def _advance(self, index: int, axis: Axis, held: float, seconds: float) -> None:
         """Move one axis; ``held``: the turn (rad) that keeps its direction in spite of the body's motion."""
@@ -254,13 +254,13 @@ class GimbalAxes:
         self._base.steer(0.0 if abs(off) < SETTLED else max(-top, min(top, STEERING * off)))
 
 
-def together(rows: Rows, gimbals: Sequence[tuple[GimbalAxes, Control]]) -> SharedControl:
+def control_all(tables: RobotTables, gimbals: Sequence[tuple[GimbalAxes, Control]]) -> BatchedControl:
     """Return a function that controls all gimbals, in one call of the kernel as far as they follow their bodies."""
-    hulls, table = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, GIMBAL_WIDTH)
-    return rows.control(
+    hulls, table = tables.table(HULLS, HULL_WIDTH), tables.table(TABLE, GIMBAL_WIDTH)
+    return tables.control(
         {axes.index: control for axes, control in gimbals},
-        lambda kernels, seconds: kernels.follow(hulls, table, FOLLOWING, SETTLED, seconds, rows.others),
-        Leg(GIMBALS, (table,), (FOLLOWING, SETTLED)),
+        lambda kernels, seconds: kernels.turn_gimbals(hulls, table, FOLLOWING, SETTLED, seconds, tables.others),
+        TickStage(GIMBALS, (table,), (FOLLOWING, SETTLED)),
     )
 
 

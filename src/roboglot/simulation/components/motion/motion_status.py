@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from msgspec import Struct
 
 from roboglot.kernels.layouts import (
+    BATCHED,
     HULL_WIDTH,
     IMU_WIDTH,
-    STATUS_BLOW,
-    STATUS_BLOWS,
+    STATUS_IMPACT_MIN,
+    STATUS_IMPACTS,
     STATUS_SLIPPING,
     STATUS_STAMP,
     STATUS_WIDTH,
-    TOGETHER,
     USE,
     WATCHED,
 )
@@ -25,8 +25,8 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import Positive
-from roboglot.simulation.bodies.rows import Leg, Rows, Sense, SharedSense
 from roboglot.simulation.bodies.support import GRAVITY
+from roboglot.simulation.bodies.tables import BatchedSense, RobotTables, Sense, TickStage
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import TABLE as IMUS
 from roboglot.simulation.components.sensing.imu import SimulatedImu
@@ -52,14 +52,14 @@ class SimulatedMotionStatus(MotionStatus):
 
     def __init__(self, section: MotionStatusSection, hull: Hull, base: SimulatedBase, imu: SimulatedImu) -> None:
         self._section, self._hull, self._base, self._imu = section, hull, base, imu
-        self._row = row = hull.seat.row(TABLE, STATUS_WIDTH)
-        row[USE], row[STATUS_BLOW] = TOGETHER, section.blow
-        row[STATUS_BLOWS] = row[STATUS_BLOWS + 1] = row[STATUS_BLOWS + 2] = -math.inf  # of the last along x, y, z
+        self._row = row = hull.robot_rows.row(TABLE, STATUS_WIDTH)
+        row[USE], row[STATUS_IMPACT_MIN] = BATCHED, section.blow
+        row[STATUS_IMPACTS] = row[STATUS_IMPACTS + 1] = row[STATUS_IMPACTS + 2] = -math.inf  # of the last along x, y, z
 
     @property
     def index(self) -> int:
         """Row of this part in the table of all robots."""
-        return self._hull.seat.index
+        return self._hull.robot_rows.index
 
     @property
     def flags(self) -> MotionFlags:
@@ -72,7 +72,7 @@ class SimulatedMotionStatus(MotionStatus):
         wheels, (c, s) = self._base.velocity, (math.cos(hull.turned), math.sin(hull.turned))
         driven = wheels.x * (c * vx + s * vy) + wheels.y * (c * vy - s * vx) > 0.0  # the motion of the wheels
         row = self._row
-        impacts = [row[STATUS_STAMP] - row[STATUS_BLOWS + axis] <= self._section.hold for axis in range(3)]
+        impacts = [row[STATUS_STAMP] - row[STATUS_IMPACTS + axis] <= self._section.hold for axis in range(3)]
         return MotionFlags(
             static=static,
             uphill=sloping and not static and vz > CLIMBING,
@@ -93,11 +93,11 @@ class SimulatedMotionStatus(MotionStatus):
         row[STATUS_STAMP] = stamp
         (x, y, z), blow = self._imu.felt, self._section.blow
         if not -blow <= x <= blow:
-            row[STATUS_BLOWS] = stamp
+            row[STATUS_IMPACTS] = stamp
         if not -blow <= y <= blow:
-            row[STATUS_BLOWS + 1] = stamp
+            row[STATUS_IMPACTS + 1] = stamp
         if abs(abs(z) - GRAVITY) > blow:
-            row[STATUS_BLOWS + 2] = stamp
+            row[STATUS_IMPACTS + 2] = stamp
         wheels, hull = self._base.velocity, self._hull
         vx, vy, _, turn = hull.motion
         if wheels.x or wheels.y or wheels.yaw or vx * vx + vy * vy > SLIP_SQUARE:
@@ -115,13 +115,17 @@ class SimulatedMotionStatus(MotionStatus):
         return off_x * off_x + off_y * off_y > SLIP_SQUARE
 
 
-def _together(rows: Rows, parts: Sequence[tuple[SimulatedMotionStatus, Sense]]) -> SharedSense:
+def _sense_all(tables: RobotTables, parts: Sequence[tuple[SimulatedMotionStatus, Sense]]) -> BatchedSense:
     """Return a function that watches for all robots, in one call of the kernel as far as their wheels are whole."""
-    tables = rows.table(HULLS, HULL_WIDTH), rows.table(IMUS, IMU_WIDTH), rows.table(TABLE, STATUS_WIDTH)
-    return rows.sense(
+    inputs = (
+        tables.table(HULLS, HULL_WIDTH),
+        tables.table(IMUS, IMU_WIDTH),
+        tables.table(TABLE, STATUS_WIDTH),
+    )
+    return tables.sense(
         {status.index: sense for status, sense in parts},
-        lambda kernels, stamp, _: kernels.watch(*tables, stamp, GRAVITY, SLIP_SQUARE, SLIP_RATE, rows.others),
-        Leg(WATCHED, tables[-1:], (GRAVITY, SLIP_SQUARE, SLIP_RATE)),
+        lambda kernels, stamp, _: kernels.watch_motion(*inputs, stamp, GRAVITY, SLIP_SQUARE, SLIP_RATE, tables.others),
+        TickStage(WATCHED, inputs[-1:], (GRAVITY, SLIP_SQUARE, SLIP_RATE)),
     )
 
 
@@ -137,5 +141,5 @@ PART = Part(
     fit=_fit,
     after=("base", "imu"),
     sense=SimulatedMotionStatus.sense,
-    together=_together,
+    sense_all=_sense_all,
 )

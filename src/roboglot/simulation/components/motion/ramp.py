@@ -29,7 +29,7 @@ class Ramp:
 
     def go_on(self, goal: Twist, linear: float, angular: float) -> bool:
         """Let the kernel approach ``goal`` by these steps (m/s, rad/s) a tick, from this one on; False: it cannot."""
-        if self._hull.seat.rows.kernels is None or self._hull.tilts:
+        if self._hull.robot_rows.tables.kernels is None or self._hull.tilts:
             return False
         self._hull.approach(goal, linear, angular)
         self._goal = goal

@@ -13,25 +13,25 @@ import numpy as np
 from msgspec import Struct
 
 from roboglot.kernels.layouts import (
+    BATCHED,
     HULL_WIDTH,
-    IMU_AT,
-    IMU_FELT_X,
-    IMU_FELT_Y,
-    IMU_FELT_Z,
-    IMU_LEANT,
-    IMU_MX,
-    IMU_MY,
-    IMU_MZ,
+    IMU_AX,
+    IMU_AY,
+    IMU_AZ,
+    IMU_HULL_VX,
+    IMU_HULL_VY,
+    IMU_HULL_VZ,
+    IMU_HULL_YAW,
+    IMU_NEXT_NOISE,
     IMU_NOISES,
     IMU_RATE,
     IMU_RATES,
     IMU_SCALE,
     IMU_STAMP,
-    IMU_TURNED,
+    IMU_TILTED,
     IMU_WIDTH,
     IMU_YAW,
     MEASURED,
-    TOGETHER,
     USE,
 )
 from roboglot.model.components.sensing.imu import Imu, ImuConverters
@@ -43,8 +43,8 @@ from roboglot.simulation.bodies.hull_state import LEVEL
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
-from roboglot.simulation.bodies.rows import Leg, Rows, Sense, SharedSense
 from roboglot.simulation.bodies.support import GRAVITY
+from roboglot.simulation.bodies.tables import BatchedSense, RobotTables, Sense, TickStage
 
 ACCELERATION_UNIT = GRAVITY / 8192  # per unit of a 16-bit converter for 4 g
 RATE_UNIT = math.radians(1.0 / 65.5)  # for 500 degrees/s
@@ -87,13 +87,13 @@ class SimulatedImu(Imu, ImuConverters):
         )
         self._sigma = np.array([section.gyro_noise] * 3 + [section.acceleration_noise] * 3)
         self._held = STRAIGHT  # the legs' last share of the attitude
-        self._row = row = hull.seat.row(TABLE, IMU_WIDTH)
-        row[USE], row[IMU_SCALE], row[IMU_FELT_Z] = TOGETHER, self._scale, GRAVITY
+        self._row = row = hull.robot_rows.row(TABLE, IMU_WIDTH)
+        row[USE], row[IMU_SCALE], row[IMU_AZ] = BATCHED, self._scale, GRAVITY
         self.forget()
         self._reading: ImuReading | None = None  # of the stamp in the row, once read
         self._raw: RawImu | None = None
         self._compass, self._field = compass, field  # random numbers, and the earth's field in the world's frame, T
-        self._noises = hull.seat.row(NOISES, NOISE_WIDTH)
+        self._noises = hull.robot_rows.row(NOISES, NOISE_WIDTH)
         self.forget_noise()
 
     @property
@@ -111,13 +111,13 @@ class SimulatedImu(Imu, ImuConverters):
     @property
     def felt(self) -> tuple[float, float, float]:
         """The accelerometer's x, y, z, m/s2."""
-        x, y, z = self._row[IMU_FELT_X : IMU_FELT_Z + 1]
+        x, y, z = self._row[IMU_AX : IMU_AZ + 1]
         return x, y, z
 
     @property
     def index(self) -> int:
         """Row of this part in the table of all robots."""
-        return self._hull.seat.index
+        return self._hull.robot_rows.index
 
     @property
     def raw(self) -> RawImu:
@@ -140,40 +140,40 @@ class SimulatedImu(Imu, ImuConverters):
     def forget(self) -> None:
         """Forget the last motion: the robot was put elsewhere, without a measurement in between."""
         row = self._row
-        row[IMU_TURNED] = self._hull.turned
-        row[IMU_MX], row[IMU_MY], row[IMU_MZ], _ = self._hull.motion
+        row[IMU_HULL_YAW] = self._hull.turned
+        row[IMU_HULL_VX], row[IMU_HULL_VY], row[IMU_HULL_VZ], _ = self._hull.motion
 
     def forget_noise(self) -> None:
         """Discard the drawn noise: the seed has changed."""
-        self._row[IMU_AT] = len(self._noises)
+        self._row[IMU_NEXT_NOISE] = len(self._noises)
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Measure one tick."""
         hull, scale, row = self._hull, self._scale, self._row
-        at = int(row[IMU_AT])
+        at = int(row[IMU_NEXT_NOISE])
         if at == len(self._noises):
             drawn = self._random.standard_normal((DRAWN, IMU_NOISES)) * self._sigma + self._bias
             self._noises.cast("B")[:] = drawn.data.cast("B")
             at = 0
         noise = list(self._noises[at : at + IMU_NOISES])
-        row[IMU_AT] = at + IMU_NOISES
+        row[IMU_NEXT_NOISE] = at + IMU_NOISES
         turned, motion = hull.turned, hull.motion
-        row[IMU_RATE] = rate = (turned - row[IMU_TURNED]) / seconds * scale + noise[2]
+        row[IMU_RATE] = rate = (turned - row[IMU_HULL_YAW]) / seconds * scale + noise[2]
         row[IMU_YAW] = wrap_angle(row[IMU_YAW] + rate * seconds)
-        ux, uy, uz = row[IMU_MX : IMU_MZ + 1]
+        ux, uy, uz = row[IMU_HULL_VX : IMU_HULL_VZ + 1]
         vx, vy, vz, turning = motion
-        row[IMU_TURNED] = turned
-        row[IMU_MX], row[IMU_MY], row[IMU_MZ] = vx, vy, vz
+        row[IMU_HULL_YAW] = turned
+        row[IMU_HULL_VX], row[IMU_HULL_VY], row[IMU_HULL_VZ] = vx, vy, vz
         ax, ay, az = (vx - ux) / seconds, (vy - uy) / seconds, (vz - uz) / seconds
         row[IMU_STAMP] = stamp
         if hull.tilt is not LEVEL or hull.attitude != STRAIGHT or self._held != STRAIGHT:
             self._reading = reading = self._tilted(stamp, (ax, ay, az + GRAVITY), noise, seconds)
             felt = reading.linear_acceleration
-            row[IMU_FELT_X], row[IMU_FELT_Y], row[IMU_FELT_Z] = felt.x, felt.y, felt.z
+            row[IMU_AX], row[IMU_AY], row[IMU_AZ] = felt.x, felt.y, felt.z
             return
         c, s = math.cos(turned), math.sin(turned)
-        row[IMU_FELT_X], row[IMU_FELT_Y] = c * ax + s * ay + noise[3], c * ay - s * ax + noise[4]
-        row[IMU_FELT_Z] = az + GRAVITY + noise[5]
+        row[IMU_AX], row[IMU_AY] = c * ax + s * ay + noise[3], c * ay - s * ax + noise[4]
+        row[IMU_AZ] = az + GRAVITY + noise[5]
         row[IMU_RATES], row[IMU_RATES + 1], row[IMU_RATES + 2] = noise[0], noise[1], turning * scale + noise[2]
         self._reading = None
 
@@ -183,7 +183,7 @@ class SimulatedImu(Imu, ImuConverters):
         """Measure with a tilted body, by ground or legs; ``felt``: acceleration plus gravity, world, m/s2."""
         hull, held, before = self._hull, self._hull.attitude, self._held
         self._held = held
-        self._row[IMU_LEANT] = float(held != STRAIGHT)
+        self._row[IMU_TILTED] = float(held != STRAIGHT)
         roll, pitch = hull.tilt[0] + held.roll, hull.tilt[1] + held.pitch
         rolling = hull.tilting[0] + wrap_angle(held.roll - before.roll) / seconds
         pitching = hull.tilting[1] + wrap_angle(held.pitch - before.pitch) / seconds
@@ -199,13 +199,19 @@ class SimulatedImu(Imu, ImuConverters):
         )
 
 
-def _together(rows: Rows, parts: Sequence[tuple[SimulatedImu, Sense]]) -> SharedSense:
+def _sense_all(tables: RobotTables, parts: Sequence[tuple[SimulatedImu, Sense]]) -> BatchedSense:
     """Return a function that measures with all IMUs, in one call of the kernel as far as they are level."""
-    hulls, imus, noises = rows.table(HULLS, HULL_WIDTH), rows.table(TABLE, IMU_WIDTH), rows.table(NOISES, NOISE_WIDTH)
-    return rows.sense(
+    hulls, imus, noises = (
+        tables.table(HULLS, HULL_WIDTH),
+        tables.table(TABLE, IMU_WIDTH),
+        tables.table(NOISES, NOISE_WIDTH),
+    )
+    return tables.sense(
         {imu.index: sense for imu, sense in parts},
-        lambda kernels, stamp, seconds: kernels.measure(hulls, imus, noises, stamp, seconds, GRAVITY, rows.others),
-        Leg(MEASURED, (imus, noises), (GRAVITY,)),
+        lambda kernels, stamp, seconds: kernels.measure_imus(
+            hulls, imus, noises, stamp, seconds, GRAVITY, tables.others
+        ),
+        TickStage(MEASURED, (imus, noises), (GRAVITY,)),
     )
 
 
@@ -233,6 +239,6 @@ PART = Part(
     section=ImuSection,
     fit=_fit,
     sense=SimulatedImu.sense,
-    together=_together,
+    sense_all=_sense_all,
     displaced=SimulatedImu.forget,
 )

@@ -21,7 +21,7 @@ from roboglot.model.sensing import LaserScan
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative, Positive
-from roboglot.simulation.bodies.rows import Rows
+from roboglot.simulation.bodies.tables import RobotTables
 from roboglot.simulation.components.sensing.odometry import SimulatedOdometry
 from roboglot.simulation.world.sight import Sight
 
@@ -191,7 +191,7 @@ class _Turns:
                 lidar.taken = row.copy()  # it may be kept for long
 
 
-def _measure_all(_: Rows, lidars: Sequence[SimulatedLidar]) -> Callable[[int], None]:
+def _measure_all(_: RobotTables, lidars: Sequence[SimulatedLidar]) -> Callable[[int], None]:
     turns = _Turns(lidars[0].sight)
     for lidar in lidars:
         lidar.turns, lidar.taken = turns, None

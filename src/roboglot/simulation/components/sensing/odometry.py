@@ -9,10 +9,10 @@ import numpy as np
 from msgspec import Struct, structs
 
 from roboglot.kernels.layouts import (
-    ALONE,
+    BATCHED,
     HULL_WIDTH,
     IMU_WIDTH,
-    ODOMETRY_AT,
+    ODOMETRY_NEXT_NOISE,
     ODOMETRY_NOISE,
     ODOMETRY_NOISES,
     ODOMETRY_SCALE_X,
@@ -21,7 +21,7 @@ from roboglot.kernels.layouts import (
     ODOMETRY_STILL,
     ODOMETRY_WIDTH,
     RECKONED,
-    TOGETHER,
+    SINGLE,
     USE,
 )
 from roboglot.model.components.sensing.odometry import Odometry, OdometryNoise
@@ -30,7 +30,7 @@ from roboglot.model.sensing import OdometryReading
 from roboglot.simulation.bodies.hull_state import TABLE as HULLS
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative, Positive
-from roboglot.simulation.bodies.rows import Leg, Rows, Seat, Sense, SharedSense
+from roboglot.simulation.bodies.tables import BatchedSense, RobotRows, RobotTables, Sense, TickStage
 from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.sensing.imu import TABLE as IMUS
 from roboglot.simulation.components.sensing.imu import SimulatedImu
@@ -72,15 +72,20 @@ class SimulatedOdometry(Odometry):
     """Odometry that starts at (0, 0, 0) in odom."""
 
     def __init__(
-        self, section: OdometrySection, base: SimulatedBase, imu: SimulatedImu, random: np.random.Generator, seat: Seat
+        self,
+        section: OdometrySection,
+        base: SimulatedBase,
+        imu: SimulatedImu,
+        random: np.random.Generator,
+        robot_rows: RobotRows,
     ) -> None:
         self._section, self._base, self._imu, self._random = section, base, imu, random
         self._scale_x, self._scale_y = (1.0 + random.normal(0.0, section.scale_error, 2)).tolist()
         self._disturbs = bool(section.turn_slip or section.jump_every)
-        self.index = seat.index
-        self._row = row = seat.row(TABLE, ODOMETRY_WIDTH)
-        self._noises = seat.row(NOISES, NOISE_WIDTH)
-        row[USE] = ALONE if self._disturbs else TOGETHER
+        self.index = robot_rows.index
+        self._row = row = robot_rows.row(TABLE, ODOMETRY_WIDTH)
+        self._noises = robot_rows.row(NOISES, NOISE_WIDTH)
+        row[USE] = SINGLE if self._disturbs else BATCHED
         row[ODOMETRY_SCALE_X], row[ODOMETRY_SCALE_Y] = self._scale_x, self._scale_y
         row[ODOMETRY_NOISE], row[ODOMETRY_STILL] = section.noise, section.still_rate
         self.forget_noise()
@@ -114,7 +119,7 @@ class SimulatedOdometry(Odometry):
 
     def forget_noise(self) -> None:
         """Discard the drawn noise: the seed has changed."""
-        self._row[ODOMETRY_AT] = NOISE_WIDTH
+        self._row[ODOMETRY_NEXT_NOISE] = NOISE_WIDTH
 
     def sense(self, stamp: float, seconds: float) -> None:
         """Add one tick's motion."""
@@ -147,28 +152,32 @@ class SimulatedOdometry(Odometry):
 
     def _noise(self) -> list[float]:
         """Return the tick's two numbers."""
-        at = int(self._row[ODOMETRY_AT])
+        at = int(self._row[ODOMETRY_NEXT_NOISE])
         if at == NOISE_WIDTH:
             self._noises.cast("B")[:] = self._random.standard_normal(NOISE_WIDTH).data.cast("B")
             at = 0
-        self._row[ODOMETRY_AT] = at + ODOMETRY_NOISES
+        self._row[ODOMETRY_NEXT_NOISE] = at + ODOMETRY_NOISES
         return list(self._noises[at : at + ODOMETRY_NOISES])
 
 
-def _together(rows: Rows, parts: Sequence[tuple[SimulatedOdometry, Sense]]) -> SharedSense:
+def _sense_all(tables: RobotTables, parts: Sequence[tuple[SimulatedOdometry, Sense]]) -> BatchedSense:
     """Return a function that reckons for all robots, in one call of the kernel."""
-    tables = rows.table(HULLS, HULL_WIDTH), rows.table(IMUS, IMU_WIDTH), rows.table(TABLE, ODOMETRY_WIDTH)
-    noises = rows.table(NOISES, NOISE_WIDTH)
-    return rows.sense(
+    inputs = (
+        tables.table(HULLS, HULL_WIDTH),
+        tables.table(IMUS, IMU_WIDTH),
+        tables.table(TABLE, ODOMETRY_WIDTH),
+    )
+    noises = tables.table(NOISES, NOISE_WIDTH)
+    return tables.sense(
         {odometry.index: sense for odometry, sense in parts},
-        lambda kernels, stamp, seconds: kernels.dead_reckon(*tables, noises, stamp, seconds, rows.others),
-        Leg(RECKONED, (tables[-1], noises)),
+        lambda kernels, stamp, seconds: kernels.dead_reckon(*inputs, noises, stamp, seconds, tables.others),
+        TickStage(RECKONED, (inputs[-1], noises)),
     )
 
 
 def _fit(fit: Fitting) -> SimulatedOdometry:
     base, imu = fit.get(SimulatedBase), fit.get(SimulatedImu)
-    odometry = SimulatedOdometry(fit.body[OdometrySection], base, imu, fit.chance("odometry"), fit.hull.seat)
+    odometry = SimulatedOdometry(fit.body[OdometrySection], base, imu, fit.chance("odometry"), fit.hull.robot_rows)
     fit.world.chances.on_reseed(odometry.forget_noise)
     return odometry
 
@@ -181,5 +190,5 @@ PART = Part(
     fit=_fit,
     after=("base", "imu"),
     sense=SimulatedOdometry.sense,
-    together=_together,
+    sense_all=_sense_all,
 )

@@ -9,8 +9,8 @@ import pytest
 from roboglot.model.components.motion.base import Base
 from roboglot.model.errors import Collided
 from roboglot.model.geometry import Pose, Twist, Vector3
-from roboglot.simulation.world.contact_switch import Meetings
-from roboglot.simulation.world.gliding import Gliding
+from roboglot.simulation.world.contact_switch import ContactSwitch
+from roboglot.simulation.world.free_motion import FreeMotion
 
 from .conftest import Simulate, Simulation
 
@@ -48,9 +48,9 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
 async def test_skipped_contact_searches_miss_no_contact(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
     simulation = simulate("office", robots=("a", "b"), seed=3)
     simulation.world._physics.load_kernels()
-    monkeypatch.setattr(Gliding, "step", lambda *_: False)  # equals MuJoCo's steps up to rounding only
+    monkeypatch.setattr(FreeMotion, "step", lambda *_: False)  # equals MuJoCo's steps up to rounding only
     sparing, calm, touched = await lived(simulation)
-    monkeypatch.setattr(Meetings, "look", lambda *_, **__: None)
+    monkeypatch.setattr(ContactSwitch, "look", lambda *_, **__: None)
     thorough, always, _ = await lived(simulate("office", robots=("a", "b"), seed=3))
     assert sparing == thorough
     assert calm > 50
@@ -78,7 +78,7 @@ async def test_robot_in_its_dock_sleeps(simulate: Simulate) -> None:
     await simulation.world.prepare(wait=True)
     simulation.world.start()
     await simulation.clock.advance(2.0)
-    assert physics._meetings.off
+    assert physics._contact_switch.off
     assert physics._sleep.lasts
 
 
@@ -87,7 +87,7 @@ async def test_robot_at_rest_feels_obstacles(simulate: Simulate) -> None:
     simulation.world._physics.load_kernels()
     simulation.world.start()
     await simulation.clock.advance(1.0)
-    assert simulation.world._physics._meetings.off
+    assert simulation.world._physics._contact_switch.off
     radius = simulation.robot.description.radius
     simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(radius + 0.095)), (0.2, 0.2, 0.5))
     await simulation.clock.advance(0.04)

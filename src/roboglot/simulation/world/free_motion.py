@@ -28,13 +28,13 @@ MARGIN = 0.012  # m around each robot: covers contacts beyond the shapes, and wh
 
 @dataclass(frozen=True, slots=True)
 class _Kernels:
-    """The compiled functions of ``kernels/gliding.py``."""
+    """The compiled functions of ``kernels/free_motion.py``."""
 
     clear: Callable[..., bool]
-    glide: Callable[..., bool]
+    advance: Callable[..., bool]
 
 
-class Gliding:
+class FreeMotion:
     """All robots of a world; its floors are level, and only robots and a lift's car move.
 
     ``scene``, ``geoms``, ``state``, ``servos`` and ``settings`` are what ``kernels/ticks.py`` takes.
@@ -80,9 +80,9 @@ class Gliding:
     def load_kernels(self) -> None:
         """Compute with the compiled kernels from now on."""
         with loading():
-            from roboglot.kernels import gliding
+            from roboglot.kernels import free_motion
 
-        self._kernels = _Kernels(gliding.clear, gliding.glide)
+        self._kernels = _Kernels(free_motion.clear, free_motion.advance)
 
     @property
     def loaded(self) -> bool:
@@ -99,7 +99,7 @@ class Gliding:
 
     def step(self, steps: int) -> bool:
         """Advance robots that are clear by so many steps of the physics; return False if only MuJoCo can."""
-        return self._kernels is not None and self.free and self._kernels.glide(*self._motion, steps)
+        return self._kernels is not None and self.free and self._kernels.advance(*self._motion, steps)
 
     @property
     def parted(self) -> bool:

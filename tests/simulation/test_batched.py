@@ -43,7 +43,7 @@ async def sensed(*, together: bool) -> list[str]:
     for robot in robots:
         world.equip(robot)
     if together:
-        world._physics.rows.load_kernels()
+        world._physics.tables.load_kernels()
     happenings = {
         1: lambda: world.hands.push("a", Vector3(30.0, 10.0, 5.0)),
         2: lambda: world.hands.lift("h", 0.2),
@@ -82,11 +82,11 @@ def _command(robot: Robot, command: Twist | WheelSpeeds) -> None:
         pass  # locked, or a bumper is pressed
 
 
-@pytest.mark.parametrize("name", [part.name for part in parts() if part.together is not None])
+@pytest.mark.parametrize("name", [part.name for part in parts() if part.sense_all is not None])
 def test_part_sensed_together_needs_none_sensed_later(name: str) -> None:
     by_name = {part.name: part for part in parts()}
     before = [by_name[other] for other in by_name[name].after]
-    assert all(part.sense is None or part.together is not None for part in before)
+    assert all(part.sense is None or part.sense_all is not None for part in before)
 
 
 async def test_robots_computed_together_sense_what_each_would_alone() -> None:
@@ -99,7 +99,7 @@ def test_a_robot_may_join_within_a_tick() -> None:
     world = World(load_world("office"), [RobotPlacement(name, body) for name, body in BODIES.items()], clock=clock)
     robots = [Robot(name, world.description_of(name), clock) for name in BODIES]
     world.equip(robots[0])
-    world._physics.rows.load_kernels()
+    world._physics.tables.load_kernels()
     for joining in robots[1:]:
         steps = world._tick()
         next(steps)

@@ -1,7 +1,7 @@
-"""A tick's arithmetic of all robots of a world at once. Compiled twins of the simulation's own functions.
+"""One tick for all robots of a world at once: compiled twins of functions of the simulated parts.
 
-They give the same numbers, to the last bit: the order of every operation is that of the twin. Rows whose robot is
-in an unusual state are left as they are and listed in ``others``, for the twin; the answer is how many are.
+They compute the same numbers as their twins, to the last bit: every operation is in the same order. A robot in an
+unusual state is left alone: its row is listed in ``others``, for the twin, and the kernel returns how many are listed.
 Columns are those of ``layouts``.
 """
 
@@ -12,46 +12,44 @@ import math
 from roboglot.kernels.arrays import FloatArray, IntArray
 from roboglot.kernels.compiled import kernel
 from roboglot.kernels.layouts import (
-    ALONE,
+    BATCHED,
     CONTACT_ANGLE,
     CONTACT_DISTANCE,
     CONTACT_MADE,
     GIMBAL_ACCELERATION,
     GIMBAL_HIGHEST,
+    GIMBAL_HULL_TURNS,
+    GIMBAL_HULL_YAW,
     GIMBAL_LOWEST,
     GIMBAL_RATE,
-    GIMBAL_SINCE,
-    GIMBAL_TOP,
-    GIMBAL_TURNED,
+    GIMBAL_SPEED_MAX,
     GIMBAL_YAW,
     HULL_A,
-    HULL_ANGULAR,
-    HULL_BEFORE,
-    HULL_BELLY,
-    HULL_COUNTED,
+    HULL_ANGULAR_STEP,
     HULL_DRIVE_X,
     HULL_DRIVE_Y,
     HULL_DRIVE_YAW,
     HULL_FLOOR,
-    HULL_FREE,
-    HULL_GAZE_YAW,
+    HULL_FLOOR_CHECK_Z,
+    HULL_GIMBAL_YAW,
     HULL_GOAL_X,
     HULL_GOAL_Y,
     HULL_GOAL_YAW,
     HULL_HELD,
-    HULL_LEANS,
-    HULL_LINEAR,
-    HULL_LOOKED_X,
-    HULL_LOOKED_Y,
+    HULL_LAST_V,
+    HULL_LINEAR_STEP,
+    HULL_LOOKUP_RANGE,
+    HULL_LOOKUP_X,
+    HULL_LOOKUP_Y,
+    HULL_ON_SPRING,
     HULL_Q,
     HULL_RADIUS,
-    HULL_REST,
-    HULL_SINKING,
-    HULL_SLACK,
-    HULL_SPRUNG,
+    HULL_REST_Z,
+    HULL_TILTED,
     HULL_TORSO,
-    HULL_TURN,
-    HULL_TURNED,
+    HULL_TORSO_V,
+    HULL_UNDERSIDE,
+    HULL_UNDRIVEN,
     HULL_V,
     HULL_VX,
     HULL_VY,
@@ -61,43 +59,45 @@ from roboglot.kernels.layouts import (
     HULL_WHEEL_YAW,
     HULL_X,
     HULL_Y,
+    HULL_YAW,
+    HULL_YAW_RATE,
     HULL_Z,
-    IMU_AT,
-    IMU_FELT_X,
-    IMU_FELT_Y,
-    IMU_FELT_Z,
-    IMU_LEANT,
-    IMU_MX,
-    IMU_MY,
-    IMU_MZ,
+    IMU_AX,
+    IMU_AY,
+    IMU_AZ,
+    IMU_HULL_VX,
+    IMU_HULL_VY,
+    IMU_HULL_VZ,
+    IMU_HULL_YAW,
+    IMU_NEXT_NOISE,
     IMU_NOISES,
     IMU_RATE,
     IMU_RATES,
     IMU_SCALE,
     IMU_STAMP,
-    IMU_TURNED,
+    IMU_TILTED,
     IMU_YAW,
-    ODOMETRY_AT,
+    ODOMETRY_NEXT_NOISE,
     ODOMETRY_NOISE,
     ODOMETRY_NOISES,
     ODOMETRY_SCALE_X,
     ODOMETRY_SCALE_Y,
     ODOMETRY_STATE,
     ODOMETRY_STILL,
-    STATUS_BLOW,
-    STATUS_BLOWS,
+    SINGLE,
+    STATUS_IMPACT_MIN,
+    STATUS_IMPACTS,
     STATUS_SLIPPING,
     STATUS_STAMP,
-    TOGETHER,
     USE,
 )
 
 
 @kernel("boolean(float64[::1], float64)")
-def still(numbers: FloatArray, least: float) -> bool:
-    """Return whether none of ``numbers`` is further from 0 than ``least``; False if there are none."""
+def all_below(numbers: FloatArray, limit: float) -> bool:
+    """Return whether all ``numbers`` are within ``limit`` of 0; False if there are none."""
     for number in numbers:
-        if not -least <= number <= least:
+        if not -limit <= number <= limit:
             return False
     return len(numbers) > 0
 
@@ -106,12 +106,12 @@ def still(numbers: FloatArray, least: float) -> bool:
 def _approach(row: FloatArray) -> None:
     """Bring the wheels' velocity a step nearer to its goal, as ``SimulatedBase`` does."""
     dx, dy = row[HULL_GOAL_X] - row[HULL_WHEEL_X], row[HULL_GOAL_Y] - row[HULL_WHEEL_Y]
-    dyaw, linear, angular = row[HULL_GOAL_YAW] - row[HULL_WHEEL_YAW], row[HULL_LINEAR], row[HULL_ANGULAR]
+    dyaw, linear, angular = row[HULL_GOAL_YAW] - row[HULL_WHEEL_YAW], row[HULL_LINEAR_STEP], row[HULL_ANGULAR_STEP]
     way = math.sqrt(dx * dx + dy * dy)
     if way <= linear and abs(dyaw) <= angular:
         for k in range(3):
             row[HULL_WHEEL_X + k] = row[HULL_GOAL_X + k]
-        row[HULL_LINEAR] = row[HULL_ANGULAR] = 0.0
+        row[HULL_LINEAR_STEP] = row[HULL_ANGULAR_STEP] = 0.0
     else:
         part = min(1.0, linear / way) if way > 0.0 else 1.0
         row[HULL_WHEEL_X] += dx * part
@@ -122,10 +122,10 @@ def _approach(row: FloatArray) -> None:
 
 
 @kernel("void(float64[:,::1], float64[::1], float64)")
-def drive(hulls: FloatArray, controls: FloatArray, seconds: float) -> None:
+def drive_wheels(hulls: FloatArray, controls: FloatArray, seconds: float) -> None:
     """Turn the wheels of all hulls as commanded: write the physics' ``controls`` for the next ``seconds``."""
     for i in range(hulls.shape[0]):
-        if hulls[i, HULL_LINEAR] > 0.0:
+        if hulls[i, HULL_LINEAR_STEP] > 0.0:
             _approach(hulls[i])
         first = int(hulls[i, HULL_A])
         if hulls[i, HULL_HELD] != 0.0:
@@ -133,16 +133,16 @@ def drive(hulls: FloatArray, controls: FloatArray, seconds: float) -> None:
             continue
         vx, vy, turn = hulls[i, HULL_DRIVE_X], hulls[i, HULL_DRIVE_Y], hulls[i, HULL_DRIVE_YAW]
         if vx != 0.0 or vy != 0.0:
-            yaw = hulls[i, HULL_TURNED] + turn * seconds / 2
+            yaw = hulls[i, HULL_YAW] + turn * seconds / 2
             c, s = math.cos(yaw), math.sin(yaw)
             vx, vy = c * vx - s * vy, s * vx + c * vy
         controls[first], controls[first + 1], controls[first + 2] = vx, vy, turn
 
 
 @kernel("void(float64[::1], float64, float64, float64, float64)")
-def _trail(row: FloatArray, way: float, pull: float, settled: float, seconds: float) -> None:
+def _trail_yaw(row: FloatArray, way: float, pull: float, settled: float, seconds: float) -> None:
     """Shift a gimbal's yaw by ``way``, then return to the middle: ``Axis.trail``."""
-    low, high, top = row[GIMBAL_LOWEST], row[GIMBAL_HIGHEST], row[GIMBAL_TOP]
+    low, high, top = row[GIMBAL_LOWEST], row[GIMBAL_HIGHEST], row[GIMBAL_SPEED_MAX]
     position, rate = row[GIMBAL_YAW] + way, row[GIMBAL_RATE]
     if not low <= position <= high:
         position, rate = (low if position < low else high), 0.0
@@ -160,56 +160,58 @@ def _trail(row: FloatArray, way: float, pull: float, settled: float, seconds: fl
 
 
 @kernel("int64(float64[:,::1], float64[:,::1], float64, float64, float64, int64[::1])")
-def follow(
+def turn_gimbals(
     hulls: FloatArray, gimbals: FloatArray, pull: float, settled: float, seconds: float, others: IntArray
 ) -> int:
-    """Turn the gimbals of level robots after their bodies, where nothing aims them."""
+    """Turn the gimbals of level robots after their bodies, unless they have an aim."""
     count = 0
     for i in range(hulls.shape[0]):
         if gimbals[i, USE] == 0.0:
             continue
-        if gimbals[i, USE] == ALONE or hulls[i, HULL_LEANS] != 0.0:
+        if gimbals[i, USE] == SINGLE or hulls[i, HULL_TILTED] != 0.0:
             others[count] = i
             count += 1
             continue
-        turned = hulls[i, HULL_TURNED]
-        turn = turned - gimbals[i, GIMBAL_TURNED]
-        gimbals[i, GIMBAL_TURNED] = turned
-        gimbals[i, GIMBAL_SINCE] += turn
-        _trail(gimbals[i], -turn, pull, settled, seconds)
-        hulls[i, HULL_GAZE_YAW] = gimbals[i, GIMBAL_YAW]
+        turned = hulls[i, HULL_YAW]
+        turn = turned - gimbals[i, GIMBAL_HULL_YAW]
+        gimbals[i, GIMBAL_HULL_YAW] = turned
+        gimbals[i, GIMBAL_HULL_TURNS] += turn
+        _trail_yaw(gimbals[i], -turn, pull, settled, seconds)
+        hulls[i, HULL_GIMBAL_YAW] = gimbals[i, GIMBAL_YAW]
     return count
 
 
 @kernel("int64(float64[:,::1], float64[::1], float64[::1], float64, float64, int64[::1])")
-def see(
+def read_motion(
     hulls: FloatArray, positions: FloatArray, velocities: FloatArray, storey: float, lifted: float, others: IntArray
 ) -> int:
-    """Read pose and motion of the hulls that stand on springs, clear of all that they have to look at."""
+    """Read pose and motion of the hulls on springs, as long as they are within range of their last search for walls."""
     count = 0
     for i in range(hulls.shape[0]):
         q, v = int(hulls[i, HULL_Q]), int(hulls[i, HULL_V])
         x, y, z = positions[q], positions[q + 1], positions[q + 2]
-        usual = hulls[i, HULL_SPRUNG] != 0.0
-        usual = usual and -storey <= z - hulls[i, HULL_COUNTED] <= storey
-        usual = usual and abs(x - hulls[i, HULL_LOOKED_X]) + abs(y - hulls[i, HULL_LOOKED_Y]) <= hulls[i, HULL_FREE]
-        if not (usual and -lifted <= z - hulls[i, HULL_REST] <= lifted):
+        usual = hulls[i, HULL_ON_SPRING] != 0.0
+        usual = usual and -storey <= z - hulls[i, HULL_FLOOR_CHECK_Z] <= storey
+        usual = (
+            usual and abs(x - hulls[i, HULL_LOOKUP_X]) + abs(y - hulls[i, HULL_LOOKUP_Y]) <= hulls[i, HULL_LOOKUP_RANGE]
+        )
+        if not (usual and -lifted <= z - hulls[i, HULL_REST_Z] <= lifted):
             others[count] = i
             count += 1
             continue
-        hulls[i, HULL_X], hulls[i, HULL_Y], hulls[i, HULL_Z], hulls[i, HULL_TURNED] = x, y, z, positions[q + 3]
+        hulls[i, HULL_X], hulls[i, HULL_Y], hulls[i, HULL_Z], hulls[i, HULL_YAW] = x, y, z, positions[q + 3]
         for k in range(4):
-            hulls[i, HULL_BEFORE + k] = hulls[i, HULL_VX + k]
+            hulls[i, HULL_LAST_V + k] = hulls[i, HULL_VX + k]
             hulls[i, HULL_VX + k] = velocities[v + k]
         torso = int(hulls[i, HULL_TORSO])
         if torso >= 0:
-            hulls[i, HULL_BELLY] = positions[torso]
-            hulls[i, HULL_VZ] += velocities[int(hulls[i, HULL_SINKING])]
+            hulls[i, HULL_UNDERSIDE] = positions[torso]
+            hulls[i, HULL_VZ] += velocities[int(hulls[i, HULL_TORSO_V])]
     return count
 
 
 @kernel("int64(float64[:,::1], float64[:,::1], float64[:,::1], float64, float64, float64, int64[::1])")
-def measure(
+def measure_imus(
     hulls: FloatArray,
     imus: FloatArray,
     noises: FloatArray,
@@ -218,52 +220,52 @@ def measure(
     gravity: float,
     others: IntArray,
 ) -> int:
-    """Measure with the IMUs of level robots that have noise left."""
+    """Measure with the IMUs of robots that are level and have noise left in ``noises``."""
     count, drawn = 0, noises.shape[1]
     for i in range(hulls.shape[0]):
         if imus[i, USE] == 0.0:
             continue
-        turned, at = hulls[i, HULL_TURNED], int(imus[i, IMU_AT])
-        alone = imus[i, USE] == ALONE or hulls[i, HULL_LEANS] != 0.0 or imus[i, IMU_LEANT] != 0.0 or at >= drawn
+        turned, at = hulls[i, HULL_YAW], int(imus[i, IMU_NEXT_NOISE])
+        alone = imus[i, USE] == SINGLE or hulls[i, HULL_TILTED] != 0.0 or imus[i, IMU_TILTED] != 0.0 or at >= drawn
         rate = yaw = 0.0
         if not alone:
-            rate = (turned - imus[i, IMU_TURNED]) / seconds * imus[i, IMU_SCALE] + noises[i, at + 2]
+            rate = (turned - imus[i, IMU_HULL_YAW]) / seconds * imus[i, IMU_SCALE] + noises[i, at + 2]
             yaw = imus[i, IMU_YAW] + rate * seconds
             alone = not -math.pi < yaw <= math.pi
         if alone:
             others[count] = i
             count += 1
             continue
-        imus[i, IMU_AT] = at + IMU_NOISES
-        imus[i, IMU_RATE], imus[i, IMU_YAW], imus[i, IMU_TURNED] = rate, yaw, turned
+        imus[i, IMU_NEXT_NOISE] = at + IMU_NOISES
+        imus[i, IMU_RATE], imus[i, IMU_YAW], imus[i, IMU_HULL_YAW] = rate, yaw, turned
         vx, vy, vz = hulls[i, HULL_VX], hulls[i, HULL_VY], hulls[i, HULL_VZ]
-        ax, ay = (vx - imus[i, IMU_MX]) / seconds, (vy - imus[i, IMU_MY]) / seconds
-        az = (vz - imus[i, IMU_MZ]) / seconds
-        imus[i, IMU_MX], imus[i, IMU_MY], imus[i, IMU_MZ] = vx, vy, vz
+        ax, ay = (vx - imus[i, IMU_HULL_VX]) / seconds, (vy - imus[i, IMU_HULL_VY]) / seconds
+        az = (vz - imus[i, IMU_HULL_VZ]) / seconds
+        imus[i, IMU_HULL_VX], imus[i, IMU_HULL_VY], imus[i, IMU_HULL_VZ] = vx, vy, vz
         c, s = math.cos(turned), math.sin(turned)
-        imus[i, IMU_FELT_X] = c * ax + s * ay + noises[i, at + 3]
-        imus[i, IMU_FELT_Y] = c * ay - s * ax + noises[i, at + 4]
-        imus[i, IMU_FELT_Z] = az + gravity + noises[i, at + 5]
+        imus[i, IMU_AX] = c * ax + s * ay + noises[i, at + 3]
+        imus[i, IMU_AY] = c * ay - s * ax + noises[i, at + 4]
+        imus[i, IMU_AZ] = az + gravity + noises[i, at + 5]
         imus[i, IMU_STAMP] = stamp
         imus[i, IMU_RATES], imus[i, IMU_RATES + 1] = noises[i, at], noises[i, at + 1]
-        imus[i, IMU_RATES + 2] = hulls[i, HULL_TURN] * imus[i, IMU_SCALE] + noises[i, at + 2]
+        imus[i, IMU_RATES + 2] = hulls[i, HULL_YAW_RATE] * imus[i, IMU_SCALE] + noises[i, at + 2]
     return count
 
 
 @kernel("boolean(float64[:,::1], int64, float64, float64)")
 def _slips(hulls: FloatArray, i: int, speed_square: float, turn_rate: float) -> bool:
     """Return whether a body's motion differs from that of its wheels."""
-    vx, vy, turn = hulls[i, HULL_VX], hulls[i, HULL_VY], hulls[i, HULL_TURN]
+    vx, vy, turn = hulls[i, HULL_VX], hulls[i, HULL_VY], hulls[i, HULL_YAW_RATE]
     if not -turn_rate <= turn - hulls[i, HULL_WHEEL_YAW] <= turn_rate:
         return True
-    c, s = math.cos(hulls[i, HULL_TURNED]), math.sin(hulls[i, HULL_TURNED])
+    c, s = math.cos(hulls[i, HULL_YAW]), math.sin(hulls[i, HULL_YAW])
     off_x = c * vx + s * vy - hulls[i, HULL_WHEEL_X]
     off_y = c * vy - s * vx - hulls[i, HULL_WHEEL_Y]
     return bool(off_x * off_x + off_y * off_y > speed_square)
 
 
 @kernel("int64(float64[:,::1], float64[:,::1], float64[:,::1], float64, float64, float64, float64, int64[::1])")
-def watch(
+def watch_motion(
     hulls: FloatArray,
     imus: FloatArray,
     statuses: FloatArray,
@@ -273,23 +275,23 @@ def watch(
     turn_rate: float,
     others: IntArray,
 ) -> int:
-    """Watch for blows and slip of robots whose wheels turn as their motors."""
+    """Watch for impacts and slip of robots whose wheels are all driven."""
     count = 0
     for i in range(hulls.shape[0]):
         if statuses[i, USE] == 0.0:
             continue
-        if statuses[i, USE] == ALONE or hulls[i, HULL_SLACK] != 0.0:
+        if statuses[i, USE] == SINGLE or hulls[i, HULL_UNDRIVEN] != 0.0:
             others[count] = i
             count += 1
             continue
-        blow = statuses[i, STATUS_BLOW]
+        blow = statuses[i, STATUS_IMPACT_MIN]
         statuses[i, STATUS_STAMP] = stamp
-        if not -blow <= imus[i, IMU_FELT_X] <= blow:
-            statuses[i, STATUS_BLOWS] = stamp
-        if not -blow <= imus[i, IMU_FELT_Y] <= blow:
-            statuses[i, STATUS_BLOWS + 1] = stamp
-        if abs(abs(imus[i, IMU_FELT_Z]) - gravity) > blow:
-            statuses[i, STATUS_BLOWS + 2] = stamp
+        if not -blow <= imus[i, IMU_AX] <= blow:
+            statuses[i, STATUS_IMPACTS] = stamp
+        if not -blow <= imus[i, IMU_AY] <= blow:
+            statuses[i, STATUS_IMPACTS + 1] = stamp
+        if abs(abs(imus[i, IMU_AZ]) - gravity) > blow:
+            statuses[i, STATUS_IMPACTS + 2] = stamp
         vx, vy = hulls[i, HULL_VX], hulls[i, HULL_VY]
         turns = hulls[i, HULL_WHEEL_X] != 0.0 or hulls[i, HULL_WHEEL_Y] != 0.0 or hulls[i, HULL_WHEEL_YAW] != 0.0
         moves = turns or vx * vx + vy * vy > speed_square
@@ -308,7 +310,7 @@ def dead_reckon(
     seconds: float,
     others: IntArray,
 ) -> int:
-    """Add a tick to the odometry of robots that stand, or drive and have noise left."""
+    """Add a tick to the odometry of robots that stand, or that drive and have noise left in ``noises``."""
     count, drawn = 0, noises.shape[1]
     for i in range(hulls.shape[0]):
         row = odometries[i]
@@ -318,9 +320,9 @@ def dead_reckon(
         drives = wheel_x != 0.0 or wheel_y != 0.0
         if not drives and hulls[i, HULL_WHEEL_YAW] == 0.0 and abs(rate) < row[ODOMETRY_STILL]:
             rate = 0.0
-        at, yaw = int(row[ODOMETRY_AT]), row[ODOMETRY_STATE + 3]
+        at, yaw = int(row[ODOMETRY_NEXT_NOISE]), row[ODOMETRY_STATE + 3]
         turned = yaw + rate * seconds if rate != 0.0 else yaw
-        usual = row[USE] == TOGETHER and hulls[i, HULL_SLACK] == 0.0
+        usual = row[USE] == BATCHED and hulls[i, HULL_UNDRIVEN] == 0.0
         if not (usual and (not drives or at < drawn) and -math.pi < turned <= math.pi):
             others[count] = i
             count += 1
@@ -329,7 +331,7 @@ def dead_reckon(
         if drives:
             vx = wheel_x * (row[ODOMETRY_SCALE_X] + row[ODOMETRY_NOISE] * noises[i, at])
             vy = wheel_y * (row[ODOMETRY_SCALE_Y] + row[ODOMETRY_NOISE] * noises[i, at + 1])
-            row[ODOMETRY_AT] = at + ODOMETRY_NOISES
+            row[ODOMETRY_NEXT_NOISE] = at + ODOMETRY_NOISES
             middle = yaw + rate * seconds / 2
             c, s = math.cos(middle), math.sin(middle)
             row[ODOMETRY_STATE + 1] += (c * vx - s * vy) * seconds
@@ -341,8 +343,8 @@ def dead_reckon(
 
 
 @kernel("int64(float64[:,::1], float64[:,::1], float64[:,::1], int64[::1])")
-def touch(hulls: FloatArray, contacts: FloatArray, docks: FloatArray, others: IntArray) -> int:
-    """List the robots whose rear has come to a dock or left it."""
+def find_docks(hulls: FloatArray, contacts: FloatArray, docks: FloatArray, others: IntArray) -> int:
+    """List the robots whose rear contacts have come to a dock or left it."""
     count = 0
     for i in range(hulls.shape[0]):
         if contacts[i, USE] == 0.0:
@@ -359,7 +361,7 @@ def touch(hulls: FloatArray, contacts: FloatArray, docks: FloatArray, others: In
             )
             if abs(c * dx + s * dy - hulls[i, HULL_RADIUS]) > near or abs(c * dy - s * dx) > near:
                 continue
-            turn = hulls[i, HULL_TURNED] - docks[dock, 4]
+            turn = hulls[i, HULL_YAW] - docks[dock, 4]
             turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
             made = made or abs(turn) <= contacts[i, CONTACT_ANGLE]
         if made != (contacts[i, CONTACT_MADE] != 0.0):

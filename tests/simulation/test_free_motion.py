@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from roboglot.kernels.layouts import HULL_LOOKED_X, HULL_LOOKED_Y, HULL_WALLS
+from roboglot.kernels.layouts import HULL_LOOKUP_X, HULL_LOOKUP_Y, HULL_WALLS
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.legs import Legs
@@ -46,8 +46,8 @@ async def test_gliding_equals_the_physics_of_mujoco() -> None:
     physics.load_kernels()
     world.start()
     await clock.advance(0.5)
-    gliding, data, model = physics._gliding, physics._data, copy.copy(physics._model)
-    assert gliding is not None
+    free_motion, data, model = physics._free_motion, physics._data, copy.copy(physics._model)
+    assert free_motion is not None
     model.opt.disableflags |= NO_CONTACTS
     glided = 0
     for tick in range(200):
@@ -62,7 +62,7 @@ async def test_gliding_equals_the_physics_of_mujoco() -> None:
                 )
         expected = copy.copy(data)
         mujoco.mj_step(model, expected, nstep=STEPS)
-        if gliding.step(STEPS):
+        if free_motion.step(STEPS):
             glided += 1
         else:  # a torso at its stops
             mujoco.mj_step(model, data, nstep=STEPS)
@@ -121,11 +121,11 @@ async def test_distance_of_walls_is_never_overrated(simulate: Simulate) -> None:
         for _ in range(60):
             physics._data.qpos[:2] += 0.02 * np.cos(way), 0.02 * np.sin(way)
             hull.look()
-            gone = abs(hull.x - row[HULL_LOOKED_X]) + abs(hull.y - row[HULL_LOOKED_Y])
+            gone = abs(hull.x - row[HULL_LOOKUP_X]) + abs(hull.y - row[HULL_LOOKUP_Y])
             assert row[HULL_WALLS] - gone <= physics.walls.room(hull.x, hull.y, 0) + 1e-9
 
 
-async def story(seed: int, *, glides: bool) -> list[list[tuple[bool, float, float]]]:
+async def story(seed: int, *, moves_freely: bool) -> list[list[tuple[bool, float, float]]]:
     """Return touches and places by tick and robot, while robots drive and hands do all they can."""
     clock, dice = LockstepClock(), random.Random(seed)
     names = {f"r{index}": dice.choice(BODIES) for index in range(dice.randint(1, 3))}
@@ -133,11 +133,11 @@ async def story(seed: int, *, glides: bool) -> list[list[tuple[bool, float, floa
     for name in names:
         world.equip(Robot(name, world.description_of(name), clock))
     physics, hands = world._physics, world.own_hands
-    physics.rows.load_kernels()
-    if glides:
+    physics.tables.load_kernels()
+    if moves_freely:
         physics.load_kernels()
     else:
-        physics._gliding = physics._meetings._gliding = None
+        physics._free_motion = physics._contact_switch._free_motion = None
     world.start()
     seen = []
     for tick in range(500):
@@ -164,9 +164,9 @@ async def story(seed: int, *, glides: bool) -> list[list[tuple[bool, float, floa
 
 @pytest.mark.parametrize("seed", [3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 15))])
 async def test_touches_are_those_of_mujoco(seed: int) -> None:
-    gliding, stepping = await story(seed, glides=True), await story(seed, glides=False)
+    free_motion, stepping = await story(seed, moves_freely=True), await story(seed, moves_freely=False)
     assert any(touches for tick in stepping for touches, _, _ in tick)
-    for glided, stepped in zip(gliding, stepping, strict=True):
+    for glided, stepped in zip(free_motion, stepping, strict=True):
         assert [touches for touches, _, _ in glided] == [touches for touches, _, _ in stepped]
         assert np.allclose(glided, stepped, rtol=0.0, atol=1e-3)
 

@@ -18,14 +18,14 @@ from roboglot.kernels.layouts import (
     HULL_DRIVE_Y,
     HULL_FLOOR,
     HULL_HELD,
-    HULL_LOOKED_X,
-    HULL_LOOKED_Y,
+    HULL_LOOKUP_X,
+    HULL_LOOKUP_Y,
+    HULL_ON_SPRING,
     HULL_Q,
     HULL_RADIUS,
-    HULL_SERVO,
-    HULL_SINKING,
-    HULL_SPRUNG,
     HULL_TORSO,
+    HULL_TORSO_CONTROL,
+    HULL_TORSO_V,
     HULL_V,
     HULL_VX,
     HULL_VY,
@@ -64,7 +64,7 @@ def _meet_walls(hulls: FloatArray, reach: FloatArray, rests: FloatArray, walls: 
         if rests[i] != 0.0:
             continue
         x, y = hulls[i, HULL_X], hulls[i, HULL_Y]
-        if hulls[i, HULL_WALLS] - abs(x - hulls[i, HULL_LOOKED_X]) - abs(y - hulls[i, HULL_LOOKED_Y]) > reach[i]:
+        if hulls[i, HULL_WALLS] - abs(x - hulls[i, HULL_LOOKUP_X]) - abs(y - hulls[i, HULL_LOOKUP_Y]) > reach[i]:
             continue
         for w in range(walls.shape[0]):
             if walls[w, 6] == hulls[i, HULL_FLOOR]:
@@ -138,7 +138,7 @@ def clear(
     robots = hulls.shape[0]
     reach, rests = np.empty(robots), np.empty(robots)
     for i in range(robots):
-        if hulls[i, HULL_SPRUNG] == 0.0:
+        if hulls[i, HULL_ON_SPRING] == 0.0:
             return False
         vx, vy = hulls[i, HULL_VX], hulls[i, HULL_VY]
         reach[i] = hulls[i, HULL_RADIUS] + margin + seconds * math.sqrt(vx * vx + vy * vy)
@@ -178,7 +178,7 @@ def _yield_of(a: int, force: float, biases: FloatArray, limits: FloatArray) -> f
     " float64[::1], float64[:,::1], float64[::1], float64[::1], float64[::1], float64[:,::1], float64[:,::1],"
     " float64[:,::1], float64, float64, int64)"
 )
-def glide(
+def advance(
     hulls: FloatArray,
     uprights: FloatArray,
     positions: FloatArray,
@@ -205,7 +205,7 @@ def glide(
     """
     for i in range(hulls.shape[0]):
         q, v, t = int(hulls[i, HULL_Q]) + 2, int(hulls[i, HULL_V]) + 2, int(hulls[i, HULL_TORSO])
-        sinking, servo = int(hulls[i, HULL_SINKING]), int(hulls[i, HULL_SERVO])
+        sinking, servo = int(hulls[i, HULL_TORSO_V]), int(hulls[i, HULL_TORSO_CONTROL])
         z, vz, az, torso, vt, at, force = positions[q], velocities[v], 0.0, 0.0, 0.0, 0.0, 0.0
         whole, part, stiff, soft = masses[v], 0.0, stiffness[v], damping[v]
         if t >= 0:
@@ -231,9 +231,9 @@ def glide(
         q, v, t, row = int(hulls[i, HULL_Q]), int(hulls[i, HULL_V]), int(hulls[i, HULL_TORSO]), uprights[i]
         positions[q + 2], velocities[v + 2], accelerations[v + 2] = row[0], row[1], row[2]
         if t >= 0:
-            sinking = int(hulls[i, HULL_SINKING])
+            sinking = int(hulls[i, HULL_TORSO_V])
             positions[t], velocities[sinking], accelerations[sinking] = row[3], row[4], row[5]
-            forces[int(hulls[i, HULL_SERVO])] = row[6]
+            forces[int(hulls[i, HULL_TORSO_CONTROL])] = row[6]
         for k in range(3):
             axis, a = (3 if k == 2 else k), int(hulls[i, HULL_A]) + k
             place, rate, mass, acceleration = positions[q + axis], velocities[v + axis], masses[v + axis], 0.0

@@ -1,4 +1,4 @@
-"""A tick of all robots of a world: first parts computed together, kind by kind, then robot by robot."""
+"""A tick of all robots of a world: first parts computed for all robots at once, then robot by robot."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from heapq import heappop, heappush
 
 from roboglot.simulation.bodies.assembly import SimulatedRobot
 from roboglot.simulation.bodies.part import parts
-from roboglot.simulation.bodies.rows import Rows, SharedControl, SharedSense
 from roboglot.simulation.bodies.schedule import Schedule
+from roboglot.simulation.bodies.tables import BatchedControl, BatchedSense, RobotTables
 
 LAST = 1 << 60  # after all
 
 
-class Agenda:
+class DueSchedules:
     """Finds the schedules with something due in a tick, in their order, without looking at the others.
 
     ``number`` is the index of a schedule. ``before``: for each schedule, the world's tick before its first one.
@@ -70,21 +70,21 @@ class Agenda:
         self._booked[number] = later
 
 
-class Rounds:
+class RobotTicks:
     """Control and sensing of the robots. ``tick``: s.
 
-    ``controls`` and ``senses``: functions for all robots together, in every tick; the caller runs ``senses``.
+    ``controls`` and ``senses``: functions for all robots at once, in every tick; the caller runs ``senses``.
     """
 
-    def __init__(self, rows: Rows, tick: float) -> None:
-        self._rows, self._tick = rows, tick
+    def __init__(self, tables: RobotTables, tick: float) -> None:
+        self._tables, self._tick = tables, tick
         self._robots: tuple[SimulatedRobot, ...] = ()
-        self.controls: list[SharedControl] = []
-        self.senses: list[SharedSense] = []
+        self.controls: list[BatchedControl] = []
+        self.senses: list[BatchedSense] = []
         self._ahead: list[Callable[[int], None]] = []
         self.gathered = 0  # number of times that these were made
         self._ticks = 0
-        self._controlled = self._sensed = Agenda((), (), 0)
+        self._controlled = self._sensed = DueSchedules((), (), 0)
 
     def control(self, robots: tuple[SimulatedRobot, ...], *, lean: bool = False) -> bool:
         """Run all control of the next tick, before its physics; if ``lean``, only if a robot has something due.
@@ -143,18 +143,18 @@ class Rounds:
         self.senses.clear()
         self._ahead.clear()
         for part in parts():
-            if part.control_together is not None:
-                moved = [its for robot in robots if (its := robot.control_together(part.name)) is not None]
-                self.controls.append(part.control_together(self._rows, moved))
-            if part.together is not None:
-                found = [one for robot in robots if (one := robot.together(part.name)) is not None]
-                self.senses.append(part.together(self._rows, found))
+            if part.control_all is not None:
+                moved = [its for robot in robots if (its := robot.batched_control(part.name)) is not None]
+                self.controls.append(part.control_all(self._tables, moved))
+            if part.sense_all is not None:
+                found = [one for robot in robots if (one := robot.batched_sense(part.name)) is not None]
+                self.senses.append(part.sense_all(self._tables, found))
             if part.ahead is not None:
                 early = [it for robot in robots if (it := robot.ahead(part.name)) is not None]
-                self._ahead += [part.ahead(self._rows, early)] if early else []
+                self._ahead += [part.ahead(self._tables, early)] if early else []
         for robot in robots:
             if robot.before is None:
                 robot.before = self._ticks
         before = [robot.before or 0 for robot in robots]
-        self._controlled = Agenda([robot.controls for robot in robots], before, self._ticks)
-        self._sensed = Agenda([robot.senses for robot in robots], before, self._ticks)
+        self._controlled = DueSchedules([robot.controls for robot in robots], before, self._ticks)
+        self._sensed = DueSchedules([robot.senses for robot in robots], before, self._ticks)
