@@ -59,7 +59,7 @@ class Building:
         """Put the robot there (map frame), once people have left the place. Raises Refused if they stay."""
         for last in (*[False] * PATIENCE, True):
             try:
-                self.fleet.world.hands.place("a", self.start.compose(pose))
+                self.fleet.world.stage.place("a", self.start.compose(pose))
                 return
             except Refused:
                 if last:

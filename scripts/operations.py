@@ -86,7 +86,7 @@ def played() -> dict[str, Pair]:
 
     with serving(world="office", body="hermes", lockstep=True) as server:
         server.call(server.robot.tap.listen, note)
-        example().play(server.address, Hands(server))
+        example().play(server.address, WorldStage(server))
     return pairs
 
 

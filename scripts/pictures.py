@@ -90,7 +90,7 @@ async def until_done(clock: LockstepClock, action: Action, watch: Callable[[], o
 
 async def scan(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
     """One scan over the true floor plan."""
-    fleet.world.hands.place("a", Pose(12.0, 9.8, math.radians(20)))
+    fleet.world.stage.place("a", Pose(12.0, 9.8, math.radians(20)))
     await clock.advance(3.0)
     here, seen = fleet.world.truth.pose_of("a"), fleet.robots["a"][Lidar].scan
     assert seen is not None
@@ -145,7 +145,7 @@ async def mapped(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
 async def sights(fleet: Fleet, clock: LockstepClock, folder: Path) -> None:
     """A picture, and the detectors' results on it."""
     robot, kinds = fleet.robots["a"], {"people": RED, "markers": BLUE, "tags": GREEN, "gestures": GOLD}
-    fleet.world.hands.place("a", Pose(2.2, 3.4, math.radians(16)))
+    fleet.world.stage.place("a", Pose(2.2, 3.4, math.radians(16)))
     viewers = {kind: getattr(robot[Vision], kind).subscribe() for kind in kinds}
     await clock.advance(1.5)
     frame = await robot[Camera].capture()

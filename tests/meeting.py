@@ -142,7 +142,7 @@ async def opened(world: str, robots: Sequence[RobotConfig], seed: int) -> AsyncI
     fleet = build_fleet(world, robots, clock=clock, seed=seed, database=database)
     if world == "office":
         for name in WALKING:
-            fleet.world.hands.remove_person(name)
+            fleet.world.stage.remove_person(name)
     await fleet.start(wait=True)
     await clock.advance(0.5)
     try:
@@ -165,7 +165,7 @@ async def survey(world: str) -> OccupancyGrid:
             for column in range(int(width / SURVEYED)):
                 pose = Pose((column + 0.5) * SURVEYED, (row + 0.5) * SURVEYED, 0.3 * (row + column))
                 if free.free(pose, 0, 0.3):
-                    fleet.world.hands.place("surveyor", pose)
+                    fleet.world.stage.place("surveyor", pose)
                     await clock.advance(0.25)
                     scan = lidar.scan
                     assert scan is not None

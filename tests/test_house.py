@@ -23,9 +23,8 @@ HOPS_MAX = 8  # files that a request enters
 FUNCTION_MAX = 50  # lines, without the docstring
 METHODS_MAX = 24  # of a class, properties too
 WIDE = {  # classes with more, and why
-    "Hands": "a Stage",
     "PipeEnd": "an asyncio.Transport, whose methods are half of it",
-    "Stage": "one verb for each thing that hands do in a world: consoles, agents and scenarios call them by name",
+    "Stage": "one verb for each change of a world: consoles, agents and scenarios call them by name",
 }
 GENERATED = ("_pb2.py", "_pb2_grpc.py")
 WORDS_MAX = 5  # in 10,000 lines

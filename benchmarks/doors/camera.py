@@ -48,7 +48,7 @@ async def draw(claims: Claims, folder: Path | None) -> None:
     for name, pose in VIEWS.items():
         times = []
         for turn in range(60):
-            world.hands.place("a", Pose(pose.x, pose.y, pose.yaw + 0.0001 * turn))  # an unchanged view is not drawn
+            world.stage.place("a", Pose(pose.x, pose.y, pose.yaw + 0.0001 * turn))  # an unchanged view is not drawn
             posing.cache_clear()  # as if all people were walking
             began = time.thread_time()  # lockstep draws in the calling thread
             frame = await camera.capture()
@@ -64,7 +64,7 @@ async def draw(claims: Claims, folder: Path | None) -> None:
 async def stream(claims: Claims) -> None:
     """Measure the share of a core that live video takes while the robot turns, without that of the world itself."""
     world, robot = place(RealClock())
-    world.hands.place("a", VIEWS["open-plan office"])
+    world.stage.place("a", VIEWS["open-plan office"])
     world.start()
     await robot[Camera].capture()
     alone, _, _ = await watched(world, robot, 0)
@@ -85,7 +85,7 @@ async def watched(world: World, robot: Robot, viewers: int) -> tuple[float, floa
         viewer.drain()
     packets, size, used, began = 0, 0, time.process_time(), time.monotonic()
     while (passed := time.monotonic() - began) < SECONDS:
-        world.hands.place("a", Pose(12.0, 14.0, 1.7 + 0.5 * passed))
+        world.stage.place("a", Pose(12.0, 14.0, 1.7 + 0.5 * passed))
         await asyncio.sleep(1 / 60)  # a new view for each picture
         for got in [viewer.drain() for viewer in watching][:1]:
             packets += len(got)

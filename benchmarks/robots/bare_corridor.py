@@ -92,7 +92,7 @@ class Watch:
             self.drive.across.append((pose.y - truth.y, math.sqrt(covariance[1, 1])))
         if self._kind == "pushed" and place.x > self._pushed_at:
             self._pushed_at += PUSHED_EVERY
-            house.fleet.world.hands.push("a", Vector3(-PUSH, 0.0, 0.0))
+            house.fleet.world.stage.push("a", Vector3(-PUSH, 0.0, 0.0))
 
 
 async def drive(house: Building, kind: str) -> Drive:

@@ -111,7 +111,7 @@ class Trial:
     def put(self, pose: Pose) -> None:
         """Push it there, unless a person stands in the way."""
         with contextlib.suppress(Refused):
-            self.house.fleet.world.hands.place("a", self.house.start.compose(pose))
+            self.house.fleet.world.stage.place("a", self.house.start.compose(pose))
 
     async def suffer(self, name: str) -> None:
         """One event, and what came of it."""

@@ -86,7 +86,7 @@ async def run(world: str, preset: str, seed: int) -> Tour:
     async with building(world, body=f"universal+{preset}", seed=seed) as house:
         robot = house.fleet.robots["a"]
         goals = around(house.floor(await house.survey()), seed)
-        house.fleet.world.hands.place("a", house.start)
+        house.fleet.world.stage.place("a", house.start)
         await house.clock.advance(0.5)
         robot[Mapping].clear()
         robot[Localization].set_pose(Pose())

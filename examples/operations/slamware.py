@@ -26,7 +26,7 @@ DOCK, PLACE = "0d0c0000-1f6e-4c43-8a5e-9b3d2f1c0a77", "4b8a7f2c-1f6e-4c43-8a5e-9
 SECONDS_MAX = 240  # s of robot time for anything awaited
 
 
-class Hands(Protocol):
+class WorldStage(Protocol):
     """Events around the robot meanwhile."""
 
     def wait(self, seconds: float) -> None:

@@ -149,7 +149,7 @@ class Rehearsals:
             )
             try:
                 await fleet.start(wait=True)
-                set_up(fleet.world.hands, scene)
+                set_up(fleet.world.stage, scene)
                 await clock.advance(0.2)
                 return await act(fleet, clock, self._engine)
             finally:
@@ -187,7 +187,7 @@ class _Play:
         """Play from start to end."""
         robot = self.fleet.robots[ROBOT]
         session = Session(robot, "rehearsal", self)
-        plan = self.fleet.world.hands.floors[self.fleet.world.truth.floor_of(ROBOT)]
+        plan = self.fleet.world.stage.floors[self.fleet.world.truth.floor_of(ROBOT)]
         self.played.outlines = [*plan.walls, *plan.furniture]
         self._began, self._real = self.clock.time(), time.monotonic()
         self._coming = sorted(self.scene.acts, key=lambda act: act.at)
@@ -255,7 +255,7 @@ class _Play:
         """Let robot time pass, no faster than the requested speed, and record the robot's pose."""
         now = self.clock.time() - self._began
         while self._coming and now >= self._coming[0].at - 1e-9:
-            act(self.fleet.world.hands, self._coming.pop(0))
+            act(self.fleet.world.stage, self._coming.pop(0))
         await self.clock.advance(seconds)
         self._note()
         if self.speed > 0:

@@ -85,7 +85,7 @@ class Runtime:
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
         self.leases = LeaseServer(
-            config.data, self.fleet.robots, self.fleet.world.hands, (*(door.name for door in doors), CLIENT)
+            config.data, self.fleet.robots, self.fleet.world.stage, (*(door.name for door in doors), CLIENT)
         )
         self._recorder: Recorder | None = None
         self._record_server = RecordServer(config.data, lambda: self.recorder)
@@ -133,10 +133,10 @@ class Runtime:
         if self._recorder is None:
             from roboglot.recording.recorder import Recorder
 
-            stage = self.fleet.world.hands
+            stage = self.fleet.world.stage
             origin = origin_of(self.config, own_version(), remembers=self._remembers)
-            outside = self.fleet.world.outside
-            self._recorder = Recorder(self.config.record, self.fleet.robots, stage, self.clock, origin, outside)
+            inputs = self.fleet.world.inputs
+            self._recorder = Recorder(self.config.record, self.fleet.robots, stage, self.clock, origin, inputs)
         return self._recorder
 
     def _begin_recording(self) -> None:
@@ -233,7 +233,7 @@ class Runtime:
         def running() -> int:
             return 0 if self._engine is None else self._engine.running
 
-        desk = Desk(world, self.fleet.robots, self.fleet.world.hands, listed, studio, running)
+        desk = Desk(world, self.fleet.robots, self.fleet.world.stage, listed, studio, running)
         desk.recordings = Recordings(self.config.data, lambda: self.recorder)
         desk.sessions = data / "sessions.db" if self.guard is not None else None
         return desk
@@ -244,7 +244,7 @@ class Runtime:
         if robots[name].is_real:
             raise ValueError(f"robot {name} is not simulated: there is no copy of its world to try things in")
         others = [robot.name for robot in robots.values() if robot.name != name and not robot.is_real]
-        return scene_of(self.fleet.world.hands, name, self.config.world, robots[name].body, others)
+        return scene_of(self.fleet.world.stage, name, self.config.world, robots[name].body, others)
 
     async def start(self) -> None:
         """Open every door, then let the world run. Raises OSError with the address if it is taken."""

@@ -98,12 +98,12 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow  # real time behind a bad line; test_tunnel.py has the tunnel itself
 async def test_robomasterpy_sees_what_it_sees_without(tmp_path: Path, vendor_ports: None) -> None:
     async with behind_a_bad_line(tmp_path, "robomaster_ep", "office") as runtime:
-        hands = runtime.fleet.world.hands
+        stage = runtime.fleet.world.stage
         pipe = asyncio.subprocess.PIPE
         tour = await asyncio.create_subprocess_exec(sys.executable, str(TOUR), HERE, stdout=pipe, stderr=pipe)
         said: list[str] = []
         async with asyncio.timeout(90.0):
-            errors = await listen(tour, said, lambda: hands.touch_plate("a", PlatePlace.REAR))
+            errors = await listen(tour, said, lambda: stage.touch_plate("a", PlatePlace.REAR))
         assert tour.returncode == 0, errors.decode()
         check(said, HERE, late=True)
 

@@ -192,7 +192,7 @@ async def test_lost_robot_put_on_its_dock_is_localized(tour: Tour, monkeypatch: 
     tour.robot[Localization].set_pose(Pose(40.0, 40.0))
     await tour.clock.advance(3.0)
     assert tour.robot[Localization].lost is not None
-    tour.world.hands.place("a", tour.start)
+    tour.world.stage.place("a", tour.start)
     await tour.clock.advance(3.0)
     assert tour.robot[Localization].lost is None
     assert tour.error[0] < 0.05

@@ -40,8 +40,8 @@ async def test_it_keeps_near_who_walks(tour: Tour, side: FollowSide) -> None:
 
 @pytest.mark.world("playground", body="cyberdog2")
 async def test_it_stands_still_near_a_person_unseen(tour: Tour) -> None:
-    anna = tour.world.hands.person("anna")
-    tour.world.hands.place("a", Pose(anna.pose.x - 2.0, anna.pose.y, 0.0))
+    anna = tour.world.stage.person("anna")
+    tour.world.stage.place("a", Pose(anna.pose.x - 2.0, anna.pose.y, 0.0))
     action, gaps, searched = tour.robot[Following].follow(distance=1.0), [], 0
     for _ in range(140):
         await tour.clock.advance(0.1)

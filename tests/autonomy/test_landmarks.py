@@ -90,7 +90,7 @@ async def test_landmarks_fix_the_place_along_a_passage(tour):
     await tour.robot[MapAnnotations].change(lambda now: replace(now, landmarks=tuple(marks)))
     drive = tour.head_for((36.0, 1.2), tolerance=0.3)
     await tour.until(lambda: tour.truth.x > 18.0)
-    tour.world.hands.place("a", tour.truth.compose(Pose(0.2)))  # neither walls nor wheels determine it
+    tour.world.stage.place("a", tour.truth.compose(Pose(0.2)))  # neither walls nor wheels determine it
     await tour.clock.advance(2.0)
     assert tour.error[0] > 0.15
     await tour.end_of(drive)

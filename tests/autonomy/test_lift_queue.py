@@ -31,7 +31,7 @@ async def fleet(clock: LockstepClock, request: pytest.FixtureRequest) -> AsyncIt
     ]
     built = build_fleet("office", robots, clock=clock, seed=1, database=database)
     for person in ("person 0 0", "person 0 1"):
-        built.world.hands.remove_person(person)
+        built.world.stage.remove_person(person)
     await built.start(wait=True)
     yield built
     await built.close()

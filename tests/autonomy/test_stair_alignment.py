@@ -43,7 +43,7 @@ class Stand:
         """Place the dog so far before the edge, turned to the left, shifted along +y."""
         turn = math.radians(degrees)
         up = Pose(FOOT - before, MIDDLE + aside, turn)
-        self.world.hands.place("a", up if way is UP else Pose(TOP + before, MIDDLE + aside, math.pi + turn))
+        self.world.stage.place("a", up if way is UP else Pose(TOP + before, MIDDLE + aside, math.pi + turn))
         await self.clock.advance(0.3)
 
     async def ended(self, action: Action, seconds: float = 40.0) -> None:
@@ -123,7 +123,7 @@ async def test_shifts_until_the_step_is_on_both_sides(stand: Make) -> None:
 @pytest.mark.parametrize("way", [UP, DOWN])
 async def test_refuses_to_move_where_no_step_is(stand: Make, way: StairDirection) -> None:
     dog = await stand()
-    dog.world.hands.place("a", Pose(2.0, 2.0, 0.0))
+    dog.world.stage.place("a", Pose(2.0, 2.0, 0.0))
     await dog.clock.advance(0.3)
     driving = dog.robot[Driving].drive(Twist(yaw=0.1))
     with pytest.raises(NotFound):
@@ -144,7 +144,7 @@ async def test_down_is_not_up(stand: Make) -> None:
 @pytest.mark.parametrize("gap", [0.45, 0.6, 0.75])
 async def test_a_wall_is_no_step(stand: Make, gap: float) -> None:
     dog = await stand()
-    dog.world.hands.place("a", Pose(10.0 - gap, 1.5, 0.1))
+    dog.world.stage.place("a", Pose(10.0 - gap, 1.5, 0.1))
     await dog.clock.advance(0.3)
     before = dog.world.truth.pose_of("a")
     action = dog.alignment.align(UP)
@@ -157,7 +157,7 @@ async def test_a_wall_is_no_step(stand: Make, gap: float) -> None:
 async def test_accepts_steps_by_their_tread_without_lidar(stand: Make) -> None:
     dog = await stand()
     dog.world.faults.inject("lidar_gone", robot="a")
-    dog.world.hands.place("a", Pose(9.45, 1.5, 0.1))
+    dog.world.stage.place("a", Pose(9.45, 1.5, 0.1))
     await dog.clock.advance(0.3)
     wall = dog.alignment.align(UP)
     await dog.ended(wall)
@@ -215,7 +215,7 @@ async def test_a_step_that_is_lost_on_the_way(stand: Make) -> None:
     await dog.put(0.75, 15.0, 0.0)
     action = dog.alignment.align(UP)
     await dog.reported(action, AlignmentStage.ALIGNING)
-    dog.world.hands.place("a", Pose(2.0, 2.0, 0.0))
+    dog.world.stage.place("a", Pose(2.0, 2.0, 0.0))
     await dog.ended(action)
     assert action.status is ActionStatus.ABORTED
     assert isinstance(action.error, NotFound)
@@ -226,7 +226,7 @@ async def test_a_step_that_is_lost_on_the_way(stand: Make) -> None:
 async def test_held_fast_it_gives_up_in_time(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.75, 15.0, 0.0)
-    dog.world.hands.lift("a", 0.0)  # held in place
+    dog.world.stage.lift("a", 0.0)  # held in place
     action = dog.alignment.align(UP)
     await dog.ended(action)
     assert isinstance(action.error, Expired)

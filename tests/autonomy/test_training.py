@@ -10,10 +10,10 @@ from roboglot.model.geometry import Pose
 
 @pytest.mark.world("playground")
 async def test_a_word_said_three_times(robot, world, forward):
-    anna = world.hands.person("anna")
+    anna = world.stage.person("anna")
     anna.stand()
     anna.place(3.0, 5.5, 180)
-    world.hands.place("a", Pose(1.5, 5.5))
+    world.stage.place("a", Pose(1.5, 5.5))
     await forward(seconds=1)
     teaching = robot[TrainingWords].teach("wave_task")
     for text in ("hello", "abracadabra", "abracadabra"):

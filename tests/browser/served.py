@@ -62,7 +62,7 @@ def is_driven(robot: Robot) -> bool:
 async def drive_until(robot: Robot, clock: LockstepClock, enough: Callable[[], bool]) -> None:
     """Let time pass while a page's pad drives: a piece for each of its commands, shorter than these last."""
     commanded = asyncio.Event()
-    deafen = robot.outside.listen(lambda given: commanded.set() if (given.kind, given.name) == (PAD, "move") else None)
+    deafen = robot.inputs.listen(lambda given: commanded.set() if (given.kind, given.name) == (PAD, "move") else None)
     try:
         async with asyncio.timeout(PATIENCE):
             while not enough():

@@ -234,23 +234,23 @@ async def test_paused_wire_goes_back_to_the_first_message(served: Served, open_c
     await becomes(page.locator("text=Earlier ones").count, 0)
 
 
-async def test_hands_break_and_mend_the_robot(served: Served, open_console: OpenConsole) -> None:
+async def test_stage_break_and_mend_the_robot(served: Served, open_console: OpenConsole) -> None:
     page = await open_console(view="world")
     await page.click("#tab-faults")
     await page.select_option("form select", "emergency_stop")
     await page.click("button:has-text('Inject')")
-    await until(lambda: len(served.runtime.fleet.world.hands.faults) == 1)
+    await until(lambda: len(served.runtime.fleet.world.stage.faults) == 1)
     await served.clock.advance(0.2)
     assert served.robot[EmergencyStop].engaged
     await page.wait_for_selector(".banner.bad")
     await page.click("li button:has-text('Clear')")
-    await until(lambda: len(served.runtime.fleet.world.hands.faults) == 0)
+    await until(lambda: len(served.runtime.fleet.world.stage.faults) == 0)
     await served.clock.advance(0.2)
 
 
 async def test_things_in_the_world_can_be_dragged(served: Served, open_console: OpenConsole) -> None:
-    hands = served.runtime.fleet.world.hands
-    before = hands.robots[0].pose
+    stage = served.runtime.fleet.world.stage
+    before = stage.robots[0].pose
     page = await open_console(view="world")
     box = await page.locator("main canvas").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2  # where the robot is
@@ -258,8 +258,8 @@ async def test_things_in_the_world_can_be_dragged(served: Served, open_console: 
     await page.click("[aria-label=Tag], [title=Tag]")
     await page.wait_for_selector("[aria-label=Tag][aria-pressed=true]")
     await page.mouse.click(x + 150, y)
-    await until(lambda: len(hands.tags) == 1)
-    hung = hands.tags[0]
+    await until(lambda: len(stage.tags) == 1)
+    hung = stage.tags[0]
     assert (hung.kind, hung.text) == ("april", "23")
     await page.wait_for_selector("text=23")
     await page.click("[aria-label=Carry], [title=Carry]")
@@ -268,12 +268,12 @@ async def test_things_in_the_world_can_be_dragged(served: Served, open_console: 
     await page.mouse.down()
     await page.mouse.move(x + 150, y + 150, steps=4)
     await page.mouse.up()
-    await until(lambda: hands.tags[0].pose != hung.pose)
-    moved = hands.tags[0].pose
+    await until(lambda: stage.tags[0].pose != hung.pose)
+    moved = stage.tags[0].pose
     assert hung.pose.distance_to(before) * math.sqrt(2) == pytest.approx(moved.distance_to(before), rel=0.1)
-    assert hands.robots[0].pose == before
+    assert stage.robots[0].pose == before
     await page.click("li:has-text('23') >> text=Remove")
-    await until(lambda: not hands.tags)
+    await until(lambda: not stage.tags)
 
 
 async def test_languages_and_themes_change_while_it_runs(served: Served, open_console: OpenConsole) -> None:

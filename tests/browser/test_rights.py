@@ -362,10 +362,10 @@ async def test_pupils_join_by_code_and_the_teacher_leads(guarded: Guarded, open_
     await teacher.click(".tile:has-text('Emil') >> text=Unlock")
     await until(lambda: guarded.runtime.fleet.robots[emils][Lease].taken_by == "")
 
-    hands = guarded.runtime.fleet.world.hands
-    hands.place(emils, Pose(5.0, 5.0, 1.0))
+    stage = guarded.runtime.fleet.world.stage
+    stage.place(emils, Pose(5.0, 5.0, 1.0))
     await teacher.click(".tile:has-text('Emil') >> text=Reset")
-    await until(lambda: next(r.pose for r in hands.robots if r.name == emils).distance_to(Pose(5.0, 5.0)) > 1.0)
+    await until(lambda: next(r.pose for r in stage.robots if r.name == emils).distance_to(Pose(5.0, 5.0)) > 1.0)
 
     await teacher.click(".tile:has-text('Emil') >> text=Give back")
     await pupils[0].wait_for_selector(".sign")

@@ -261,7 +261,7 @@ async def test_the_program_is_simulated_first(studio: Open, opened: Served) -> N
 async def test_simulated_picture_has_the_frame_of_the_map(studio: Open, opened: Served) -> None:
     world, page = opened.runtime.fleet.world, await studio()
     before = world.truth.pose_of("a")
-    world.hands.place("a", Pose(before.x, before.y, before.yaw + 1.5))  # no time passes: it believes what it did
+    world.stage.place("a", Pose(before.x, before.y, before.yaw + 1.5))  # no time passes: it believes what it did
     await page.evaluate(DIRECTIONS)
     await page.click("#tab-robot")
     await until(page, "document.querySelector('.world canvas').turned !== undefined")
@@ -269,7 +269,7 @@ async def test_simulated_picture_has_the_frame_of_the_map(studio: Open, opened: 
     await page.dblclick("text=Simulate first")
     await until(page, "document.querySelector('canvas.trace')?.turned !== undefined")
     shown = await page.evaluate("['.world canvas', 'canvas.trace'].map(c => document.querySelector(c).turned)")
-    world.hands.place("a", before)
+    world.stage.place("a", before)
     await page.locator("canvas.trace").locator("xpath=preceding::button[1]").click()
     await shows(page, "document.querySelector('.notice').innerText", "The simulation has ended.")  # no refusal
     assert shown[1] == pytest.approx(shown[0], abs=0.05)

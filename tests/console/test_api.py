@@ -338,7 +338,7 @@ async def test_chance_begins_anew_from_seed_that_is_given(shown: Shown) -> None:
         ranges: list[float] = scan.ranges.tolist()
         return [*ranges, shown.robot[Imu].reading.angular_velocity.x]  # drawn for many ticks at once
 
-    shown.runtime.fleet.world.hands.add_obstacle(Pose(2.0, 0.0), (0.5, 4.0, 1.0), 0)
+    shown.runtime.fleet.world.stage.add_obstacle(Pose(2.0, 0.0), (0.5, 4.0, 1.0), 0)
     await shown.clock.advance(0.2)
     first = await scanned(7)
     assert shown.desk.pace["seed"] == 7

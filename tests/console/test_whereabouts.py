@@ -29,7 +29,7 @@ from roboglot.wire.vda5050.versions import V3
 @pytest.mark.world("empty", body="robomaster_ep")
 async def test_robot_without_localization_is_shown_by_its_odometry(fleet: Fleet, forward: Forward) -> None:
     robot = fleet.robots["a"]
-    view = RobotView(robot, fleet.world.hands)
+    view = RobotView(robot, fleet.world.stage)
     view.settle()
     assert Localization not in robot
     robot[Driving].move_by(Pose(0.5, 0.0, 0.0))
@@ -48,7 +48,7 @@ async def test_robot_without_localization_is_shown_by_its_odometry(fleet: Fleet,
 async def test_nothing_is_made_up_of_an_unheard_robot(fleet: Fleet, forward: Forward) -> None:
     robot = fleet.robots["a"]
     link = robot.add(Link, Link("slamware://127.0.0.1:9", robot.clock, robot.events, robot[Health]))
-    view, sent = RobotView(robot, fleet.world.hands), list[Entry]()
+    view, sent = RobotView(robot, fleet.world.stage), list[Entry]()
     view.settle()
     sampler = Sampler(robot, sent.append)
     sampler.beat(0)

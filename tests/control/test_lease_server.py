@@ -49,7 +49,7 @@ async def _ask(path: Path, request: Request) -> Answer:
 @pytest.fixture
 async def desk(robot: Robot, world: World, tmp_path: Path) -> AsyncIterator[Path]:
     """The desk's folder."""
-    made = LeaseServer(tmp_path, world.robots, world.hands, ("robomaster", "console"))
+    made = LeaseServer(tmp_path, world.robots, world.stage, ("robomaster", "console"))
     await made.open()
     yield tmp_path
     await made.close()
@@ -260,14 +260,14 @@ async def test_reset_puts_one_back_as_it_was(desk: Path, world: World, forward: 
     charge = battery.charge
     battery.set_charge(0.1)
     battery.plug(True)
-    world.hands.inject_fault("lidar_gone", "a")
-    world.hands.place("a", start.compose(Pose(2.0, 1.0, 1.0)))
+    world.stage.inject_fault("lidar_gone", "a")
+    world.stage.place("a", start.compose(Pose(2.0, 1.0, 1.0)))
     await forward(seconds=0.5)
     assert (await say(desk, b'{"do": "reset", "robot": "a"}\n'))["error"] == ""
     await forward(seconds=0.5)
     assert world.truth.pose_of("a").distance_to(start) < 0.02
     assert battery.charge == pytest.approx(charge, abs=0.01)
-    assert not world.hands.faults
-    world.hands.place("a", start.compose(Pose(3.0, 0.0)))
-    world.hands.place("b", start)
+    assert not world.stage.faults
+    world.stage.place("a", start.compose(Pose(3.0, 0.0)))
+    world.stage.place("b", start)
     assert "b is in the way" in (await say(desk, b'{"do": "reset", "robot": "a"}\n'))["error"]

@@ -83,7 +83,7 @@ async def test_people_do_as_asked(robot: Robot, world: World, clock: LockstepClo
 
 
 @pytest.mark.world("office", body="hermes")
-async def test_hands_on_a_delivery_robot(robot: Robot, world: World, clock: LockstepClock) -> None:
+async def test_stage_on_a_delivery_robot(robot: Robot, world: World, clock: LockstepClock) -> None:
     code = snippet("worlds/worlds.md", "cargo.put").replace('robot("b")', 'robot("a")')
     await run(code, clock, world=world, Cargo=Cargo, EmergencyStop=EmergencyStop, Pose=Pose)
     assert of_kind(robot[EmergencyStop], SimulatedEmergencyStop).pressed

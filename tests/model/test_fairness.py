@@ -109,7 +109,7 @@ def test_long_request_counts_little(machine: Machine) -> None:
     assert machine.fairness.of(GREEDY).used == COST_MAX
 
 
-def test_handshakes_of_many_robots_follow_each_other(machine: Machine) -> None:
+def test_stagehakes_of_many_robots_follow_each_other(machine: Machine) -> None:
     assert machine.fairness.wait_to_dial() == 0.0
     waits = [machine.fairness.wait_to_dial() for _ in range(99)]
     assert waits == pytest.approx([HANDSHAKE_GAP * number for number in range(1, 100)])

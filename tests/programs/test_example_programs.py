@@ -37,12 +37,12 @@ class Scene:
     clock: LockstepClock
 
     def touch(self, kind: TouchKind = TouchKind.SINGLE) -> Callable[[], None]:
-        return lambda: self.world.hands.touch("a", kind)
+        return lambda: self.world.stage.touch("a", kind)
 
     async def anna_stands_before_it(self, distance: float = 3.5) -> None:
-        self.world.hands.place("a", Pose(2.0, 5.0))
+        self.world.stage.place("a", Pose(2.0, 5.0))
         for name, x, y in (("ben", 1.0, 7.5), ("anna", 2.0 + distance, 5.0)):
-            person = self.world.hands.person(name)
+            person = self.world.stage.person(name)
             person.stand()
             person.place(x, y, 180)
             await self.robot[Members].add(name.title())
@@ -58,39 +58,39 @@ async def nothing(scene: Scene) -> list[Act]:
 
 
 async def a_box_ahead(scene: Scene) -> list[Act]:
-    scene.world.hands.add_obstacle(Pose(2.4, 5.0), (0.3, 0.8, 0.5))
+    scene.world.stage.add_obstacle(Pose(2.4, 5.0), (0.3, 0.8, 0.5))
     return []
 
 
 async def a_box_to_the_left(scene: Scene) -> list[Act]:
-    scene.world.hands.add_obstacle(Pose(3.2, 5.3), (0.3, 0.8, 0.5))
+    scene.world.stage.add_obstacle(Pose(3.2, 5.3), (0.3, 0.8, 0.5))
     return []
 
 
 async def a_box_nearby(scene: Scene) -> list[Act]:
-    scene.world.hands.place("a", Pose(2.0, 5.0))
-    scene.world.hands.add_obstacle(Pose(3.1, 5.0), (0.3, 0.8, 0.5))
+    scene.world.stage.place("a", Pose(2.0, 5.0))
+    scene.world.stage.add_obstacle(Pose(3.1, 5.0), (0.3, 0.8, 0.5))
     return []
 
 
 async def an_intruder(scene: Scene) -> list[Act]:
-    scene.world.hands.place("a", Pose(2.0, 5.0))
-    return [(4.0, lambda: scene.world.hands.add_obstacle(Pose(3.6, 5.4), (0.4, 0.4, 1.0)))]
+    scene.world.stage.place("a", Pose(2.0, 5.0))
+    return [(4.0, lambda: scene.world.stage.add_obstacle(Pose(3.6, 5.4), (0.4, 0.4, 1.0)))]
 
 
 async def anna_trains(scene: Scene) -> list[Act]:
     await scene.anna_stands_before_it()
-    return [(5.0, lambda: scene.world.hands.person("anna").do_sport(Sport.SQUAT, count=4, period=2.0))]
+    return [(5.0, lambda: scene.world.stage.person("anna").do_sport(Sport.SQUAT, count=4, period=2.0))]
 
 
 async def anna_leads(scene: Scene) -> list[Act]:
     await scene.anna_stands_before_it()
-    return [(4.0, lambda: scene.world.hands.person("anna").walk_to(7.3, 5.0)), (12.0, scene.touch())]
+    return [(4.0, lambda: scene.world.stage.person("anna").walk_to(7.3, 5.0)), (12.0, scene.touch())]
 
 
 async def anna_gestures(scene: Scene) -> list[Act]:
     await scene.anna_stands_before_it()
-    anna = scene.world.hands.person("anna")
+    anna = scene.world.stage.person("anna")
     kinds = ((1.0, Gesture.STOP), (9.0, Gesture.THUMB_UP), (18.0, Gesture.PULL))
     return [(at, partial(anna.gesture, kind, seconds=2)) for at, kind in kinds]
 
@@ -98,14 +98,14 @@ async def anna_gestures(scene: Scene) -> list[Act]:
 async def anna_then_ben(scene: Scene) -> list[Act]:
     await scene.anna_stands_before_it()
     return [
-        (2.0, lambda: scene.world.hands.person("anna").place(1.0, 1.0, 180)),
-        (5.0, lambda: scene.world.hands.person("ben").place(5.5, 5.2, 180)),
+        (2.0, lambda: scene.world.stage.person("anna").place(1.0, 1.0, 180)),
+        (5.0, lambda: scene.world.stage.person("ben").place(5.5, 5.2, 180)),
     ]
 
 
 async def anna_speaks(scene: Scene) -> list[Act]:
     await scene.anna_stands_before_it(2.0)
-    anna = scene.world.hands.person("anna")
+    anna = scene.world.stage.person("anna")
     said = ((1.0, "暂停任务"), (9.0, "good dog"), (15.0, "继续任务"), (24.0, "终止任务"))
     return [(at, partial(anna.say, text)) for at, text in said]
 

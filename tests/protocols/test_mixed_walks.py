@@ -44,13 +44,13 @@ class MixedWalk:
         await step()
 
     async def _move_box(self) -> None:
-        hands = self._witness.world.hands
+        stage = self._witness.world.stage
         if self._boxes and self._draw.random() < 0.6:
-            hands.remove_obstacle(self._boxes.pop())
+            stage.remove_obstacle(self._boxes.pop())
             return
         try:
             place = Pose(self._draw.uniform(1, 9), self._draw.uniform(1, 9))
-            self._boxes.append(hands.add_obstacle(place, (0.4, 0.4, 0.6)))
+            self._boxes.append(stage.add_obstacle(place, (0.4, 0.4, 0.6)))
         except RobotError as error:  # the robot is in the way
             self._witness.note("no box", str(error))
 

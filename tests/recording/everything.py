@@ -22,7 +22,7 @@ from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock, RealClock
-from roboglot.model.inputs.outside import CALLED_OFF, GONE, Input
+from roboglot.model.inputs.external import CALLED_OFF, GONE, Input
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections
 from roboglot.protocols.cyberdog.config import CyberDogConfig
@@ -192,7 +192,7 @@ async def begun(folder: Path, **more: object) -> AsyncIterator[Session]:
     session = Session(folder, **more)
     await session.runtime.start()
     session.runtime.fleet.robots["a"].tap.listen(session.hear)
-    session.runtime.fleet.robots["a"].outside.listen(session.notice)
+    session.runtime.fleet.robots["a"].inputs.listen(session.notice)
     try:
         yield session
     finally:
@@ -249,7 +249,7 @@ async def hold(folder: Path, rounds: int) -> Session:
                 await session.console_does("robots/a/drive", x=0.2, seconds=1.0)
                 await clock.advance(1.117)
                 await session.console_does("world/push", robot="a", x=4.0, y=1.0)
-                session.runtime.fleet.world.hands.touch("a")
+                session.runtime.fleet.world.stage.touch("a")
                 await clock.advance(2.5)
                 await session.dog_asks(6009, type=0)
                 await clock.advance(1.011)
@@ -264,7 +264,7 @@ async def hold(folder: Path, rounds: int) -> Session:
 
 
 def _last_box(session: Session) -> int:
-    return session.runtime.fleet.world.hands.obstacles[-1].number
+    return session.runtime.fleet.world.stage.obstacles[-1].number
 
 
 async def _read_all(socket: ClientConnection) -> None:

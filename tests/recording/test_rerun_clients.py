@@ -17,7 +17,7 @@ from roboglot.cli.recordings.rerun import NoRerun, configuration, reasons
 from roboglot.console import program_runs
 from roboglot.console.people.classes import Classes
 from roboglot.console.studio.classroom import Classroom
-from roboglot.model.inputs.outside import CALLED_OFF, CAME, GONE
+from roboglot.model.inputs.external import CALLED_OFF, CAME, GONE
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.inputs import Inputs
 from roboglot.recording.reader import Recording, read_recording

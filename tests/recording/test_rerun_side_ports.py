@@ -64,7 +64,7 @@ async def test_outgoing_data_needs_no_repeat(tmp_path: Path) -> None:
         await say(session, reader, writer, "command", "stream on", "audio on", "armor sensitivity 5")
         await say(session, reader, writer, "chassis push position on pfreq 5", "chassis speed x 0.3")
         await session.clock.advance(2.0)
-        session.runtime.fleet.world.hands.push("a", Vector3(0.0, 4.0, 0.0))
+        session.runtime.fleet.world.stage.push("a", Vector3(0.0, 4.0, 0.0))
         await session.clock.advance(1.0)
         writer.close()
         await until_gone(session, "robomaster")

@@ -45,13 +45,13 @@ async def sensed(*, together: bool) -> list[str]:
     if together:
         world._physics.tables.load_kernels()
     happenings = {
-        1: lambda: world.hands.push("a", Vector3(30.0, 10.0, 5.0)),
-        2: lambda: world.hands.lift("h", 0.2),
-        3: lambda: world.hands.let_go("h"),
+        1: lambda: world.stage.push("a", Vector3(30.0, 10.0, 5.0)),
+        2: lambda: world.stage.lift("h", 0.2),
+        3: lambda: world.stage.let_go("h"),
         4: lambda: world.faults.inject("motor_fault", "h", duration=1.5),
         5: lambda: (robots[1][Legs].lie_down(), robots[0][Gimbal].set_mode(FollowMode.GIMBAL_LEAD)),
-        6: lambda: world.hands.place("a", Pose(22.0, 10.0, 2.0)),
-        0: lambda: world.hands.add_obstacle(Pose(21.5, 10.5)),
+        6: lambda: world.stage.place("a", Pose(22.0, 10.0, 2.0)),
+        0: lambda: world.stage.add_obstacle(Pose(21.5, 10.5)),
     }
     world.start()
     wanted, lines = commands(dice), list[str]()

@@ -28,14 +28,14 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
             with contextlib.suppress(Collided):
                 robot[Base].set_velocity(WAYS[(second + 2 * number) % len(WAYS)])
         if second == 7:
-            world.hands.place("a", Pose(4.0, 3.5, 1.0))
+            world.stage.place("a", Pose(4.0, 3.5, 1.0))
         if second == 9:
-            world.hands.add_obstacle(Pose(4.6, 4.2, 0.3), (0.4, 0.4, 0.5))
+            world.stage.add_obstacle(Pose(4.6, 4.2, 0.3), (0.4, 0.4, 0.5))
         if second == 12:
             there = world.truth.pose_of("b")
-            world.hands.add_person(Pose(there.x + 0.5, there.y + 0.3))
+            world.stage.add_person(Pose(there.x + 0.5, there.y + 0.3))
         if second == 16:
-            world.hands.push("b", Vector3(20.0, 10.0))
+            world.stage.push("b", Vector3(20.0, 10.0))
         for _ in range(50):
             await clock.advance(0.02)
             calm += bool(physics._model.opt.disableflags)
@@ -67,7 +67,7 @@ async def test_alone_no_contact_is_looked_for(simulate: Simulate) -> None:
     await simulation.clock.advance(2.0)
     assert options.disableflags
     radius = simulation.robot.description.radius
-    simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(radius + 0.11)), (0.2, 0.2, 0.5))
+    simulation.world.world_stage.add_obstacle(simulation.pose.compose(Pose(radius + 0.11)), (0.2, 0.2, 0.5))
     await simulation.clock.advance(0.02)
     assert not options.disableflags
 
@@ -89,6 +89,6 @@ async def test_robot_at_rest_feels_obstacles(simulate: Simulate) -> None:
     await simulation.clock.advance(1.0)
     assert simulation.world._physics._contact_switch.off
     radius = simulation.robot.description.radius
-    simulation.world.hands.add_obstacle(simulation.pose.compose(Pose(radius + 0.095)), (0.2, 0.2, 0.5))
+    simulation.world.world_stage.add_obstacle(simulation.pose.compose(Pose(radius + 0.095)), (0.2, 0.2, 0.5))
     await simulation.clock.advance(0.04)
     assert simulation.world._physics.hulls["a"].touches

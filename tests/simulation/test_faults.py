@@ -68,7 +68,7 @@ async def test_every_kind_begins_and_ends(sim):
 
 
 async def test_a_dead_wheel_pulls_to_its_side(sim):
-    sim.world.hands.place("a", Pose(14.0, 10.0))
+    sim.world.stage.place("a", Pose(14.0, 10.0))
     sim.world.faults.inject("motor_fault", "a", wheel="front_left")
     sim.robot[Base].set_velocity(Twist(0.4))
     await sim.clock.advance(3.0)

@@ -20,7 +20,7 @@ ANNA = {"name": "anna", "path": [[6.0, 5.0]], "facing": 180}
 async def test_claps_are_counted(count):
     with lab(people=[ANNA]) as room, room.robot[Hearing].claps() as viewer:
         await room.clock.advance(0.5)
-        room.world.hands.person("anna").clap(count)
+        room.world.stage.person("anna").clap(count)
         await room.clock.advance(0.35 * count)
         assert viewer.drain() == []  # another one may follow
         await room.clock.advance(1.5)
@@ -31,7 +31,7 @@ async def test_claps_are_counted(count):
 
 async def test_runs_of_claps_are_distinguished():
     with lab(people=[ANNA]) as room, room.robot[Hearing].claps() as viewer:
-        anna = room.world.hands.person("anna")
+        anna = room.world.stage.person("anna")
         anna.wait(0.5)
         anna.clap(2)
         anna.wait(1.5)
@@ -42,8 +42,8 @@ async def test_runs_of_claps_are_distinguished():
 
 async def test_talking_and_tones_are_no_claps():
     with lab(people=[ANNA]) as room, room.robot[Hearing].claps() as viewer:
-        room.world.hands.person("anna").say("this is a rather long sentence without any clapping in it")
-        room.world.hands.make_sound(tone(800.0, 1.0), Point(3.0, 5.0))
+        room.world.stage.person("anna").say("this is a rather long sentence without any clapping in it")
+        room.world.stage.make_sound(tone(800.0, 1.0), Point(3.0, 5.0))
         await room.clock.advance(6.0)
         assert viewer.drain() == []
 
@@ -51,7 +51,7 @@ async def test_talking_and_tones_are_no_claps():
 async def test_claps_behind_walls_or_far_are_not_heard():
     far = ANNA | {"path": [[95.0, 95.0]]}
     with lab(people=[far], size=100.0) as room, room.robot[Hearing].claps() as viewer:
-        room.world.hands.person("anna").clap(2)
+        room.world.stage.person("anna").clap(2)
         await room.clock.advance(3.0)
         assert viewer.drain() == []
 
@@ -61,9 +61,9 @@ async def test_a_voice_gets_its_members_name():
         database = Database(":memory:")
         members = room.robot.add(Members, StoredMembers(database, "a", room.clock, room.robot.events))
         await members.add("Anna")
-        await members.set_voice("Anna", room.world.hands.person("anna").voice)
+        await members.set_voice("Anna", room.world.stage.person("anna").voice)
         with room.robot[Hearing].speech() as viewer:
-            room.world.hands.person("anna").say("hello")
+            room.world.stage.person("anna").say("hello")
             await room.clock.advance(2.0)
             (speech,) = viewer.drain()
         database.close()

@@ -20,7 +20,7 @@ ANNA = {"name": "anna", "path": [[6.0, 5.0]], "facing": 180, "height": 1.75, "sp
 
 async def test_they_do_one_thing_after_the_other():
     with lab(people=[ANNA]) as room:
-        anna = room.world.hands.person("anna")
+        anna = room.world.stage.person("anna")
         anna.walk_to(6.0, 8.0)
         anna.gesture(Gesture.STOP, 2.0)
         anna.say("hello")
@@ -38,7 +38,7 @@ async def test_they_do_one_thing_after_the_other():
 
 async def test_turning_takes_time_and_standing_is_at_once():
     with lab(people=[ANNA]) as room:
-        anna = room.world.hands.person("anna")
+        anna = room.world.stage.person("anna")
         anna.look_at(6.0, 9.0)
         await room.clock.advance(0.3)
         assert math.radians(90) < anna.pose.yaw < math.radians(180)
@@ -55,7 +55,7 @@ async def test_turning_takes_time_and_standing_is_at_once():
 async def test_scripts_begin_anew_and_wait_while_someone_directs():
     script = [{"do": "walk", "to": [6.0, 6.0]}, {"do": "wait", "seconds": 1.0}, {"do": "walk", "to": [6.0, 5.0]}]
     with lab(people=[ANNA | {"script": script}]) as room:
-        anna = room.world.hands.person("anna")
+        anna = room.world.stage.person("anna")
         await room.clock.advance(1.5)
         assert anna.pose.y == pytest.approx(6.0, abs=0.1)
         await room.clock.advance(1.6)
@@ -74,7 +74,7 @@ async def test_moved_person_is_there_for_the_lidar_too():
     from roboglot.model.components.sensing.lidar import Lidar
 
     with lab(people=[ANNA]) as room:
-        room.world.hands.person("anna").place(3.0, 5.0)
+        room.world.stage.person("anna").place(3.0, 5.0)
         await room.clock.advance(0.3)
         scan = room.robot[Lidar].scan
         assert scan is not None
@@ -83,14 +83,14 @@ async def test_moved_person_is_there_for_the_lidar_too():
 
 async def test_people_without_a_name_go_by_their_place():
     with lab(people=[{"path": [[1, 1]]}, {"path": [[8, 8]]}]) as room:
-        assert room.world.hands.person("person 0 1").pose.point == Point(8, 8)
+        assert room.world.stage.person("person 0 1").pose.point == Point(8, 8)
         with pytest.raises(NotFound, match="no person here is named 'carl'"):
-            room.world.hands.person("carl")
+            room.world.stage.person("carl")
 
 
 async def test_they_refuse_what_no_file_could_say():
     with lab(people=[ANNA]) as room:
-        anna = room.world.hands.person("anna")
+        anna = room.world.stage.person("anna")
         with pytest.raises(ValueError, match="count"):
             anna.do_sport(Sport.SQUAT, count=0)
         with pytest.raises(ValueError, match="text"):
@@ -126,7 +126,7 @@ async def test_repetitions_are_counted(sport, facing):
     with lab(people=[ANNA | {"facing": facing}]) as room, room.robot[Vision].skeletons.subscribe() as viewer:
         counter = SportCounter(sport)
         others = [SportCounter(other) for other in Sport if other not in (sport, Sport.PLANK)]
-        room.world.hands.person("anna").do_sport(sport, 6, 1.5)
+        room.world.stage.person("anna").do_sport(sport, 6, 1.5)
         for _ in range(60):
             await room.clock.advance(0.2)
             for sighting in viewer.drain():
@@ -142,8 +142,8 @@ async def test_a_plank_is_timed():
 
     with lab(people=[ANNA | {"facing": 90}]) as room, room.robot[Vision].skeletons.subscribe() as viewer:
         counter = SportCounter(Sport.PLANK)
-        room.world.hands.person("anna").wait(2.0)
-        room.world.hands.person("anna").do_sport(Sport.PLANK, 5, 2.0)
+        room.world.stage.person("anna").wait(2.0)
+        room.world.stage.person("anna").do_sport(Sport.PLANK, 5, 2.0)
         for _ in range(80):
             await room.clock.advance(0.2)
             for sighting in viewer.drain():
@@ -156,7 +156,7 @@ async def test_a_plank_is_timed():
 async def test_an_exercise_behind_a_wall_does_not_count():
     wall = {"from": [5, 0], "to": [5, 10]}
     with lab(people=[ANNA], walls=[wall]) as room:
-        room.world.hands.person("anna").do_sport(Sport.SQUAT, 3, 1.0)
+        room.world.stage.person("anna").do_sport(Sport.SQUAT, 3, 1.0)
         assert await room.see("skeletons", 3.0) == []
 
 
@@ -171,10 +171,10 @@ async def heard(room, seconds=3.0):
 
 async def test_nearby_speech_is_understood():
     with lab(people=[ANNA]) as room:
-        room.world.hands.person("anna").say("坐下")
+        room.world.stage.person("anna").say("坐下")
         (speech,) = await heard(room)
     assert speech.text == "坐下"
-    assert speech.print == room.world.hands.person("anna").voice
+    assert speech.print == room.world.stage.person("anna").voice
     assert speech.name == ""
     assert speech.stamp == pytest.approx(speech.seconds, abs=0.15)
 
@@ -189,21 +189,21 @@ async def test_nearby_speech_is_understood():
 )
 async def test_faint_words_are_lost(things, texts):
     with lab(**things) as room:
-        room.world.hands.person("anna").say("sit down please")
+        room.world.stage.person("anna").say("sit down please")
         assert [speech.text for speech in await heard(room)] == texts
 
 
 async def test_two_at_once_drown_each_other():
     with lab(people=[ANNA, {"name": "ben", "path": [[6.0, 6.0]]}]) as room:
-        room.world.hands.person("anna").say("sit down please")
-        room.world.hands.person("ben").say("stand up at once")
+        room.world.stage.person("anna").say("sit down please")
+        room.world.stage.person("ben").say("stand up at once")
         assert all(speech.text == "" for speech in await heard(room))
 
 
 async def test_robot_that_stands_in_way_is_walked_around():
     with lab(people=[ANNA]) as room:
-        anna = room.world.hands.person("anna")
-        room.world.hands.place("a", Pose(4.0, 5.0))
+        anna = room.world.stage.person("anna")
+        room.world.stage.place("a", Pose(4.0, 5.0))
         anna.walk_to(1.5, 5.0)
         await room.clock.advance(3.5)  # she waits a while
         assert anna.pose.point == Point(anna.pose.x, 5.0)
@@ -220,8 +220,8 @@ async def test_robot_that_stands_in_way_is_walked_around():
 async def test_people_step_back_without_room_aside():
     walls = [{"from": [2.0, 4.6], "to": [9.0, 4.6]}, {"from": [2.0, 5.4], "to": [9.0, 5.4]}]
     with lab(people=[ANNA], walls=walls) as room:
-        anna = room.world.hands.person("anna")
-        room.world.hands.place("a", Pose(4.0, 5.0))
+        anna = room.world.stage.person("anna")
+        room.world.stage.place("a", Pose(4.0, 5.0))
         anna.walk_to(1.5, 5.0)
         await room.clock.advance(6.0)
         assert anna.pose.x > 5.5

@@ -26,7 +26,7 @@ async def circled(body: str) -> tuple[float, float, list[tuple[float, float]]]:
     """Return odometry's error after a bent drive (m), the share of silent rays, and where scans were taken."""
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet("empty", [RobotConfig(body=body)], clock=clock, seed=4, database=database)
-    fleet.world.hands.place("a", Pose(5.0, 3.0))
+    fleet.world.stage.place("a", Pose(5.0, 3.0))
     await fleet.start(wait=True)
     robot, start, unknown, trace = fleet.robots["a"], fleet.world.truth.pose_of("a"), [], []
 

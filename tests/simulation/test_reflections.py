@@ -35,7 +35,7 @@ async def ranges_at(file: Path, body: str) -> NDArray[np.float32]:
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet(str(file), [RobotConfig(body=body)], clock=clock, seed=1, database=database)
     await fleet.start(wait=True)
-    fleet.world.hands.place("a", EYE)
+    fleet.world.stage.place("a", EYE)
     await clock.advance(0.5)
     scan = fleet.robots["a"][Lidar].scan
     assert scan is not None

@@ -37,16 +37,16 @@ async def test_physics_sleep_until_a_robot_moves(simulate: Simulate) -> None:
     assert await resting(simulation)
 
 
-async def test_hands_wake_the_physics(simulate: Simulate) -> None:
+async def test_stage_wake_the_physics(simulate: Simulate) -> None:
     simulation = simulate("empty")
     simulation.world.start()
     assert await resting(simulation)
     there = simulation.pose
-    simulation.world.hands.push(simulation.robot.id, Vector3(50.0))
+    simulation.world.world_stage.push(simulation.robot.id, Vector3(50.0))
     await simulation.clock.advance(0.1)
     assert simulation.pose != there
     assert await resting(simulation)
-    simulation.world.hands.place(simulation.robot.id, Pose(1.0, 0.5, 0.2))
+    simulation.world.world_stage.place(simulation.robot.id, Pose(1.0, 0.5, 0.2))
     await simulation.clock.advance(0.02)
     assert simulation.pose.distance_to(Pose(1.0, 0.5)) < 1e-6
 
@@ -66,13 +66,13 @@ async def test_rays_meet_who_walks_by_a_sleeper(simulate: Simulate) -> None:
     simulation = simulate("empty")
     world, hull = simulation.world, simulation.world._physics.hulls[simulation.robot.id]
     world.start()
-    person = world.hands.add_person(simulation.pose.compose(Pose(3.0)))
+    person = world.stage.add_person(simulation.pose.compose(Pose(3.0)))
     assert await resting(simulation)
     origin = hull.position + np.array((0.0, 0.0, 0.5))
     ahead = np.array([[np.cos(hull.turned), np.sin(hull.turned), 0.0]])
     (near,) = world._physics.rays.cast(origin[None], ahead, 10.0, hull)
     there = simulation.pose.compose(Pose(4.0))
-    world.hands.person(person).place(there.x, there.y)
+    world.stage.person(person).place(there.x, there.y)
     await simulation.clock.advance(0.02)
     (far,) = world._physics.rays.cast(origin[None], ahead, 10.0, hull)
     assert asleep(simulation)

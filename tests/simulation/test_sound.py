@@ -93,7 +93,7 @@ async def test_microphone_gives_gapless_blocks_of_noise_per_seed(simulate):
 
 async def test_the_microphone_hears_claps_in_the_world(simulate):
     run = simulate("empty", start=Pose(5, 5))
-    run.world.hands.make_sound(claps(2, pause=0.35), Point(5, 7))
+    run.world.stage.make_sound(claps(2, pause=0.35), Point(5, 7))
     wave = np.concatenate([block.samples for block in await taken_down(run, 1.0)]).astype(float)
     loud = np.flatnonzero(np.abs(wave) > 3000) / SAMPLE_RATE
     starts = loud[np.concatenate(([True], np.diff(loud) > 0.1))]

@@ -51,11 +51,11 @@ async def test_neither_jumps_nor_sinks_when_its_body_moves(empty: Scene) -> None
 
 async def test_lifted_robot_stands_on_the_floor_again(empty: Scene) -> None:
     await empty.clock.advance(1.0)
-    empty.world.hands.lift("a", 0.2)
+    empty.world.stage.lift("a", 0.2)
     await empty.clock.advance(1.0)
     assert not empty.hull.support.sprung
     assert empty.hull.rise == pytest.approx(0.2, abs=0.02)
-    empty.world.hands.let_go("a")
+    empty.world.stage.let_go("a")
     await empty.clock.advance(2.0)
     assert empty.hull.support.sprung
     assert abs(empty.hull.rise) < STANDING

@@ -54,7 +54,7 @@ async def test_agrees_with_mujoco(simulate, request, name):
     path = str(request.config.rootpath / name) if "/" in name else name
     sim = simulate(path, robots=("a", "b"))
     physics, hull = sim.world._physics, sim.world._physics.hulls["a"]
-    sim.world.hands.add_obstacle(Pose(10, 10, 0.3), (1.0, 0.5, 0.6))
+    sim.world.stage.add_obstacle(Pose(10, 10, 0.3), (1.0, 0.5, 0.6))
     chance, compared = np.random.default_rng(1), 0
     directions, hits, ids = np.zeros((360, 3)), np.empty(360), np.empty(360, np.int32)
     for _ in range(80):
@@ -62,7 +62,7 @@ async def test_agrees_with_mujoco(simulate, request, name):
         floor = int(chance.integers(0, len(sim.world.description.floors)))
         if sim.world.truth.in_the_way("a", pose, floor):
             continue
-        sim.world.hands.place("a", pose, floor)
+        sim.world.stage.place("a", pose, floor)
         height = float(chance.uniform(0.1, 0.9))
         ranges = sim.world._environment.sight.turn(hull, height, 360, 12.0)
         mujoco.mj_forward(physics._model, physics._data)

@@ -33,7 +33,7 @@ QUIET, TICK = 60, 0.02  # steps without commands; s
 def put_apart(world: World) -> None:
     """Put the robots where nothing is near."""
     for index, name in enumerate(world.robots):
-        world.hands.place(name, Pose(3.5 + 1.3 * index, 5.5))
+        world.stage.place(name, Pose(3.5 + 1.3 * index, 5.5))
 
 
 def turn(world: World, twist: Twist) -> None:
@@ -45,7 +45,7 @@ def turn(world: World, twist: Twist) -> None:
 
 def happen(world: World, step: int) -> None:
     """Let hands, faults and people interfere in some steps of 0.1 s."""
-    hands, (person, *_) = world.hands, (walker.key for walker in world._walkers)
+    hands, (person, *_) = world.stage, (walker.key for walker in world._walkers)
     happenings = {
         5: lambda: hands.push("a", Vector3(30.0, 10.0, 5.0)),
         10: lambda: hands.lift("h", 0.2),
@@ -154,7 +154,7 @@ async def test_people_walk_past_robots_as_without_the_kernel(simulate: Simulate)
         world, found = simulation.world, list[str]()
         if compiled:
             world._crowd.load_kernels()
-        one, other, *_ = (world.hands.person(walker.key) for walker in world._walkers)
+        one, other, *_ = (world.stage.person(walker.key) for walker in world._walkers)
         one.place(9.0, 6.0)
         one.walk_to(5.0, 6.0)
         one.look_at(0.0, 0.0)

@@ -30,7 +30,7 @@ from roboglot.simulation.world.world_files import load_world
 async def test_obstacle_that_appears_is_seen_and_stops_robot(simulate):
     sim = simulate(start=Pose(3, 5))
     sim.world.start()
-    box = sim.world.hands.add_obstacle(Pose(6, 5), (0.5, 0.5, 1.0))
+    box = sim.world.stage.add_obstacle(Pose(6, 5), (0.5, 0.5, 1.0))
     await sim.clock.advance(0.1)
     assert sim.robot[Lidar].scan.ranges[180] == pytest.approx(2.75, abs=0.05)
     sim.robot[Base].set_velocity(Twist(1.0))
@@ -38,7 +38,7 @@ async def test_obstacle_that_appears_is_seen_and_stops_robot(simulate):
     assert sim.pose.x == pytest.approx(5.5, abs=0.01)
     with pytest.raises(Collided):
         sim.robot[Base].set_velocity(Twist(1.0))
-    sim.world.hands.remove_obstacle(box)
+    sim.world.stage.remove_obstacle(box)
     await sim.clock.advance(0.1)
     sim.robot[Base].set_velocity(Twist(1.0))
     await sim.clock.advance(2.5)
@@ -47,15 +47,15 @@ async def test_obstacle_that_appears_is_seen_and_stops_robot(simulate):
 
 async def test_obstacles_are_counted(simulate):
     world = simulate().world
-    numbers = [world.hands.add_obstacle(Pose(1 + i * 0.5, 9)) for i in range(OBSTACLES_MAX)]
+    numbers = [world.stage.add_obstacle(Pose(1 + i * 0.5, 9)) for i in range(OBSTACLES_MAX)]
     with pytest.raises(ValueError, match="no more than"):
-        world.hands.add_obstacle(Pose(5, 5))
-    world.hands.remove_obstacle(numbers[3])
+        world.stage.add_obstacle(Pose(5, 5))
+    world.stage.remove_obstacle(numbers[3])
     with pytest.raises(NotFound):
-        world.hands.remove_obstacle(numbers[3])
+        world.stage.remove_obstacle(numbers[3])
     with pytest.raises(ValueError, match="20 m"):
-        world.hands.add_obstacle(Pose(5, 5), (0.5, -1.0, 1.0))
-    assert world.hands.add_obstacle(Pose(5, 5)) == numbers[3]
+        world.stage.add_obstacle(Pose(5, 5), (0.5, -1.0, 1.0))
+    assert world.stage.add_obstacle(Pose(5, 5)) == numbers[3]
 
 
 async def test_people_walk_and_the_lidar_sees_them(simulate):
@@ -88,7 +88,7 @@ async def test_odometry_does_not_notice_being_lifted(simulate):
     sim = simulate(start=Pose(5, 5))
     sim.world.start()
     await sim.clock.advance(1.0)
-    sim.world.hands.place("a", Pose(2, 2, 1.0))
+    sim.world.stage.place("a", Pose(2, 2, 1.0))
     await sim.clock.advance(1.0)
     assert sim.pose.distance_to(Pose(2, 2)) < 0.001
     assert sim.robot[Odometry].reading.pose == Pose()
@@ -98,7 +98,7 @@ async def test_no_one_is_put_outside_the_world(simulate):
     sim = simulate(start=Pose(5, 5))
     for pose, floor in ((Pose(-0.1, 5), 0), (Pose(5, 10.1), 0), (Pose(math.nan, 5), 0), (Pose(5, 5), 1)):
         with pytest.raises(ValueError, match="no place"):
-            sim.world.hands.place("a", pose, floor)
+            sim.world.stage.place("a", pose, floor)
         with pytest.raises(ValueError, match="no place"):
             sim.world.faults.inject("lost_localization", "a", x=pose.x, y=pose.y, floor=floor)
     assert sim.pose == Pose(5, 5)
@@ -110,7 +110,7 @@ async def test_floors_are_apart(simulate):
     await sim.clock.advance(1.0)
     assert sim.world.truth.floor_of("a") == 2
     on_top = sim.robot[Lidar].scan.ranges.copy()
-    sim.world.hands.place("a", sim.pose, floor=1)
+    sim.world.stage.place("a", sim.pose, floor=1)
     await sim.clock.advance(0.2)
     assert sim.world.truth.floor_of("a") == 1
     below = sim.robot[Lidar].scan.ranges

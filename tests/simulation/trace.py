@@ -47,7 +47,7 @@ async def trace(seed: int, seconds: int) -> list[str]:
         await clock.advance(1.0)
         if second == 3:
             robots["b"][Legs].lie_down()
-            world.hands.add_obstacle(world.truth.pose_of("a").compose(Pose(0.7, 0.3)))
+            world.stage.add_obstacle(world.truth.pose_of("a").compose(Pose(0.7, 0.3)))
             world.faults.inject("lost_localization", "c")
             robots["c"][LiftClient].call(1)
         if second == 8:

@@ -129,7 +129,7 @@ async def test_plain_connections_can_be_refused(tmp_path: Path) -> None:
         assert await echoed(number, b"secret", trusting) == b"secret"
 
 
-async def test_handshakes_are_asked_for_first(tmp_path: Path) -> None:
+async def test_stagehakes_are_asked_for_first(tmp_path: Path) -> None:
     async with port(tmp_path, admit=False) as (number, trusting):
         assert await echoed(number, b"secret", trusting) == b""
         assert Echo.opened == 0

@@ -185,7 +185,7 @@ class Desk:
     def _input(
         robot: Robot, verb: str, values: Mapping[str, object], client: str
     ) -> contextlib.AbstractContextManager[None]:
-        return robot.outside.noting(COMMAND, verb, {"values": dict(values), "by": client})
+        return robot.inputs.noting(COMMAND, verb, {"values": dict(values), "by": client})
 
     @contextlib.contextmanager
     def noting(self, what: str) -> Iterator[None]:

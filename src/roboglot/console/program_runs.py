@@ -23,7 +23,7 @@ async def start(desk: Desk, name: str, source: str) -> dict[str, object]:
     if not 0 < len(source) <= SOURCE_MAX:
         raise ValueError(f"a program has 1 to {SOURCE_MAX} characters")
     robot = desk.robots[name]
-    with robot.admission.noting(CLIENT, "program"), robot.outside.noting(PROGRAM, "run", {"source": source}):
+    with robot.admission.noting(CLIENT, "program"), robot.inputs.noting(PROGRAM, "run", {"source": source}):
         await programs.service.save(StoredProgram(TASK, "run by a script", "", "single", "now", source, ""))
         await programs.service.run(TASK)
     return await program(desk, name)
@@ -37,7 +37,7 @@ async def end_all(desk: Desk, name: str) -> None:
     robot = desk.robots.get(name)
     if robot is None:
         raise NotFound(f"there is no robot {name!r}")
-    with robot.admission.noting(CLIENT, "stop"), robot.outside.noting(PROGRAM, END, {}):
+    with robot.admission.noting(CLIENT, "stop"), robot.inputs.noting(PROGRAM, END, {}):
         if (programs := desk.studio.programs.get(name)) is not None:
             running = [figures.target_id for figures in programs.service.running()]
             await programs.service.shutdown(running, why="ended by the teacher")
@@ -46,7 +46,7 @@ async def end_all(desk: Desk, name: str) -> None:
 
 async def debug(programs: Programs, text: str) -> str:
     """Return the answer of a robot's programs to a message of the debugger. Raises ProgramError."""
-    with programs.robot.outside.noting(PROGRAM, DEBUG, {"text": text}):
+    with programs.robot.inputs.noting(PROGRAM, DEBUG, {"text": text}):
         return await debugging.answer(programs.service, text)
 
 

@@ -72,13 +72,13 @@ class Pad:
         limits = self._robot[Base].limits
         top = limits.twist
         twist = Twist(x * top.x, y * top.x if limits.holonomic else 0.0, yaw * top.yaw).clamped(top)
-        with self._robot.outside.noting(PAD, "move", {"source": self._source, "x": x, "y": y, "yaw": yaw}):
+        with self._robot.inputs.noting(PAD, "move", {"source": self._source, "x": x, "y": y, "yaw": yaw}):
             self._action = self._robot[Driving].drive(twist, lifetime=DEAD_MAN * self._pace, source=self._source)
 
     def let_go(self, why: str) -> None:
         """End this page's driving."""
         self._action = None
-        with self._robot.outside.noting(PAD, "let_go", {"source": self._source, "why": why}):
+        with self._robot.inputs.noting(PAD, "let_go", {"source": self._source, "why": why}):
             for action in self._robot.actions.running():
                 if action.source == self._source:
                     action.cancel(why)

@@ -92,7 +92,7 @@ class LeaseServer(LocalServer):
 
     async def do(self, request: Request, robot: Robot) -> None:
         """Execute a request for one robot. Raises LookupError if that is impossible."""
-        with robot.outside.noting(LEASE, request.do, {"who": request.who}):
+        with robot.inputs.noting(LEASE, request.do, {"who": request.who}):
             await self._do(request, robot)
 
     async def _do(self, request: Request, robot: Robot) -> None:

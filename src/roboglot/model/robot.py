@@ -14,8 +14,8 @@ from roboglot.model.components.motion.actuators import Actuators
 from roboglot.model.components.system.starts import Starts
 from roboglot.model.errors import ComponentMissing
 from roboglot.model.events import EventStream
+from roboglot.model.inputs.external import ExternalInputs
 from roboglot.model.inputs.fairness import Fairness
-from roboglot.model.inputs.outside import Outside
 from roboglot.model.stand_in import StandIn
 from roboglot.model.tap import Tap
 from roboglot.values import dataclass
@@ -48,7 +48,7 @@ class Robot:
     actuators: Actuators = field(init=False)
     starts: Starts = field(init=False)
     tap: Tap = field(init=False)
-    outside: Outside = field(init=False)
+    inputs: ExternalInputs = field(init=False)
     admission: Admission = field(default_factory=Admission)
     fairness: Fairness | None = None  # shared by all robots of a program; None: clients never wait
     stand_in: StandIn | None = None  # answers requests in the robot's place
@@ -59,7 +59,7 @@ class Robot:
         self.actuators = Actuators(self.actions)
         self.starts = Starts(self.events)
         self.tap = Tap(self.id, self.clock)
-        self.outside = Outside(self.id, self.clock)
+        self.inputs = ExternalInputs(self.id, self.clock)
 
     def add(self, interface: type[C], component: C) -> C:
         """Add a component; at most one per interface."""

@@ -1,8 +1,8 @@
-"""Hands in a simulated world: move robots, things and people about, make sounds, break things.
+"""Stage: control of a simulated world. Moves robots, things and people, makes sounds, injects faults.
 
-A console, a test kit or an agent works with this interface; the simulation implements it (``simulation.world.hands``).
-All places are in the world's frame: m, rad; floor 0 is the lowest. Unknown names raise NotFound, and impossible
-requests raise ValueError in plain words.
+For consoles, test kits and agents; ``simulation.world.world_stage`` implements it. All places are in the world's
+frame: m, rad; floor 0 is the lowest. Unknown names raise NotFound, and impossible requests raise ValueError in plain
+words.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """A box that hands put into the world; ``size``: x, y, z extent in m; ``number`` is what removes it."""
+    """A box that was added to the world; ``size``: x, y, z extent in m; ``number`` removes it."""
 
     number: int
     pose: Pose
@@ -40,7 +40,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class HungTag:
-    """A printed code that hands hung up: ``pose`` with +x out of it, ``height`` of its middle, m."""
+    """A printed code that was hung up: ``pose`` with +x out of it, ``height`` of its middle, m."""
 
     number: int
     kind: TagKind
@@ -53,7 +53,7 @@ class HungTag:
 
 @dataclass(frozen=True, slots=True)
 class ActiveFault:
-    """A fault that acts now; ``robot`` is None for those of the building. ``number`` is what clears it."""
+    """A fault that acts now; ``robot`` is None for those of the building. ``number`` clears it."""
 
     number: int
     kind: str
@@ -139,7 +139,7 @@ class StagePerson(ABC):
 
 
 class Stage(ABC):
-    """One world's hands."""
+    """Control of one world, for tests, consoles and agents."""
 
     @property
     @abstractmethod

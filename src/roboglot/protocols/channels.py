@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import replace
 from typing import Protocol
 
-from roboglot.model.inputs.outside import CAME, GONE, Outside
+from roboglot.model.inputs.external import CAME, GONE, ExternalInputs
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
 from roboglot.protocols.turns import Turns
@@ -110,13 +110,13 @@ class _Noted:
         self._inner.close()
 
 
-def noted(channel: Channel, outside: Outside, door: str, path: str) -> Channel:
+def noted(channel: Channel, inputs: ExternalInputs, door: str, path: str) -> Channel:
     """Return the channel with its clients' arrivals and departures noted as the robot's inputs."""
 
     def open_noted(carrier: Carrier) -> Session:
         session = channel.open(carrier)
-        outside.note_client(CAME, door, carrier.name, path=path)
-        return _Noted(session, lambda: outside.note_client(GONE, door, carrier.name))
+        inputs.note_client(CAME, door, carrier.name, path=path)
+        return _Noted(session, lambda: inputs.note_client(GONE, door, carrier.name))
 
     return replace(channel, open=open_noted)
 

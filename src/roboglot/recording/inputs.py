@@ -1,7 +1,7 @@
 """Replays recorded inputs to a lockstep world, each at exactly its robot time, in the recorded order.
 
-Inputs are requests at the doors, clients that connect and hang up, and other influences from outside: see
-``model/inputs/outside.py``.
+Inputs are requests at the doors, clients that connect and hang up, and other external inputs: see
+``model/inputs/external.py``.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import LockstepClock, RealClock
-from roboglot.model.inputs import outside
-from roboglot.model.inputs.outside import Input
+from roboglot.model.inputs import external
+from roboglot.model.inputs.external import Input
 from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.recording.lines import FoxgloveLine, FrameLine, Line, TextLine
 from roboglot.recording.reader import Asked, Recording, pair
@@ -101,19 +101,19 @@ class Inputs:
     async def _give(self, given: Input) -> None:
         """Apply an input that is not a request."""
         match given.kind:
-            case outside.ANSWER:
+            case external.ANSWER:
                 if not await self._wait_until(lambda: self._repeat(given)):
                     self._patience = LOOK  # later inputs will differ as well
                     self._miss(f"{given.robot} was not waiting for an answer to {given.name}", given.stamp)
-            case outside.CAME:
+            case external.CAME:
                 path = str(given.values.get("path", ""))
                 await self._line((given.robot, given.name, given.connection), path, given.stamp)
-            case outside.GONE:
+            case external.GONE:
                 line = self._lines.pop((given.robot, given.name, given.connection), None)
                 if line is not None:
                     self._follow(line.close())
                     await self._see(given)
-            case outside.CALLED_OFF:
+            case external.CALLED_OFF:
                 place = given.robot, given.name, given.connection
                 code, began = given.values.get("operation"), given.values.get("asked")
                 called = place, str(code), began if isinstance(began, float) else 0.0
@@ -177,7 +177,7 @@ class Inputs:
         line.clock = RealClock()
         if isinstance(line, FrameLine) and path.startswith("/"):
             line.path = path
-        came = self._heard[robot, door, outside.CAME]
+        came = self._heard[robot, door, external.CAME]
         try:
             await line.open()
         except (ClientError, OSError) as error:
@@ -187,7 +187,7 @@ class Inputs:
         if isinstance(line, DRAINED):
             self._follow(line.drain())
         if isinstance(line, DRAINED) and line.comes:
-            await self._wait_for({(robot, door, outside.CAME): came + 1})
+            await self._wait_for({(robot, door, external.CAME): came + 1})
         return line
 
     def _follow(self, work: Awaitable[object]) -> asyncio.Task[None]:

@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from roboglot.model.inputs.outside import Input
+from roboglot.model.inputs.external import Input
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.readings import READINGS
 from roboglot.validation import decode_json
@@ -108,7 +108,7 @@ def decode_exchange(data: bytes) -> Exchange:
 
 
 def encode_input(given: Input) -> bytes:
-    """Return an input from outside as a message of the file."""
+    """Return an external input as a message of the file."""
     return _encode(given._asdict())
 
 

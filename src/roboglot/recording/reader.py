@@ -18,7 +18,7 @@ from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from msgspec import DecodeError
 
-from roboglot.model.inputs.outside import Input
+from roboglot.model.inputs.external import Input
 from roboglot.model.tap import DRIVER, SILENT, Direction, Exchange
 from roboglot.recording.latched_values import REPEATED
 from roboglot.recording.messages import decode_exchange, decode_input

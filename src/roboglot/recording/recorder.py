@@ -14,7 +14,7 @@ from roboglot.model.clock import Clock, LockstepClock
 from roboglot.model.components.system.health import FaultLevel
 from roboglot.model.errors import RobotError
 from roboglot.model.events import FaultRaised
-from roboglot.model.inputs.outside import Input, Outside
+from roboglot.model.inputs.external import ExternalInputs, Input
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.recording.entries import Entry
@@ -61,10 +61,10 @@ class Recorder:
         stage: Stage | None,
         clock: Clock,
         origin: Origin,
-        outside: Outside | None = None,
+        inputs: ExternalInputs | None = None,
     ) -> None:
-        """``outside``: inputs that change the world."""
-        self._outside = outside
+        """``inputs``: inputs that change the world."""
+        self._inputs = inputs
         self._looking: list[Callable[[], None]] = []  # functions that end it
         self._config, self._robots, self._stage, self._clock, self._origin = config, robots, stage, clock, origin
         self._redaction = Redaction((*FIELDS, *config.redact))
@@ -237,8 +237,8 @@ class Recorder:
         video, photos = self._config.video, self._config.photos
         self._samplers = [Sampler(robot, self._put, video=video, photos=photos) for robot in self._robots.values()]
         self._truth = TruthSampler(self._stage) if self._stage and self._config.truth else None
-        if self._outside is not None:
-            self._looking.append(self._outside.listen(self._note_input))
+        if self._inputs is not None:
+            self._looking.append(self._inputs.listen(self._note_input))
         self._handler = _LogHandler(self)
         logging.getLogger("roboglot").addHandler(self._handler)
         self._sampling = asyncio.get_running_loop().create_task(self._sample(), name="recorder")

@@ -16,7 +16,7 @@ from roboglot.model.components.system.lease import Lease
 from roboglot.model.components.system.link import Link, is_current
 from roboglot.model.events import ActionChanged, Event, ScanTaken
 from roboglot.model.geometry import ORIGIN, Pose
-from roboglot.model.inputs.outside import Input
+from roboglot.model.inputs.external import Input
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
 from roboglot.model.tap import Exchange
@@ -64,7 +64,7 @@ class Sampler:
         self._leave = [
             robot.tap.listen(self._note_exchange),
             robot.events.listen(Event, self._note_event),
-            robot.outside.listen(self._note_input),
+            robot.inputs.listen(self._note_input),
         ]
         self._filming: asyncio.Task[None] | None = None
         self.film(video)

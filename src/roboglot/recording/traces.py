@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby, zip_longest
 from pathlib import Path
 
-from roboglot.model.inputs.outside import ANSWER, CAME, GONE
+from roboglot.model.inputs.external import ANSWER, CAME, GONE
 from roboglot.model.tap import Direction
 from roboglot.recording.entries import NANO
 from roboglot.recording.reader import Record, read_messages

@@ -43,7 +43,7 @@ def save(server: RobotServer, folder: Path, title: str, failure: str) -> Sequenc
 
 
 def _draw(server: RobotServer) -> bytes | None:
-    stage = server.runtime.fleet.world.hands
+    stage = server.runtime.fleet.world.stage
     if not stage.robots or not stage.floors:
         return None
     floor = stage.floors[min(stage.robots[0].floor, len(stage.floors) - 1)]

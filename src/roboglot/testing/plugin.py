@@ -136,7 +136,7 @@ async def fleet(request: pytest.FixtureRequest, clock: LockstepClock) -> AsyncIt
     built = build_fleet(wanted.world, robots, clock=clock, seed=wanted.seed, database=database)
     await built.start(wait=True)
     for fault in wanted.faults:
-        built.world.hands.inject_fault(fault.kind, fault.robot, **dict(fault.options))
+        built.world.stage.inject_fault(fault.kind, fault.robot, **dict(fault.options))
     yield built
     await built.close()
     database.close()

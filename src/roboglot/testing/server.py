@@ -188,7 +188,7 @@ class RobotServer:
     @property
     def stage(self) -> _LoopProxy:
         """Interventions in the world: place, push, add_obstacle, inject_fault, person (``roboglot.model.stage``)."""
-        return _LoopProxy(self.runtime.fleet.world.hands, self.loop)
+        return _LoopProxy(self.runtime.fleet.world.stage, self.loop)
 
     def pose(self, robot: str = "") -> Pose:
         """Return the true pose of a robot (default: the first) in the world's frame."""
@@ -230,7 +230,7 @@ class RobotServer:
 
     async def _reset(self) -> None:
         fleet = self.runtime.fleet
-        stage = fleet.world.hands
+        stage = fleet.world.stage
         for robot in fleet.robots.values():
             await robot.actions.cancel(reason="the test has ended")
         stage.clear_fault()
@@ -247,7 +247,7 @@ class RobotServer:
         self.loop.run(self._break_things)
 
     def _break_things(self) -> None:
-        stage = self.runtime.fleet.world.hands
+        stage = self.runtime.fleet.world.stage
         for fault in self.wanted.faults:
             stage.inject_fault(fault.kind, fault.robot, **dict(fault.options))
 

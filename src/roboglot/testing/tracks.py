@@ -37,7 +37,7 @@ class Ways:
     def begin(self, fleet: Fleet, clock: Clock) -> None:
         """Remember the poses of the robots of ``fleet`` before it starts."""
         self._fleet, self._clock = fleet, clock
-        self.origins = {placed.name: placed.pose for placed in fleet.world.hands.robots}
+        self.origins = {placed.name: placed.pose for placed in fleet.world.stage.robots}
 
     async def wait_for_places(self) -> None:
         """Wait until each mapping robot has a map, and remember its estimated pose."""
@@ -60,7 +60,7 @@ class Ways:
 
         for name, robot in self._fleet.robots.items():
             if name in self.origins:
-                self._fleet.world.hands.reset(name)
+                self._fleet.world.stage.reset(name)
             if name in self._starts:
                 robot[Localization].set_pose(self._starts[name])
 
@@ -71,7 +71,7 @@ class Ways:
 
     async def _track(self) -> None:
         while True:
-            for placed in self._fleet.world.hands.robots:
+            for placed in self._fleet.world.stage.robots:
                 track = self.tracks.setdefault(placed.name, [])
                 here = (round(placed.pose.x, 3), round(placed.pose.y, 3))
                 if not track or track[-1] != here:

@@ -54,7 +54,7 @@ async def test_robot_whose_neighbours_move_along_believes_its_wheels() -> None:
     fleet = build_fleet(CORRIDOR, robots, clock=clock, seed=1, database=database)
     starts = [Pose(2.4 + 0.9 * n, 2.6 if n % 2 else 3.4) for n in range(5)]
     for config, start in zip(robots, starts, strict=True):
-        fleet.world.hands.place(config.name, start)
+        fleet.world.stage.place(config.name, start)
     await fleet.start(wait=True)
     await clock.advance(1.0)
     for robot in fleet.robots.values():
@@ -85,8 +85,8 @@ async def test_a_robot_in_the_way_is_driven_around(body: str, other: str) -> Non
     robots = [RobotConfig("a", body=body), RobotConfig("b", body=other)]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
     start, stands = Pose(1.5, 5.0), Pose(4.5, 5.0)
-    fleet.world.hands.place("a", start)
-    fleet.world.hands.place("b", stands)
+    fleet.world.stage.place("a", start)
+    fleet.world.stage.place("b", stands)
     await fleet.start(wait=True)
     await clock.advance(1.0)
     action = fleet.robots["a"][Navigation].navigate_to([Pose(6.0, 0.0).point], NavigationOptions())
@@ -107,10 +107,10 @@ async def test_a_lidar_sees_no_gap_in_a_robot(looking: str) -> None:
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig("a", body=looking), *(RobotConfig(b, body=b) for b in ("universal", "hermes", "cyberdog2"))]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
-    fleet.world.hands.place("a", Pose(5.0, 5.0))
+    fleet.world.stage.place("a", Pose(5.0, 5.0))
     for number, name in enumerate(("universal", "hermes", "cyberdog2")):
         way = math.radians(120.0 * number)
-        fleet.world.hands.place(name, Pose(5.0 + 2.0 * math.cos(way), 5.0 + 2.0 * math.sin(way)))
+        fleet.world.stage.place(name, Pose(5.0 + 2.0 * math.cos(way), 5.0 + 2.0 * math.sin(way)))
     await fleet.start(wait=True)
     await clock.advance(0.5)
     scan = fleet.robots["a"][Lidar].scan
@@ -129,7 +129,7 @@ async def test_robots_below_the_lidar_are_not_touched() -> None:
     robots = [RobotConfig(name, body=body) for name, body in zip("abc", bodies, strict=True)]
     fleet = build_fleet(CORRIDOR, robots, clock=clock, seed=1, database=database)
     for name, place in zip("abc", (Pose(2.0, 3.0), Pose(4.0, 2.75), Pose(4.0, 3.25)), strict=True):
-        fleet.world.hands.place(name, place)
+        fleet.world.stage.place(name, place)
     await fleet.start(wait=True)
     await clock.advance(1.0)
     robot = fleet.robots["a"]
@@ -146,8 +146,8 @@ async def test_a_fast_robot_touches_softly() -> None:
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig("a", body="cyberdog2"), RobotConfig("b", body="robomaster_ep")]
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
-    fleet.world.hands.place("a", Pose(2.0, 5.0))
-    fleet.world.hands.place("b", Pose(6.0, 5.0))
+    fleet.world.stage.place("a", Pose(2.0, 5.0))
+    fleet.world.stage.place("b", Pose(6.0, 5.0))
     await fleet.start(wait=True)
     await clock.advance(0.5)
     robot = fleet.robots["a"]

@@ -49,7 +49,7 @@ async def test_too_narrow_gap_ends_drive_and_is_reported(tour: Tour) -> None:
     await tour.go((6.0, 3.0))
     await tour.go((2.0, 3.0))
     for side in (-1.0, 1.0):
-        tour.world.hands.add_obstacle(Pose(4.0, 3.0 + 0.34 * side), (0.2, 0.2, 1.0))
+        tour.world.stage.add_obstacle(Pose(4.0, 3.0 + 0.34 * side), (0.2, 0.2, 1.0))
     begun = tour.clock.time()
     action = await tour.go((6.0, 3.0))
     assert isinstance(action.error, Blocked | Unreachable)
@@ -77,14 +77,14 @@ async def test_too_wide_robot_reports_the_door_width(tour: Tour) -> None:
 
 @pytest.mark.world(WIDE)
 async def test_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
-    person = tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
+    person = tour.world.stage.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
     await tour.clock.advance(30.0)  # long enough for a pillar to appear on the map
     action = tour.head_for((6.0, 3.0))
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING, action.reason
     assert of_kind(action.feedback, NavigationFeedback).stage == "waiting"
     assert tour.blocks
-    tour.world.hands.remove_obstacle(person)
+    tour.world.stage.remove_obstacle(person)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert not tour.bumps
@@ -93,7 +93,7 @@ async def test_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
 @pytest.mark.slow  # in short: test_person_in_the_only_door_is_waited_for
 @pytest.mark.world(WIDE)
 async def test_person_who_stays_in_only_door_is_reported(tour: Tour) -> None:
-    tour.world.hands.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
+    tour.world.stage.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
     await tour.clock.advance(30.0)
     begun = tour.clock.time()
     action = await tour.go((6.0, 3.0))
@@ -142,11 +142,11 @@ async def test_waits_for_a_known_way_that_closes_briefly(tour: Tour) -> None:
     """Rather than looking for a way through rooms that it never saw: robots in a corridor close it all the time."""
     action = tour.head_for((18.0, 10.0))
     await tour.until(lambda: tour.truth.x < 21.5)
-    crowd = tour.world.hands.add_obstacle(Pose(19.6, 10.0), (0.3, 2.98, 1.0))
+    crowd = tour.world.stage.add_obstacle(Pose(19.6, 10.0), (0.3, 2.98, 1.0))
     for _ in range(90):
         await tour.clock.advance(0.1)
         assert 8.5 < tour.truth.y < 11.5
         assert action.status is ActionStatus.EXECUTING, action.reason
-    tour.world.hands.remove_obstacle(crowd)
+    tour.world.stage.remove_obstacle(crowd)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason

@@ -105,7 +105,7 @@ async def test_a_velocity_after_renewed_moves_is_kept(robot: Robot, forward: For
 
 @pytest.mark.world("empty", body="hermes")
 async def test_velocity_while_braking_at_wall_ends_in_time(robot: Robot, world: World, forward: Forward) -> None:
-    world.hands.place("a", Pose(8.2, 6.0))
+    world.stage.place("a", Pose(8.2, 6.0))
     await forward(seconds=1)
     drive, ahead = robot[Driving].drive, Twist(x=0.5, yaw=-0.2)
     first = drive(ahead, source="one")

@@ -122,13 +122,13 @@ def _milestones(action: Action) -> int:
 async def test_second_try_continues_at_the_next_goal(tour: Tour) -> None:
     action = tour.head_for((3.0, 1.2), (8.5, 1.2), retries=3)
     await tour.until(lambda: tour.truth.x > 3.5)
-    wall = tour.world.hands.add_obstacle(Pose(5.5, 1.2, 0.0), (0.3, 2.3, 1.0))
+    wall = tour.world.stage.add_obstacle(Pose(5.5, 1.2, 0.0), (0.3, 2.3, 1.0))
     west = tour.truth.x
     for _ in range(450):
         await tour.clock.advance(0.1)
         west = min(west, tour.truth.x)
     assert len(of_kind(action.feedback, NavigationFeedback).milestones) == 1
-    tour.world.hands.remove_obstacle(wall)
+    tour.world.stage.remove_obstacle(wall)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert west > 3.3
@@ -138,7 +138,7 @@ async def test_second_try_continues_at_the_next_goal(tour: Tour) -> None:
 @pytest.mark.world("empty")
 async def test_goal_on_way_that_is_walled_in_fails(tour: Tour) -> None:
     for x, y in ((5.6, 5.0), (4.4, 5.0), (5.0, 5.6), (5.0, 4.4)):
-        tour.world.hands.add_obstacle(Pose(x, y, 0.0), (0.2, 1.4, 1.0) if y == 5.0 else (1.4, 0.2, 1.0))
+        tour.world.stage.add_obstacle(Pose(x, y, 0.0), (0.2, 1.4, 1.0) if y == 5.0 else (1.4, 0.2, 1.0))
     action = tour.head_for((2.0, 5.0), (5.0, 5.0), (2.0, 6.0))
     track = [tour.truth]
     await tour.end_of(action)

@@ -88,7 +88,7 @@ async def test_feedback_counts_down(tour: Tour) -> None:
 async def test_brakes_before_new_obstacle_and_drives_around_it(tour: Tour) -> None:
     action = tour.head_for((8.5, 5.0))
     await tour.until(lambda: tour.truth.x > 3.0)
-    tour.world.hands.add_obstacle(Pose(tour.truth.x + 1.2, tour.truth.y, 0.0), (0.5, 0.5, 1.0))
+    tour.world.stage.add_obstacle(Pose(tour.truth.x + 1.2, tour.truth.y, 0.0), (0.5, 0.5, 1.0))
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert_pose(tour.truth, x=8.5, y=5.0)
@@ -101,12 +101,12 @@ async def test_brakes_before_new_obstacle_and_drives_around_it(tour: Tour) -> No
 async def test_waits_where_there_is_no_way_around(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2))
     await tour.until(lambda: tour.truth.x > 3.0)
-    wall = tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
+    wall = tour.world.stage.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
     await tour.clock.advance(10.0)
     assert action.status is ActionStatus.EXECUTING
     assert of_kind(action.feedback, NavigationFeedback).stage == "waiting"
     assert tour.truth.x < 4.7
-    tour.world.hands.remove_obstacle(wall)
+    tour.world.stage.remove_obstacle(wall)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert not tour.bumps
@@ -116,7 +116,7 @@ async def test_waits_where_there_is_no_way_around(tour: Tour) -> None:
 async def test_it_gives_up_after_half_a_minute(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2))
     await tour.until(lambda: tour.truth.x > 3.0)
-    tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
+    tour.world.stage.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
     begun = tour.clock.time()
     await tour.end_of(action)
     assert action.status is ActionStatus.ABORTED
@@ -127,7 +127,7 @@ async def test_it_gives_up_after_half_a_minute(tour: Tour) -> None:
 
 @pytest.mark.world(CORRIDOR)
 async def test_does_not_press_long_against_an_unseen_obstacle(tour: Tour) -> None:
-    tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), (0.3, 2.3, 0.2))
+    tour.world.stage.add_obstacle(Pose(5.0, 1.2, 0.0), (0.3, 2.3, 0.2))
     action = tour.head_for((8.5, 1.2))
     await tour.until(lambda: tour.robot[Base].velocity.speed > 1.0)
     await tour.until(lambda: of_kind(action.feedback, NavigationFeedback).stage == "waiting")
@@ -142,7 +142,7 @@ async def test_does_not_press_long_against_an_unseen_obstacle(tour: Tour) -> Non
 @pytest.mark.world("empty", body="hermes")
 async def test_robot_leaves_what_only_its_bumper_feels(tour: Tour) -> None:
     box, goal = tour.start.compose(Pose(1.5, -0.52)), tour.start.compose(Pose(4.0, 0.0))
-    tour.world.hands.add_obstacle(box, (0.1, 0.6, 0.1))  # below its lidar, and to the right of its camera's view
+    tour.world.stage.add_obstacle(box, (0.1, 0.6, 0.1))  # below its lidar, and to the right of its camera's view
     tour.robot[Driving].drive(Twist(x=0.2), lifetime=20.0)
     await tour.until(lambda: bool(tour.bumps))
     await tour.clock.advance(15.0)  # longer than obstacles out of sight are remembered
@@ -194,7 +194,7 @@ async def test_does_not_set_out_where_no_path_leads(tour: Tour) -> None:
 
 @pytest.mark.world("empty")
 async def test_plan_leads_from_start_to_goal_around_walls(tour: Tour) -> None:
-    tour.world.hands.add_obstacle(Pose(5.0, 4.0, 0.0), (0.3, 8.0, 1.0))  # a gap in the north
+    tour.world.stage.add_obstacle(Pose(5.0, 4.0, 0.0), (0.3, 8.0, 1.0))  # a gap in the north
     await tour.clock.advance(3.0)
     path = await tour.robot[Navigation].plan(tour.on_map(3.0, 3.0), tour.on_map(8.0, 3.0))
     assert path.points[0] == tour.on_map(3.0, 3.0)
@@ -218,10 +218,10 @@ async def test_speed_ratio_slows(tour: Tour) -> None:
 async def test_retries_try_again(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2), retries=8)
     await tour.until(lambda: tour.truth.x > 3.0)
-    wall = tour.world.hands.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
+    wall = tour.world.stage.add_obstacle(Pose(5.0, 1.2, 0.0), WALL)
     await tour.clock.advance(45.0)
     assert action.status is ActionStatus.EXECUTING
-    tour.world.hands.remove_obstacle(wall)
+    tour.world.stage.remove_obstacle(wall)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
 
@@ -249,7 +249,7 @@ async def test_robot_carried_while_turning_at_goal_fails(tour: Tour, x: float, y
     drive = tour.head_for((12.0, 6.5), deg=90)
     goal = Pose(12.0, 6.5, math.radians(90.0))
     await tour.until(lambda: tour.truth.distance_to(goal) < 0.05 and abs(tour.truth.yaw - goal.yaw) < 0.2)
-    tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
+    tour.world.stage.place("a", Pose(x, y, math.radians(deg)))
     await tour.end_of(drive)
     turned = abs(math.degrees(wrap_angle(tour.truth.yaw - goal.yaw)))
     assert drive.status is ActionStatus.ABORTED or (tour.truth.distance_to(goal) < 0.05 and turned < 2.0)

@@ -23,7 +23,7 @@ async def cross(fleet, world, clock, most):
     """Both robots drive through the area from the south; how many hulls were inside at once, and who waited."""
     starts = {"a": Pose(3.0, 4.5), "b": Pose(7.0, 3.0)}
     for name, pose in starts.items():
-        world.hands.place(name, pose)
+        world.stage.place(name, pose)
     await clock.advance(0.5)
     frames = {}
     for name, robot in fleet.robots.items():

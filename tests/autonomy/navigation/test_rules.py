@@ -99,7 +99,7 @@ async def test_forbidden_areas_may_be_left_but_not_entered(tour: Tour) -> None:
     radius = tour.robot.description.radius
     assert all(max(abs(p.x - 5.0), abs(p.y - 5.0)) > 1.5 + radius - 0.03 for p in places)
     assert isinstance((await tour.go((5.0, 5.0))).error, Unreachable)
-    tour.world.hands.place("a", Pose(5.6, 5.0, 0.0))
+    tour.world.stage.place("a", Pose(5.6, 5.0, 0.0))
     tour.robot[Localization].set_pose(Pose(5.6, 5.0, 0.0).relative_to(tour.start))
     action = await tour.go((8.5, 5.0))
     assert action.status is ActionStatus.SUCCEEDED, action.reason
@@ -148,14 +148,14 @@ async def test_waits_on_strict_tracks_reporting_after_three_minutes(
     tour.robot.events.listen(RobotBlocked, reported.append)
     action = tour.head_for((8.5, 5.0), tracks=Tracks.STRICT)
     await tour.until(lambda: tour.truth.x > 3.0)
-    stone = tour.world.hands.add_obstacle(Pose(6.0, 5.0, 0.0), (0.5, 0.5, 1.0))
+    stone = tour.world.stage.add_obstacle(Pose(6.0, 5.0, 0.0), (0.5, 0.5, 1.0))
     await tour.clock.advance(PilotTuning().patience + 5.0)
     assert action.status is ActionStatus.EXECUTING
     assert tour.blocks
     assert not reported
     await tour.clock.advance(20.0)
     assert [event.action for event in reported] == [action]
-    tour.world.hands.remove_obstacle(stone)
+    tour.world.stage.remove_obstacle(stone)
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert len(reported) == 1
@@ -165,7 +165,7 @@ async def test_waits_on_strict_tracks_reporting_after_three_minutes(
 async def test_in_maintenance_the_map_changes_only_there(tour: Tour) -> None:
     await tour.clock.advance(2.0)
     await draw(tour, area(AreaKind.MAINTENANCE, 4.0, 5.0, 1.0))
-    tour.world.hands.add_obstacle(Pose(6.0, 6.15, 0.0), (0.4, 0.4, 1.0))
+    tour.world.stage.add_obstacle(Pose(6.0, 6.15, 0.0), (0.4, 0.4, 1.0))
     await tour.clock.advance(8.0)
     grid = tour.robot[Mapping].grid
 
@@ -174,7 +174,7 @@ async def test_in_maintenance_the_map_changes_only_there(tour: Tour) -> None:
         return bool((grid.log_odds[row - 5 : row + 6, column - 5 : column + 6] > 0).any())
 
     assert not occupied(6.0, 6.15)
-    tour.world.hands.add_obstacle(Pose(4.2, 5.4, 0.0), (0.4, 0.4, 1.0))
+    tour.world.stage.add_obstacle(Pose(4.2, 5.4, 0.0), (0.4, 0.4, 1.0))
     await tour.clock.advance(8.0)
     grid = tour.robot[Mapping].grid
     assert occupied(4.2, 5.4)

@@ -23,7 +23,7 @@ STONE = (5.5, 4.5, 0.6)  # middle and side
 
 @pytest.mark.slow  # a long story
 async def test_a_coverage_area_around_an_obstacle_is_swept(tour: Tour) -> None:
-    tour.world.hands.add_obstacle(Pose(*STONE[:2], 0.0), (STONE[2], STONE[2], 1.0))
+    tour.world.stage.add_obstacle(Pose(*STONE[:2], 0.0), (STONE[2], STONE[2], 1.0))
     for spot in ((5.5, 3.0), (7.3, 4.5), (5.5, 6.0)):  # seen from all sides
         await tour.go(spot)
     middle = (SOUTH + NORTH) / 2

@@ -35,7 +35,7 @@ async def test_a_robot_pushed_back_knows_its_error(tmp_path: Path, seed: int) ->
     body.write_text(re.sub(r"(?m)^range_max = 12.0", "range_max = 4.0", text, count=1))
     clock, database = LockstepClock(), Database(":memory:")
     fleet = build_fleet(RING, [RobotConfig(body=str(body))], clock=clock, seed=seed, database=database)
-    fleet.world.hands.place("a", Pose(12.0, 1.3, 0.0))
+    fleet.world.stage.place("a", Pose(12.0, 1.3, 0.0))
     await fleet.start(wait=True)
     robot, start = fleet.robots["a"], fleet.world.truth.pose_of("a")
     await clock.advance(1.0)
@@ -49,7 +49,7 @@ async def test_a_robot_pushed_back_knows_its_error(tmp_path: Path, seed: int) ->
         truth = fleet.world.truth.pose_of("a")
         if truth.x > pushed:
             pushed += 2.0
-            fleet.world.hands.push("a", BACK)
+            fleet.world.stage.push("a", BACK)
         errors.append(abs(localization.pose.x - truth.relative_to(start).x))
         sigmas.append(math.sqrt(localization.estimator.trajectory()[-1].covariance[0, 0]))
     quality = localization.quality

@@ -56,7 +56,7 @@ async def test_sightings_while_lost_are_joined_to_the_map(tour: Tour) -> None:
     tour.robot.events.listen(LocalizationLost, news.append)
     tour.robot.events.listen(LocalizationRecovered, news.append)
     through_the_door = len(walls_in(tour, ROOM))
-    tour.world.hands.place("a", Pose(4.0, 14.5, math.radians(-90.0)))
+    tour.world.stage.place("a", Pose(4.0, 14.5, math.radians(-90.0)))
     await tour.clock.advance(3.0)
     assert isinstance(news[-1], LocalizationLost)
     await steer(tour, (4.0, 13.0), (4.0, 10.2))

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 @pytest.fixture(autouse=True)
 async def in_the_middle(world: World, clock: LockstepClock) -> None:
     """Away from all walls."""
-    world.hands.place("a", MIDDLE)
+    world.stage.place("a", MIDDLE)
     await clock.advance(1.0)
 
 
@@ -32,7 +32,7 @@ async def test_a_shove_is_reported_with_its_way(
     robot: Robot, world: World, clock: LockstepClock, blow: Vector3
 ) -> None:
     shoves, before = robot.events.subscribe(RobotDisplaced), world.truth.pose_of("a")
-    world.hands.push("a", blow)
+    world.stage.push("a", blow)
     await clock.advance(2.0)
     (shove,) = shoves.drain()
     way = world.truth.pose_of("a").distance_to(before)
@@ -42,7 +42,7 @@ async def test_a_shove_is_reported_with_its_way(
 
 async def test_a_nudge_is_not_reported(robot: Robot, world: World, clock: LockstepClock) -> None:
     shoves, before = robot.events.subscribe(RobotDisplaced), world.truth.pose_of("a")
-    world.hands.push("a", SOFT)
+    world.stage.push("a", SOFT)
     await clock.advance(2.0)
     assert world.truth.pose_of("a").distance_to(before) < 0.05
     assert not shoves.drain()
@@ -51,7 +51,7 @@ async def test_a_nudge_is_not_reported(robot: Robot, world: World, clock: Lockst
 async def test_a_shoved_move_does_not_succeed(robot: Robot, world: World, clock: LockstepClock) -> None:
     action = robot[Driving].move_by(Pose(1.0), speed=0.5)
     await clock.advance(1.0)
-    world.hands.push("a", SIDEWAYS)
+    world.stage.push("a", SIDEWAYS)
     await clock.advance(5.0)
     assert action.status is not ActionStatus.SUCCEEDED
     assert isinstance(action.error, Blocked)
@@ -64,7 +64,7 @@ async def test_a_shoved_move_does_not_succeed(robot: Robot, world: World, clock:
 async def test_driving_hard_is_no_shove(robot: Robot, world: World, clock: LockstepClock, seed: int) -> None:
     shoves = robot.events.subscribe(RobotDisplaced)
     for twist in (Twist(3.5), Twist(-3.5), Twist(0.0, 3.0), Twist(2.0, 1.0, 3.0), Twist(0.0, 0.0, 8.0)):
-        world.hands.place("a", MIDDLE)
+        world.stage.place("a", MIDDLE)
         await clock.advance(0.1)
         robot[Base].set_velocity(twist)
         await clock.advance(0.8)

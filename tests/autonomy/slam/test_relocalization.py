@@ -32,7 +32,7 @@ async def carried(tour: Tour, x: float, y: float, deg: float) -> None:
     """Carry the robot there while its scans are ignored."""
     tour.robot[Mapping].enable(False)
     tour.robot[Localization].enable(False)
-    tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
+    tour.world.stage.place("a", Pose(x, y, math.radians(deg)))
     await tour.clock.advance(0.3)
 
 
@@ -77,7 +77,7 @@ async def test_robot_carried_during_the_search_is_found(
         action = tour.robot_finds_itself()
         for step in range(1, 9):  # the robot is still in the air when the search begins
             ahead = Pose(x, y, math.radians(towards)).compose(Pose(0.08 * step))
-            tour.world.hands.place("a", Pose(ahead.x, ahead.y, math.radians(deg + turned)))
+            tour.world.stage.place("a", Pose(ahead.x, ahead.y, math.radians(deg + turned)))
             await tour.clock.advance(0.1)
         await tour.end_of(action)
         assert action.status is ActionStatus.SUCCEEDED, action.reason
@@ -94,7 +94,7 @@ async def test_a_kidnapped_robot_says_so_and_recovers(tour: Tour) -> None:
     tour.robot.events.listen(LocalizationRecovered, news.append)
     for x, y, deg in ((20.0, 10.2, 170.0), (13.0, 6.6, -60.0), (9.5, 9.7, 30.0)):
         walls = int((tour.robot[Mapping].grid.log_odds > 0).sum())
-        tour.world.hands.place("a", Pose(x, y, math.radians(deg)))
+        tour.world.stage.place("a", Pose(x, y, math.radians(deg)))
         await tour.clock.advance(5.0)
         lost, found = news[0], news[-1]  # a place accepted too early may be lost again
         assert isinstance(lost, LocalizationLost)
@@ -183,7 +183,7 @@ async def test_robot_stays_lost_while_only_other_places_fit(
 @pytest.mark.world("empty")
 async def test_lost_robot_keeps_saying_that_places_look_alike(tour: Tour) -> None:
     await tour.go((8.5, 5.0))
-    tour.world.hands.place("a", Pose(5.6, 5.0))
+    tour.world.stage.place("a", Pose(5.6, 5.0))
     await tour.clock.advance(4.0)
     for _ in range(15):
         assert tour.robot[Localization].lost is LostReason.AMBIGUOUS
@@ -200,7 +200,7 @@ async def test_place_a_metre_along_corridors_is_found(tour: Tour, x: float, alon
     tour.robot[Localization].set_pose(Pose(x + along, 10.0, math.pi).relative_to(tour.start))
     await tour.clock.advance(3.0)
     assert tour.error[0] < 0.05
-    tour.world.hands.place("a", Pose(x + along, 10.0, math.pi))
+    tour.world.stage.place("a", Pose(x + along, 10.0, math.pi))
     await tour.clock.advance(6.0)
     assert tour.error[0] < 0.05 or tour.robot[Localization].lost
 

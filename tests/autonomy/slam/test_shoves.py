@@ -28,7 +28,7 @@ async def test_shoved_standing_robot_reports_it(tour: Tour) -> None:
     await tour.clock.advance(3.0)
     assert not shoves.drain()
     before = tour.truth
-    tour.world.hands.push("a", HARD)
+    tour.world.stage.push("a", HARD)
     worst = 1.0
     for _ in range(20):
         await tour.clock.advance(0.1)
@@ -49,7 +49,7 @@ async def test_robot_shoved_while_driving_waits_until_localized(tour: Tour) -> N
     await tour.until(lambda: tour.robot[Base].velocity.speed > 0.8)
     await tour.clock.advance(1.0)
     assert not shoves.drain()
-    tour.world.hands.push("a", SIDEWAYS)
+    tour.world.stage.push("a", SIDEWAYS)
     await tour.until(lambda: bool(shoves.drain()), seconds=2.0)
     slowest = 9.0
     for _ in range(10):
@@ -66,7 +66,7 @@ async def test_move_with_a_shove_does_not_succeed(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
     action = tour.robot[Driving].move_by(Pose(2.0), speed=0.8)
     await tour.clock.advance(1.2)
-    tour.world.hands.push("a", SIDEWAYS)
+    tour.world.stage.push("a", SIDEWAYS)
     await tour.end_of(action)
     assert isinstance(action.error, Blocked)
     assert "displaced" in action.reason
@@ -79,7 +79,7 @@ async def test_push_against_the_wheels_is_no_slip(tour: Tour, speed: float, blow
     await tour.go((20.0, 10.0), deg=180)
     shoves, action = tour.robot.events.subscribe(RobotDisplaced), tour.robot[Driving].move_by(Pose(2.0), speed=speed)
     await tour.clock.advance(1.5)
-    tour.world.hands.push("a", Vector3(-blow, 0.0, 0.0))
+    tour.world.stage.push("a", Vector3(-blow, 0.0, 0.0))
     await tour.end_of(action)
     assert len(shoves.drain()) == 1
     assert isinstance(action.error, Blocked)
@@ -94,7 +94,7 @@ async def test_move_of_a_carried_robot_does_not_succeed(tour: Tour, carried: Pos
     action = tour.robot[Driving].move_by(Pose(2.0), speed=0.4)
     await tour.clock.advance(1.5)
     pose = tour.truth
-    tour.world.hands.place("a", Pose(pose.x + carried.x, pose.y + carried.y, pose.yaw + carried.yaw))
+    tour.world.stage.place("a", Pose(pose.x + carried.x, pose.y + carried.y, pose.yaw + carried.yaw))
     await tour.end_of(action)
     assert isinstance(action.error, NotLocalized), action.reason
 
@@ -111,7 +111,7 @@ async def test_move_with_a_carry_at_its_end_fails(tour: Tour, carried: Pose, bef
     action = tour.robot[Driving].move_by(Pose(1.0), speed=0.6)
     await tour.clock.advance(2.13 - before)  # as long as it takes
     pose = tour.truth
-    tour.world.hands.place("a", Pose(pose.x + carried.x, pose.y + carried.y, pose.yaw + carried.yaw))
+    tour.world.stage.place("a", Pose(pose.x + carried.x, pose.y + carried.y, pose.yaw + carried.yaw))
     begun = tour.clock.time()
     await tour.end_of(action)
     assert begun + before - 0.1 < tour.clock.time() < begun + before + 4.0
@@ -141,7 +141,7 @@ async def test_driving_and_turning_are_no_shoves(tour: Tour, seed: int) -> None:
 @pytest.mark.world("obstacle_course")
 async def test_slipping_wheels_are_no_displacement(tour: Tour) -> None:
     """Against the side of a ramp, which the lidar does not see."""
-    tour.world.hands.place("a", Pose(3.9, 2.9, math.pi / 2))
+    tour.world.stage.place("a", Pose(3.9, 2.9, math.pi / 2))
     tour.robot[Localization].set_pose(tour.truth.relative_to(tour.start))
     await tour.clock.advance(3.0)
     shoves = tour.robot.events.subscribe(RobotDisplaced)

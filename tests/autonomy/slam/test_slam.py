@@ -72,7 +72,7 @@ async def test_a_frozen_map_stays_and_localizes(tour: Tour) -> None:
     await tour.go((5.0, 5.0))
     mapping.enable(False)
     before, revision = mapping.grid, mapping.revision
-    tour.world.hands.add_obstacle(Pose(8.0, 8.0, 0.0), (1.0, 1.0, 1.0))
+    tour.world.stage.add_obstacle(Pose(8.0, 8.0, 0.0), (1.0, 1.0, 1.0))
     await tour.go((3.0, 3.0))
     assert mapping.revision == revision
     np.testing.assert_array_equal(mapping.grid.log_odds, before.log_odds)
@@ -143,11 +143,11 @@ async def test_spinning_wheels_do_not_carry_the_pose_away(tour: Tour) -> None:
 
 @pytest.mark.world("empty")
 async def test_someone_who_stood_there_is_forgotten(tour: Tour) -> None:
-    box = tour.world.hands.add_obstacle(Pose(5.0, 5.0, 0.0), (0.4, 0.4, 1.7))
+    box = tour.world.stage.add_obstacle(Pose(5.0, 5.0, 0.0), (0.4, 0.4, 1.7))
     await tour.clock.advance(4.0)
     mapping = tour.robot[Mapping]
     assert _near(mapping.grid, tour.on_map(4.8, 5.0))
-    tour.world.hands.remove_obstacle(box)
+    tour.world.stage.remove_obstacle(box)
     await tour.clock.advance(20.0)
     grid = mapping.grid
     row, column = grid.cell_of(tour.on_map(5.0, 5.0))
@@ -198,7 +198,7 @@ async def test_nonsense_poses_are_refused(tour: Tour) -> None:
 @pytest.mark.world("office")
 async def test_a_robot_that_was_pushed_aside_finds_itself(tour: Tour) -> None:
     await tour.go((20.0, 10.0))
-    tour.world.hands.place("a", tour.truth.compose(Pose(0.1, 0.15, math.radians(4.0))))
+    tour.world.stage.place("a", tour.truth.compose(Pose(0.1, 0.15, math.radians(4.0))))
     assert tour.error[0] > 0.15  # odometry noticed nothing
     await tour.clock.advance(2.0)
     assert tour.error[0] < 0.03

@@ -23,13 +23,13 @@ async def test_pressing_against_hidden_obstacle_counts_as_no_motion(tmp_path: Pa
     clock, database = LockstepClock(), Database(":memory:")
     robots = [RobotConfig(body=short_sighted(tmp_path))]
     fleet = build_fleet(RING, robots, clock=clock, seed=2, database=database)
-    fleet.world.hands.place("a", Pose(14.0, 1.3, 0.0))
+    fleet.world.stage.place("a", Pose(14.0, 1.3, 0.0))
     await fleet.start(wait=True)
     robot, start = fleet.robots["a"], fleet.world.truth.pose_of("a")
     await clock.advance(1.0)
     mask_bumper(robot)
     if held:
-        fleet.world.hands.add_obstacle(Pose(15.0, 1.3, 0.0), (0.4, 1.2, 1.0))
+        fleet.world.stage.add_obstacle(Pose(15.0, 1.3, 0.0), (0.4, 1.2, 1.0))
     robot[Driving].drive(Twist(x=0.4), lifetime=20.0)
     await clock.advance(20.0)
     truth = fleet.world.truth.pose_of("a")

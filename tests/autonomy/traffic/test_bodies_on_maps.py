@@ -56,7 +56,7 @@ async def test_announced_robots_are_not_mapped(body: str, painted: bool) -> None
     fleet = build_fleet("empty", robots, clock=clock, seed=1, database=database)
     poses = {"a": Pose(3.0, 5.0), "b": Pose(5.0, 5.0)}
     for name, pose in poses.items():
-        fleet.world.hands.place(name, pose)
+        fleet.world.stage.place(name, pose)
     await fleet.start(wait=True)
     empty = np.full((200, 200), -100, np.int8)
     empty[0], empty[-1], empty[:, 0], empty[:, -1] = 100, 100, 100, 100

@@ -40,7 +40,7 @@ async def test_looks_ahead_after_going_aside(tour: Tour, monkeypatch: pytest.Mon
     tour.head_for((goal.x, goal.y))
     await tour.until(lambda: plans == 3, 30.0)
     assert asked["is_due_without_route"] == 1
-    tour.world.hands.add_obstacle(Pose(tour.truth.x + 1.2, tour.truth.y))
+    tour.world.stage.add_obstacle(Pose(tour.truth.x + 1.2, tour.truth.y))
     await tour.clock.advance(6.0)
     assert not tour.bumps
     assert tour.blocks

@@ -63,17 +63,17 @@ async def test_only_what_is_unknown_contradicts_a_pose(
 ) -> None:
     start = StartConfig(HALL.x, HALL.y, HALL.yaw)
     async with opened(TIGHT, [RobotConfig("a", start=start)], 1) as (fleet, clock):
-        robot, hands = fleet.robots["a"], fleet.world.hands
+        robot, stage = fleet.robots["a"], fleet.world.stage
         confirmed, losses = robot.events.subscribe(PoseConfirmed), robot.events.subscribe(LocalizationLost)
         robot[Mapping].load(building, HALL)
         await clock.advance(2.0)
         assert confirmed.drain()
         for pose in ring():
-            hands.add_obstacle(pose, (1.6 * RADIUS, 1.6 * RADIUS, 1.0))
+            stage.add_obstacle(pose, (1.6 * RADIUS, 1.6 * RADIUS, 1.0))
         if announced:
             announce_from(robot, ring(), clock, monkeypatch)
         if carried:
-            hands.place("a", ELSEWHERE)
+            stage.place("a", ELSEWHERE)
         await clock.advance(SECONDS)
         assert bool(losses.drain()) is lost
         if not carried:
@@ -90,7 +90,7 @@ async def test_map_loaded_in_a_crowd_is_confirmed(building: OccupancyGrid, monke
         await clock.advance(2.0)
         announce_from(robot, ring(), clock, monkeypatch)
         for pose in ring():
-            fleet.world.hands.add_obstacle(pose, (1.6 * RADIUS, 1.6 * RADIUS, 1.0))
+            fleet.world.stage.add_obstacle(pose, (1.6 * RADIUS, 1.6 * RADIUS, 1.0))
         confirmed, losses = robot.events.subscribe(PoseConfirmed), robot.events.subscribe(LocalizationLost)
         robot[Mapping].load(building, HALL)
         await clock.advance(SECONDS)

@@ -127,7 +127,7 @@ def asked(client: CyberDogClient, monkeypatch) -> set[int]:
 
 
 async def test_every_code_of_the_contract_once(client, door: CyberDogDoor, robot, world, asked: set[int]) -> None:
-    world.hands.place("a", Pose(9.0, 6.0))
+    world.stage.place("a", Pose(9.0, 6.0))
     gadget = world.gadgets.get(BRACELET.mac)
     gadget.wearer, gadget.place = None, Point(9.5, 6.5)
     await client.found()

@@ -65,10 +65,10 @@ async def test_events(client, run, forward, robot, world) -> None:
     with client.watch(ArmorHit, AdapterLevel) as events:
         await run(client.armor.event(True))
         await run(client.sensor_adapter.event(True))
-        world.hands.touch_plate("a", PlatePlace.REAR)
+        world.stage.touch_plate("a", PlatePlace.REAR)
         await forward(seconds=0.2)
         assert await asyncio.wait_for(anext(events), 60) == ArmorHit(1, 2)
-        world.hands.apply_voltage("a", 3, 2, 2.5)
+        world.stage.apply_voltage("a", 3, 2, 2.5)
         await forward(seconds=0.2)
         assert await asyncio.wait_for(anext(events), 60) == AdapterLevel(3, 2, 1)
 
@@ -79,7 +79,7 @@ async def test_events_of_robot_whose_address_was_found_later(client, run, forwar
     async with late:
         with late.watch(ArmorHit) as events:
             await run(late.armor.event(True))
-            world.hands.touch_plate("a", PlatePlace.REAR)
+            world.stage.touch_plate("a", PlatePlace.REAR)
             await forward(seconds=0.2)
             assert await asyncio.wait_for(anext(events), 60) == ArmorHit(1, 2)
 

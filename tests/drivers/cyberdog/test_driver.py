@@ -123,18 +123,18 @@ async def test_it_stands_square_before_stairs(
     driven: Robot, robot: Robot, until: Until, forward: Forward, world: World
 ) -> None:
     alignment = driven[StairAlignment]
-    world.hands.place("a", Pose(2.0, 2.0))
+    world.stage.place("a", Pose(2.0, 2.0))
     await forward(seconds=0.3)
     nowhere = alignment.align(StairDirection.UP, source="test")
     await until(lambda: nowhere.status.ended)
     assert isinstance(nowhere.error, NotFound)
-    world.hands.place("a", Pose(3.3, 4.0, 0.3))
+    world.stage.place("a", Pose(3.3, 4.0, 0.3))
     await forward(seconds=0.3)  # until its depth sensors have measured there
     action = alignment.align(StairDirection.UP, source="test")
     await until(lambda: action.feedback is AlignmentStage.ALIGNING)
     await done(action, until)
     assert_pose(world.truth.pose_of("a"), x=3.45, deg=0, within=0.03, within_deg=3)
-    world.hands.place("a", Pose(3.3, 4.0, 0.3))
+    world.stage.place("a", Pose(3.3, 4.0, 0.3))
     await forward(seconds=0.3)  # until its depth sensors have measured there
     action = alignment.align(StairDirection.UP, source="test")
     await until(lambda: action.feedback is AlignmentStage.ALIGNING)
@@ -211,7 +211,7 @@ async def test_follows_and_docks_by_own_skills_when_localized(
 ) -> None:
     start = world.truth.pose_of("a")  # at its localized place: it is not carried away
     anna = start.compose(Pose(3.0))
-    world.hands.person("anna").place(anna.x, anna.y, math.degrees(start.yaw) + 180.0)
+    world.stage.person("anna").place(anna.x, anna.y, math.degrees(start.yaw) + 180.0)
     following = driven[Following].follow(distance=1.2, source="test")
     await until(lambda: 0.8 < world.truth.pose_of("a").distance_to(anna) < 1.6)
     following.cancel()

@@ -62,7 +62,7 @@ async def test_sensor_adapters_report_volts_levels_and_periods(
     changes: list[AdapterLevelChanged] = []
     driven_ep.events.listen(AdapterLevelChanged, changes.append)
     for voltage in (0.5, 2.0, 1.0, 2.5):
-        world.hands.apply_voltage("a", 5, 2, voltage)
+        world.stage.apply_voltage("a", 5, 2, voltage)
         await forward(seconds=0.1)
         await settle()
     await until(lambda: adapters.voltage(5, 2) == pytest.approx(2.5, abs=0.01), patience=2)
@@ -84,7 +84,7 @@ async def test_its_microphone_and_applause_reach_the_next_robot(
     with driven_ep[Microphone].subscribe() as blocks, driven_ep[AudioStream].subscribe() as packets:
         heard = blocks.drain()
         await until(lambda: packets.drain())
-        world.hands.make_sound(tone(1000.0, 0.4), beside)
+        world.stage.make_sound(tone(1000.0, 0.4), beside)
         for _ in range(40):
             await forward(seconds=0.02)
             await settle()
@@ -96,7 +96,7 @@ async def test_its_microphone_and_applause_reach_the_next_robot(
         driven_ep[Hearing].speech()
     with driven_ep[Hearing].claps() as runs:
         await forward(seconds=0.2)
-        world.hands.make_sound(claps(3), beside)
+        world.stage.make_sound(claps(3), beside)
         reported = runs.drain()
         for _ in range(30):
             await forward(seconds=0.1)
@@ -109,8 +109,8 @@ async def test_its_microphone_and_applause_reach_the_next_robot(
 async def test_it_sees_people_markers_and_lines(
     driven_ep: Robot, robot: Robot, world: World, until: Until, forward: Forward
 ) -> None:
-    vision, anna = driven_ep[Vision], world.hands.person("anna").pose
-    world.hands.place("a", Pose(anna.x - 2.5, anna.y + 0.3, 0.0))
+    vision, anna = driven_ep[Vision], world.stage.person("anna").pose
+    world.stage.place("a", Pose(anna.x - 2.5, anna.y + 0.3, 0.0))
     with vision.people.subscribe() as watching:
         with pytest.raises(Busy):
             vision.markers.subscribe()
@@ -120,7 +120,7 @@ async def test_it_sees_people_markers_and_lines(
         assert (seen.place.x, seen.place.y) == pytest.approx((place.x, place.y), abs=0.4)
         await forward(seconds=0.5)
         assert {look.seen[0].number for look in watching.drain()} == {seen.number}  # the nearest one stays the same
-    world.hands.place(
+    world.stage.place(
         "a", Pose(4.0, 1.5, -math.pi / 2)
     )  # in front of the south wall: left (red), forward (blue), right (red)
     with vision.markers.subscribe(), vision.lines.subscribe():

@@ -22,10 +22,10 @@ async def test_touches_are_waited_for(caller: Caller, world: World) -> None:
     waiting = caller.start("cyberdog.touch.get_data", 5)
     await caller.clock.advance(1.0)
     assert not waiting.done()
-    world.hands.touch("a", TouchKind.LONG)
+    world.stage.touch("a", TouchKind.LONG)
     await caller.clock.advance(0.2)
     assert field(waiting.result(), "touch_state") == 3
-    world.hands.touch("a", TouchKind.DOUBLE)
+    world.stage.touch("a", TouchKind.DOUBLE)
     await caller.clock.advance(0.2)
     data = await caller("cyberdog.touch.data")
     assert field(data, "touch_state") == 2
@@ -59,7 +59,7 @@ async def test_tof_sees_what_stands_before_the_head(caller: Caller, world: World
     assert field(free, "head.left_head.data_available") is True
     pose = world.truth.pose_of("a")
     before = Pose(pose.x + 0.55 * math.cos(pose.yaw), pose.y + 0.55 * math.sin(pose.yaw))
-    world.hands.add_obstacle(before, (0.1, 0.8, 0.6))
+    world.stage.add_obstacle(before, (0.1, 0.8, 0.6))
     await caller.clock.advance(0.3)
     data = await caller("cyberdog.tof.data")
     left = field(data, "head.left_head.data")
@@ -72,7 +72,7 @@ async def test_ultrasonic_measures_while_the_program_runs(caller: Caller, world:
     sensors = caller.robot[RangeSensors]
     assert not sensors.measuring
     pose = world.truth.pose_of("a")
-    world.hands.add_obstacle(
+    world.stage.add_obstacle(
         Pose(pose.x + 1.5 * math.cos(pose.yaw), pose.y + 1.5 * math.sin(pose.yaw)), (0.2, 1.0, 1.0)
     )
     data = await caller("cyberdog.ultrasonic.get_data")

@@ -29,12 +29,12 @@ async def test_a_cliff_ahead_lets_no_walk_get_on(caller: Caller, world: World) -
 async def test_a_robot_held_up_walks_nowhere(
     caller: Caller, world: World, name: str, values: tuple[float, ...]
 ) -> None:
-    world.hands.lift("a")
+    world.stage.lift("a")
     await caller.clock.advance(0.5)
     walked = await caller(f"cyberdog.motion.{name}", *values)
     assert (field(walked, "state.code"), field(walked, "response.code")) == (1, 3003)
     assert field(walked, "state.describe") == "the robot is held up: it has no floor under it"
-    world.hands.let_go("a")
+    world.stage.let_go("a")
     await caller.clock.advance(1.0)
     assert field(await caller("cyberdog.motion.go_straight", 0.2, 0.2), "state.code") == 0
 

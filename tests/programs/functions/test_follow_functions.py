@@ -19,8 +19,8 @@ pytestmark = pytest.mark.world("playground")
 
 @pytest.fixture
 async def anna(caller: Caller, world: World) -> Actor:
-    world.hands.place("a", Pose(1.5, 6.8))
-    ben, anna = world.hands.person("ben"), world.hands.person("anna")
+    world.stage.place("a", Pose(1.5, 6.8))
+    ben, anna = world.stage.person("ben"), world.stage.person("anna")
     ben.stand()
     ben.place(7.0, 1.0, 0)
     anna.stand()
@@ -81,7 +81,7 @@ async def test_another_clients_motion_ends_following(caller: Caller, anna: Actor
 
 @pytest.mark.slow  # in short: test_it_walks_after_member_and_keeps_its_distance
 async def test_it_goes_around_what_stands_between(caller: Caller, world: World, anna: Actor) -> None:
-    world.hands.add_obstacle(Pose(3.2, 6.58), (0.2, 0.2, 1.0))  # standing aside to see her, and moving on
+    world.stage.add_obstacle(Pose(3.2, 6.58), (0.2, 0.2, 1.0))  # standing aside to see her, and moving on
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)
     await caller.clock.advance(15.0)

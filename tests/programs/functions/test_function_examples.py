@@ -40,12 +40,12 @@ OTHERS = sorted(set(EXAMPLES) - set(WITH_PEOPLE) - set(WITH_MAP) - set(MOTIONS))
 HALVES = [0, pytest.param(1, marks=pytest.mark.slow)]
 HAPPENINGS: dict[str, Callable[[World], object]] = {
     "": lambda _world: None,
-    "a person holds a thumb up": lambda world: world.hands.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
-    "a person holds a flat hand up": lambda world: world.hands.person("anna").gesture(Gesture.STOP, seconds=3),
-    "a person does squats": lambda world: world.hands.person("anna").do_sport(Sport.SQUAT, count=5, period=2.0),
-    "a person says 暂停任务": lambda world: world.hands.person("anna").say("暂停任务"),
-    "Anna says something": lambda world: world.hands.person("anna").say("good morning"),
-    "a person touches it twice": lambda world: world.hands.touch("a", TouchKind.DOUBLE),
+    "a person holds a thumb up": lambda world: world.stage.person("anna").gesture(Gesture.THUMB_UP, seconds=3),
+    "a person holds a flat hand up": lambda world: world.stage.person("anna").gesture(Gesture.STOP, seconds=3),
+    "a person does squats": lambda world: world.stage.person("anna").do_sport(Sport.SQUAT, count=5, period=2.0),
+    "a person says 暂停任务": lambda world: world.stage.person("anna").say("暂停任务"),
+    "Anna says something": lambda world: world.stage.person("anna").say("good morning"),
+    "a person touches it twice": lambda world: world.stage.touch("a", TouchKind.DOUBLE),
 }
 
 
@@ -71,7 +71,7 @@ class Player:
         assert name not in EFFECTS or EFFECTS[name](seen), (name, seen.way, goals, played.said, played.colours)
 
     async def stand_at(self, x: float, y: float) -> None:
-        self.world.hands.place("a", Pose(x, y))
+        self.world.stage.place("a", Pose(x, y))
         if self.robot[Legs].posture is not Posture.STANDING:
             await self.stage.play("cyberdog.motion.resume_standing()")
         await self.clock.advance(0.1)
@@ -113,7 +113,7 @@ async def test_examples_of_what_needs_no_one(player: Player, part: int) -> None:
 @pytest.mark.world("playground", body="cyberdog2")
 @pytest.mark.parametrize("part", HALVES)
 async def test_examples_with_people(player: Player, world: World, part: int) -> None:
-    anna, ben = world.hands.person("anna"), world.hands.person("ben")
+    anna, ben = world.stage.person("anna"), world.stage.person("ben")
     ben.stand()
     ben.place(1.0, 7.5, 90)
     for person in (anna, ben):

@@ -269,7 +269,7 @@ async def test_a_program_without_control_learns_so(caller: Caller) -> None:
 
 
 async def test_wall_ends_a_walk_in_an_error_state(caller: Caller, world: World) -> None:
-    world.hands.place("a", Pose(9.5, 5.0, 0.0))
+    world.stage.place("a", Pose(9.5, 5.0, 0.0))
     result = await caller("cyberdog.motion.go_straight", 0.3, 2.0)
     assert field(result, "state.code") != 0
     assert field(result, "response.result") is False

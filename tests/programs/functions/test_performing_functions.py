@@ -186,27 +186,27 @@ async def test_dog_on_leash_goes_where_it_is_pulled(caller: Caller, world: World
     legs = caller.robot[Legs]
     await off_the_dock(caller)
     before, start = world.truth.pose_of("a"), caller.clock.time()
-    world.hands.pull("a", Point(15.0, 0.0))
+    world.stage.pull("a", Point(15.0, 0.0))
     await caller.clock.advance(2.0)
     assert world.truth.pose_of("a").distance_to(before) < 0.02  # not on a leash, it stands
-    world.hands.pull("a", Point())
+    world.stage.pull("a", Point())
     await caller("cyberdog.motion.walk_the_dog")
     assert caller.clock.time() - start < 4.0
     await caller.clock.advance(3.0)
     assert world.truth.pose_of("a").distance_to(before) < 0.02
     assert legs.gait is Gait.TROT_PASSIVE  # it waits
     ahead = Pose(before.x, before.y, before.yaw).compose(Pose(0.0, 1.0))  # to its left
-    world.hands.pull("a", Point(10 * (ahead.x - before.x), 10 * (ahead.y - before.y)))
+    world.stage.pull("a", Point(10 * (ahead.x - before.x), 10 * (ahead.y - before.y)))
     await caller.clock.advance(3.0)
     way = world.truth.pose_of("a").relative_to(before)
     assert way.y > 0.5
     assert math.degrees(way.yaw) == pytest.approx(90, abs=15)
-    world.hands.pull("a", Point(0.5, 0.5))
+    world.stage.pull("a", Point(0.5, 0.5))
     await caller.clock.advance(2.0)
     held = world.truth.pose_of("a")
     await caller.clock.advance(1.0)
     assert world.truth.pose_of("a").distance_to(held) < 0.01
-    world.hands.pull("a", Point(15.0, 0.0))
+    world.stage.pull("a", Point(15.0, 0.0))
     caller.session.cancel("the end")
     await caller.clock.advance(2.0)
     assert legs.gait is not Gait.TROT_PASSIVE

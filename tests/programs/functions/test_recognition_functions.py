@@ -24,8 +24,8 @@ HOLD, THUMB = ENUMS["GestureType"]["stop_sign"], ENUMS["GestureType"]["thumb_up"
 @pytest.fixture
 async def anna(caller: Caller, world: World) -> Actor:
     """A person in front of the camera, and no one else in sight."""
-    world.hands.place("a", Pose(2.0, 5.0))
-    ben, anna = world.hands.person("ben"), world.hands.person("anna")
+    world.stage.place("a", Pose(2.0, 5.0))
+    ben, anna = world.stage.person("ben"), world.stage.person("anna")
     ben.stand()
     ben.place(1.0, 7.5, 90)
     anna.stand()
@@ -175,7 +175,7 @@ async def test_members_are_known_by_their_faces(caller: Caller, world: World, an
     assert field(await caller("cyberdog.personnel.face_recognized", []), "state.code") == 1  # no face is known
     for name in ("Anna", "Ben"):
         await members.add(name)
-        await members.set_face(name, world.hands.person(name.lower()).face)
+        await members.set_face(name, world.stage.person(name.lower()).face)
     for people in ([], ["Anna"], [str(members.get("Anna").id)], ["Anna", "Ben"]):
         result = await caller("cyberdog.personnel.face_recognized", people, False, 30)
         assert field(result, "state.code") == 0
@@ -194,12 +194,12 @@ async def test_members_are_known_by_their_voices(caller: Caller, world: World, a
     members = caller.robot[Members]
     for name in ("Anna", "Ben"):
         await members.add(name)
-        await members.set_voice(name, world.hands.person(name.lower()).voice)
+        await members.set_voice(name, world.stage.person(name.lower()).voice)
     waiting = caller.start("cyberdog.personnel.voiceprint_recognized", ["Anna", "Ben"], True, 10)
     anna.say("hello robot")
     await caller.clock.advance(3.0)
     assert not waiting.done()
-    world.hands.person("ben").say("me, too")
+    world.stage.person("ben").say("me, too")
     await caller.clock.advance(3.0)
     result = waiting.result()
     assert (field(result, "data"), sorted(field(result, "list"))) == (True, ["Anna", "Ben"])

@@ -84,8 +84,8 @@ async def anna(
     world: World, client: Client, app: App, passing: Callable[[Callable[[], object]], Awaitable[None]]
 ) -> StagePerson:
     """A person three metres ahead of the robot, whose app is connected."""
-    person = world.hands.person("anna")
-    world.hands.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
+    person = world.stage.person("anna")
+    world.stage.place("a", Pose(person.pose.x - 3.0, person.pose.y, 0.0))
     await client.ask(10001)
     await passing(lambda: app.connected)
     return person

@@ -23,7 +23,7 @@ WANTED = {"mac": BRACELET, "addr_type": "random", "name": "Bracelet"}
 @pytest.fixture
 def gadget(world):
     """A device beside the robot."""
-    world.hands.place("a", Pose(9.0, 6.0))
+    world.stage.place("a", Pose(9.0, 6.0))
     gadget = world.gadgets.get(BRACELET)
     gadget.wearer, gadget.place = None, Point(9.5, 6.5)
     return gadget

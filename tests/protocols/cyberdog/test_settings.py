@@ -28,9 +28,9 @@ DEFAULT = "铁蛋"
 @pytest.fixture
 def anna(world, robot):
     """A person two metres ahead of the robot who looks at it."""
-    person = world.hands.person("anna")
+    person = world.stage.person("anna")
     at = person.pose
-    world.hands.place("a", Pose(at.x - 2.0, at.y, 0.0))
+    world.stage.place("a", Pose(at.x - 2.0, at.y, 0.0))
     return person
 
 

@@ -35,7 +35,7 @@ async def charging(client: Client) -> tuple[bool, bool]:
 async def test_charging_by_dock_and_by_wire_differ(client, robot, walker, forward: Forward) -> None:
     await forward(seconds=1)
     assert await charging(client) == (False, True)
-    walker[0].hands.place("a", Pose(6.0, 10.0))
+    walker[0].stage.place("a", Pose(6.0, 10.0))
     await forward(seconds=2)
     assert await charging(client) == (False, False)
     battery = robot[Battery]

@@ -76,7 +76,7 @@ async def test_lying_leads_to_low_power_if_enabled(client, app, robot, passing, 
 
 
 async def test_calibration_releases_motors_and_powers_them_again(client, robot, forward, world) -> None:
-    world.hands.place("a", Pose(4.0, 2.5))
+    world.stage.place("a", Pose(4.0, 2.5))
     assert await answered(client, 12001, {"data": False}, forward) == {"success": True, "message": ""}
     assert robot[Legs].posture is Posture.LIMP
     assert await answered(client, 12001, {"data": True}, forward) == {"success": True, "message": ""}

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
 async def test_wall_fails_move_and_only_away_is_free(client, robot, world, forward) -> None:
-    world.hands.place("a", Pose(9.0, 5.0, 0.0))
+    world.stage.place("a", Pose(9.0, 5.0, 0.0))
     await forward(seconds=0.5)
     client.send("chassis move x 3 wait_for_complete true;")
     waiting = asyncio.ensure_future(client.reply())
@@ -29,7 +29,7 @@ async def test_wall_fails_move_and_only_away_is_free(client, robot, world, forwa
 
 
 async def test_speed_held_against_wall_brakes_within_100_ms(client, robot, world, forward) -> None:
-    world.hands.place("a", Pose(9.0, 5.0, 0.0))
+    world.stage.place("a", Pose(9.0, 5.0, 0.0))
     await forward(seconds=0.5)
     assert await client.ask("chassis speed x 1;") == OK
     while world.truth.pose_of("a").x < 9.82:
@@ -42,7 +42,7 @@ async def test_speed_held_against_wall_brakes_within_100_ms(client, robot, world
 
 @pytest.mark.parametrize("speed", [1.0, 3.5])
 async def test_blow_is_an_impact_although_the_bumper_brakes(speed: float, client, world, forward) -> None:
-    world.hands.place("a", Pose(6.5, 5.0, 0.0))
+    world.stage.place("a", Pose(6.5, 5.0, 0.0))
     await forward(seconds=0.5)
     assert await client.ask(f"chassis speed x {speed};") == OK
     flags = []
@@ -56,8 +56,8 @@ async def test_blow_is_an_impact_although_the_bumper_brakes(speed: float, client
 
 @pytest.mark.world("empty", body="hermes")
 async def test_emergency_braking_fails_what_drives_on(client, world, forward) -> None:
-    world.hands.place("a", Pose(3.0, 5.0, 0.0))
-    world.hands.add_obstacle(Pose(4.5, 5.0), (0.3, 1.0, 1.0))
+    world.stage.place("a", Pose(3.0, 5.0, 0.0))
+    world.stage.add_obstacle(Pose(4.5, 5.0), (0.3, 1.0, 1.0))
     await forward(seconds=0.5)
     answers = []
     for _ in range(8):

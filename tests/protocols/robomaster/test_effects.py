@@ -136,7 +136,7 @@ async def test_a_shot_fires_its_beads(client, robot, forward) -> None:
 async def test_beads_are_felt_by_robot_that_they_hit(client, robot, world, forward, listen) -> None:
     """a has the door; b shoots at its front."""
     here = world.truth.pose_of("a")
-    world.hands.place("b", here.compose(Pose(1.5, 0.0, math.pi)))
+    world.stage.place("b", here.compose(Pose(1.5, 0.0, math.pi)))
     assert await client.ask("armor event hit on;") == OK
     reader = await listen("events")
     await forward(seconds=0.1)
@@ -152,11 +152,11 @@ async def test_armor_events_reach_every_reader_until_off(client, world, forward,
     first, second = await listen("events"), await listen("events")
     await client.ask("armor event hit on;")
     await client.ask("armor event hit on;")
-    world.hands.touch_plate("a", PlatePlace.REAR)
+    world.stage.touch_plate("a", PlatePlace.REAR)
     await forward(seconds=0.1)
     assert await events_of(first) == await events_of(second) == b"armor event hit 1 2;"
     await client.ask("armor event hit off;")
-    world.hands.touch_plate("a", PlatePlace.LEFT)
+    world.stage.touch_plate("a", PlatePlace.LEFT)
     await forward(seconds=1)
     assert await events_of(first) == b""
 
@@ -166,7 +166,7 @@ async def test_applause(client, world, forward, listen) -> None:
     await client.ask("sound event applause on;")
     await forward(seconds=0.5)
     here = world.truth.pose_of("a")
-    world.hands.make_sound(claps(2), Point(here.x + 1, here.y))
+    world.stage.make_sound(claps(2), Point(here.x + 1, here.y))
     await forward(seconds=3)
     assert b"sound event applause 2;" in await events_of(reader)
 
@@ -174,12 +174,12 @@ async def test_applause(client, world, forward, listen) -> None:
 async def test_adapters_read_the_world(client, world, forward, listen) -> None:
     reader = await listen("events")
     await client.ask("sensor_adapter event io_level on;")
-    world.hands.apply_voltage("a", 3, 2, 2.5)
+    world.stage.apply_voltage("a", 3, 2, 2.5)
     assert await client.ask("sensor_adapter adc id 3 port 2 ?;") == "2.5;"
     assert await client.ask("sensor_adapter io_level id 3 port 2 ?;") == "1;"
     assert await events_of(reader) == b"sensor_adapter event io_level (3, 2, 1);"
     await forward(seconds=0.25)
-    world.hands.apply_voltage("a", 3, 2, 0.0)
+    world.stage.apply_voltage("a", 3, 2, 0.0)
     assert float((await client.ask("sensor_adapter pulse_period id 3 port 2;"))[:-1]) == pytest.approx(250, abs=10)
 
 
@@ -311,7 +311,7 @@ async def test_nothing_is_drawn_while_no_one_looks(client, robot, forward, monke
 
 
 async def test_ai_pushes_what_is_seen_and_excludes(client, world, robot, pushes, forward) -> None:
-    world.hands.place("a", Pose(4.5, 3.4, 0.0))
+    world.stage.place("a", Pose(4.5, 3.4, 0.0))
     assert await client.ask("AI push marker on line on;") == OK
     assert await client.ask("AI push person on robot off;") == FAIL
     await forward(seconds=1)

@@ -45,7 +45,7 @@ async def test_commands_answers_pushes_and_events_on_one_line(robot, world, forw
             assert await heard(line) == "chassis_lead ;\n"
         await forward(seconds=1.001)
         assert (await heard(line)).startswith("chassis push attitude ")
-        world.hands.touch_plate("a", PlatePlace.LEFT)
+        world.stage.touch_plate("a", PlatePlace.LEFT)
         await forward(seconds=0.1)
         assert "armor event hit 3 2 ;;\n" in await heard(line)
     finally:

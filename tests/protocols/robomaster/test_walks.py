@@ -166,7 +166,7 @@ async def test_random_commands_end_at_rest(
 ) -> None:
     """After the walk all clients go; then no action runs, nothing moves, and the robot says so."""
     draw = random.Random(seed)
-    world.hands.place("a", Pose(5.0, 5.0))
+    world.stage.place("a", Pose(5.0, 5.0))
     witness = Witness(world, robot, forward)
     walk = Walk(draw, witness, connect)
     with witness.writing():

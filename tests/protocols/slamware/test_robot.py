@@ -68,7 +68,7 @@ async def test_power_follows_the_battery_and_the_dock(
     assert isinstance(power, dict)
     assert power["batteryPercentage"] == round(robot[Battery].state.percentage * 100)
     assert (power["dockingStatus"], power["isCharging"]) == ("on_dock", True)
-    world.hands.place("a", Pose(5.0, 5.0))
+    world.stage.place("a", Pose(5.0, 5.0))
     await forward(seconds=2)
     power = await get(client, f"{SYSTEM}/power/status")
     assert isinstance(power, dict)
@@ -105,7 +105,7 @@ async def test_healthy_robot_reports_no_errors(client: httpx.AsyncClient) -> Non
 async def test_a_low_battery_is_a_warning(
     robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward
 ) -> None:
-    world.hands.place("a", Pose(5.0, 5.0))
+    world.stage.place("a", Pose(5.0, 5.0))
     await forward(seconds=1)
     robot[Battery].low = 1.1
     await forward(seconds=1)
@@ -117,7 +117,7 @@ async def test_a_low_battery_is_a_warning(
 
 async def test_the_scan_lies_on_the_walls(world: World, client: httpx.AsyncClient, forward: Forward) -> None:
     assert (await get(client, f"{SYSTEM}/laserscan"))["laser_points"] == []
-    world.hands.place("a", Pose(3.0, 2.0, 0.7))  # an asymmetric place
+    world.stage.place("a", Pose(3.0, 2.0, 0.7))  # an asymmetric place
     await forward(seconds=1)
     where = world.truth.pose_of("a")
     points = (await get(client, f"{SYSTEM}/laserscan"))["laser_points"]

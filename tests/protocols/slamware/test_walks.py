@@ -136,13 +136,13 @@ class Walk:
         self.witness.note("walls", self._walls)
 
     async def put_box(self) -> None:
-        hands = self._world.hands
+        stage = self._world.stage
         try:
             if self._boxes and self._draw.random() < 0.6:
-                hands.remove_obstacle(self._boxes.pop())
+                stage.remove_obstacle(self._boxes.pop())
             else:
                 place = Pose(self._number(1, 9), self._number(1, 9))
-                self._boxes.append(hands.add_obstacle(place, (0.4, 0.4, 0.6)))
+                self._boxes.append(stage.add_obstacle(place, (0.4, 0.4, 0.6)))
             self.witness.note("boxes", self._boxes)
         except RobotError as error:
             self.witness.note("no box", str(error))
@@ -150,7 +150,7 @@ class Walk:
     async def plug(self) -> None:
         on = self._draw.random() < 0.4
         self.witness.note("plug", on)
-        self._world.hands.plug_in("a", on)
+        self._world.stage.plug_in("a", on)
 
     async def clear_map(self) -> None:
         """Begin a new map here; drawings stay where they are."""

@@ -105,7 +105,7 @@ async def test_random_operations_end_at_rest(
     """A suspended program's robot stands; when all are shut down, no process and no action is left."""
     draw = random.Random(seed)
     app = await connect(robot)
-    world.hands.place("a", Pose(5.0, 5.0))
+    world.stage.place("a", Pose(5.0, 5.0))
     witness = Witness(world, robot, forward)
     walk = Walk(draw, app, witness)
     with witness.writing():

@@ -138,7 +138,7 @@ async def test_a_bound_rocks_and_a_pronk_bounces(dog):
 
 @pytest.mark.parametrize(("lift", "passes"), [(0.03, False), (0.06, True)])
 async def test_feet_step_over_obstacles_below_their_lift(dog, lift, passes):
-    dog.world.hands.add_obstacle(Pose(3.0, 5.0), (0.05, 1.0, 0.05))
+    dog.world.stage.add_obstacle(Pose(3.0, 5.0), (0.05, 1.0, 0.05))
     dog.robot[Legs].walk(Gait.TROT_SLOW, FootLift(lift, lift))
     dog.robot[Base].set_velocity(Twist(0.5))
     await dog.clock.advance(4.0)
@@ -147,7 +147,7 @@ async def test_feet_step_over_obstacles_below_their_lift(dog, lift, passes):
 
 @pytest.mark.parametrize(("lift", "passes"), [(0.03, False), (0.06, True)])
 async def test_dance_steps_over_obstacles_below_its_feet(dog, lift, passes):
-    dog.world.hands.add_obstacle(Pose(3.0, 5.0), (0.05, 1.0, 0.05))
+    dog.world.stage.add_obstacle(Pose(3.0, 5.0), (0.05, 1.0, 0.05))
     steps = [Step(5.0, Twist(0.4), lift=FootLift(lift, 0.08))]
     action = dog.robot[Legs].dance(steps)
     await dog.clock.advance(8.0)

@@ -230,7 +230,7 @@ async def test_robot_on_wheels_has_no_feet_but_dances(simulate, body):
 async def test_cameras_see_a_paw_that_is_lifted(simulate):
     sim = simulate(start=Pose(3, 5), body="cyberdog2", robots=("a", "b"))
     sim.world.start()
-    sim.world.hands.place("b", Pose(4.5, 5.0, 1.2))
+    sim.world.stage.place("b", Pose(4.5, 5.0, 1.2))
     await sim.clock.advance(0.5)
     before = (await sim.robot[Camera].capture()).rgb().astype(int)
     other = sim.robots["b"][Legs]

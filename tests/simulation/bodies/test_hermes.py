@@ -96,14 +96,14 @@ async def test_falls_without_cliff_sensors_and_stays_there(hermes, holes):
     assert sim.robot[Health].worst is FaultLevel.FATAL
     with pytest.raises(Refused, match="fell"):
         sim.robot[Base].set_velocity(Twist(0.1))
-    sim.world.hands.place("a", Pose(3, 5))
+    sim.world.stage.place("a", Pose(3, 5))
     sim.robot[Base].set_velocity(Twist(0.1))
 
 
 async def test_emergency_braking_stops_before_an_obstacle(hermes):
     sim = hermes()
     heard = sim.robot.events.subscribe(ObstacleBraked)
-    sim.world.hands.add_obstacle(Pose(6, 5), (0.4, 0.4, 1.0))
+    sim.world.stage.add_obstacle(Pose(6, 5), (0.4, 0.4, 1.0))
     sim.robot[Base].set_velocity(Twist(1.2))
     await sim.clock.advance(4.0)
     assert 5.8 - 0.27 - 0.4 < sim.pose.x < 5.8 - 0.27
@@ -263,7 +263,7 @@ async def test_a_jammed_jack_raises_an_alarm(hermes):
 
 async def test_depth_camera_sees_what_the_lidar_does_not(hermes):
     sim = hermes()
-    sim.world.hands.add_obstacle(Pose(4.2, 5.0), (0.3, 0.6, 0.12))  # below the lidar's plane
+    sim.world.stage.add_obstacle(Pose(4.2, 5.0), (0.3, 0.6, 0.12))  # below the lidar's plane
     await sim.clock.advance(0.2)
     camera = sim.robot[DepthCamera]
     image = camera.image

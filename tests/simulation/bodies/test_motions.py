@@ -84,7 +84,7 @@ async def test_a_jump_is_felt_and_counted(dog):
 
 
 async def test_a_wall_in_the_way_stops_a_jump(dog):
-    dog.world.hands.place("a", Pose(9.5, 5.0))
+    dog.world.stage.place("a", Pose(9.5, 5.0))
     await dog.clock.advance(0.1)
     action = dog.robot[Legs].perform(Motion.JUMP_FORWARD_60)
     await dog.clock.advance(5.0)
@@ -142,9 +142,9 @@ async def test_refused(dog, why):
         case "battery":
             dog.robot[Battery].set_charge(0.2)
         case "wire":
-            dog.world.hands.plug_in("a")
+            dog.world.stage.plug_in("a")
         case "held":
-            dog.world.hands.lift("a")
+            dog.world.stage.lift("a")
         case "hot":
             dog.robot[Motors].warm(90.0)
         case "lying":
@@ -170,7 +170,7 @@ async def test_new_motion_replaces_the_running_one(dog):
 
 
 async def test_on_its_side_it_gets_up(dog):
-    dog.world.hands.roll_over("a", math.pi / 2)
+    dog.world.stage.roll_over("a", math.pi / 2)
     await dog.clock.advance(0.1)
     assert dog.robot[Imu].reading.orientation.roll == pytest.approx(math.pi / 2, abs=0.05)
     action = dog.robot[Legs].perform(Motion.GET_UP)
@@ -242,7 +242,7 @@ async def test_up_a_stair_and_down_again(tmp_path):
     turned = robot[Legs].perform(Motion.JUMP_LEFT_TURN)
     await clock.advance(2.0)
     assert turned.status is ActionStatus.SUCCEEDED
-    world.hands.place("a", Pose(5.22, 5.0, math.pi))
+    world.stage.place("a", Pose(5.22, 5.0, math.pi))
     robot[Legs].perform(Motion.JUMP_DOWN_STAIR)
     await clock.advance(6.0)
     assert hull.rise == pytest.approx(0.0, abs=0.005)

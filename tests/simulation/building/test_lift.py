@@ -79,13 +79,13 @@ async def test_shut_landing_door_is_seen_open_one_not(simulate):
 
 async def test_door_waits_for_obstructions_and_complains(simulate):
     sim, lift, heard = start(simulate, BEFORE)
-    sim.world.hands.place("a", Pose(2.0, 10.0, math.pi))
+    sim.world.stage.place("a", Pose(2.0, 10.0, math.pi))
     lift.call(2)
     await sim.clock.advance(60.0)
     assert lift.state.floor == 0
     assert [event.reason for event in heard.drain() if isinstance(event, LiftFailed)] == ["door blocked"]
     assert lift.state.blocked
-    sim.world.hands.place("a", BEFORE)
+    sim.world.stage.place("a", BEFORE)
     await sim.clock.advance(25.0)
     assert (lift.state.floor, lift.state.door, lift.state.blocked) == (2, LiftDoor.OPEN, False)
 

@@ -73,7 +73,7 @@ async def test_walls_stand_where_the_map_has_them(simulate, write):
     path = write(room(), x=-3.0)
     sim = simulate(str(path))
     sim.world.start()
-    sim.world.hands.place("a", Pose(2.0, 1.5))
+    sim.world.stage.place("a", Pose(2.0, 1.5))
     await sim.clock.advance(0.2)
     ranges = sim.robot[Lidar].scan.ranges
     # 80 x 60 cells of 0.1 m from (-3, -2), the outermost ones walls

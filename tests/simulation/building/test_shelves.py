@@ -56,7 +56,7 @@ async def test_low_thing_stops_leg_and_passes_between_legs(carrier):
     base.set_velocity(Twist(0.5))
     await carrier.clock.advance(6.0)
     assert carrier.pose.y == pytest.approx(6.0 - 0.45, abs=0.02)  # free up to the wall
-    carrier.world.hands.place("a", Pose(2.43, 2.0, math.pi / 2))
+    carrier.world.stage.place("a", Pose(2.43, 2.0, math.pi / 2))
     await carrier.clock.advance(0.1)
     base.set_velocity(Twist(0.5))
     await carrier.clock.advance(6.0)
@@ -64,7 +64,7 @@ async def test_low_thing_stops_leg_and_passes_between_legs(carrier):
 
 
 async def test_put_into_a_wall_it_can_leave_it(carrier):
-    carrier.world.hands.place("a", Pose(7.7, 3.0))
+    carrier.world.stage.place("a", Pose(7.7, 3.0))
     await carrier.clock.advance(0.5)
     assert carrier.pose.distance_to(Pose(7.7, 3.0)) < 0.01
     carrier.robot[Base].set_velocity(Twist(-0.5))

@@ -26,7 +26,7 @@ async def put(body, pose, world="stairs"):
     robot = Robot("a", made.description_of("a"), clock)
     made.equip(robot)
     made.start()
-    made.hands.place("a", pose)
+    made.stage.place("a", pose)
     await clock.advance(0.5)
     return made, robot, clock
 

@@ -72,7 +72,7 @@ async def test_lidar_sees_only_what_rises_above_its_plane(simulate):
     ahead = 180
     edge = 3.0 + 1.5 * 0.35 / 0.4  # where the slope is as high as the lidar's plane
     assert sim.robot[Lidar].scan.ranges[ahead] == pytest.approx(edge - 2.0, abs=0.05)
-    sim.world.hands.place("a", Pose(5.2, 4.0))
+    sim.world.stage.place("a", Pose(5.2, 4.0))
     await sim.clock.advance(0.5)
     assert sim.world.truth.height_of("a") == pytest.approx(0.4, abs=0.002)
     assert sim.robot[Lidar].scan.ranges[ahead] == pytest.approx(12.0 - 5.2, abs=0.05)  # over all of it

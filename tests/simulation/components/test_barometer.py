@@ -22,7 +22,7 @@ async def test_pressure_is_that_of_the_height(simulate):
 async def test_next_floor_is_measured_with_any_offset(simulate):
     sim = simulate("office", body="universal")
     ground = sim.robot[Barometer].reading.pressure
-    sim.world.hands.place("a", Pose(6.0, 10.0), floor=1)
+    sim.world.stage.place("a", Pose(6.0, 10.0), floor=1)
     await sim.clock.advance(1.0)
     first = sim.robot[Barometer].reading.pressure
     climbed = sim.world.description.elevation(1)

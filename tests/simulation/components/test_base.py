@@ -198,7 +198,7 @@ async def test_full_speed_into_wall_does_not_get_through(simulate):
 
 async def test_robots_do_not_drive_through_each_other(simulate):
     sim = simulate(start=Pose(3, 5), robots=("a", "b"))
-    sim.world.hands.place("b", Pose(5, 5))
+    sim.world.stage.place("b", Pose(5, 5))
     sim.world.start()
     sim.robot[Base].set_velocity(Twist(0.5))
     await sim.clock.advance(5.0)

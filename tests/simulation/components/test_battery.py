@@ -58,7 +58,7 @@ async def test_forward_leaves_the_dock_and_back_finds_it(simulate):
 async def test_contacts_touch_only_near_and_straight(simulate, offset, docked):
     sim = simulate()
     sim.world.start()
-    sim.world.hands.place("a", Pose(0.12, 5.0).compose(offset))
+    sim.world.stage.place("a", Pose(0.12, 5.0).compose(offset))
     await sim.clock.advance(0.02)
     assert sim.robot[DockContact].docked is docked
 
@@ -150,13 +150,13 @@ async def test_empty_battery_stops_robot_until_it_is_charged(simulate):
     sim = simulate()
     battery = sim.robot[Battery]
     sim.world.start()
-    sim.world.hands.place("a", Pose(5, 5))
+    sim.world.stage.place("a", Pose(5, 5))
     battery.set_charge(0.0)
     await sim.clock.advance(0.1)
     with pytest.raises(Refused, match="empty"):
         sim.robot[Base].set_velocity(Twist(0.5))
     battery.set_charge(0.018)
-    sim.world.hands.place("a", Pose(0.37, 5.0))
+    sim.world.stage.place("a", Pose(0.37, 5.0))
     await sim.clock.advance(1.0)
     assert battery.state.charging
     with pytest.raises(Refused, match="empty"):

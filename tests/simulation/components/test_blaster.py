@@ -19,7 +19,7 @@ from roboglot.model.geometry import Pose, Twist, Vector3
 async def duel(simulate):
     """``a`` at (3, 5) looks along x at ``b``, 2 m ahead, which looks back."""
     sim = simulate(start=Pose(3, 5), robots=("a", "b"), body="robomaster_ep")
-    sim.world.hands.place("b", Pose(5, 5, math.pi))
+    sim.world.stage.place("b", Pose(5, 5, math.pi))
     sim.world.start()
     sim.robot[Gimbal].set_mode(FollowMode.FREE)
     sim.hits = sim.robots["b"].events.subscribe(ArmorHit)
@@ -71,7 +71,7 @@ async def test_beside_it_lands_on_the_wall(duel):
     [(math.pi / 2, PlatePlace.LEFT), (-math.pi / 2, PlatePlace.RIGHT), (0.0, PlatePlace.REAR)],
 )
 async def test_hit_plate_depends_on_the_target_s_heading(duel, yaw, place):
-    duel.world.hands.place("b", Pose(5, 5, yaw))
+    duel.world.stage.place("b", Pose(5, 5, yaw))
     await duel.clock.advance(0.1)
     assert await shoot(duel, pitch=math.atan2(MUZZLE - PLATE, DISTANCE + 0.1)) == [(place, HitKind.BEAD)]
 
@@ -88,7 +88,7 @@ async def test_an_insensitive_plate_feels_beads_no_more(duel):
     duel.robots["b"][Armor].set_sensitivity(0)
     aim = math.atan2(MUZZLE - PLATE, DISTANCE + 0.1)
     assert await shoot(duel, pitch=aim) == [(PlatePlace.FRONT, HitKind.BEAD)]  # 26 m/s is a hard impact
-    duel.world.hands.place("b", Pose(5, 5 - 0.175 * math.sin(0.75), math.pi - 0.75))
+    duel.world.stage.place("b", Pose(5, 5 - 0.175 * math.sin(0.75), math.pi - 0.75))
     await duel.clock.advance(0.1)
     assert await shoot(duel, pitch=aim) == []  # at an angle it is not
     duel.robots["b"][Armor].set_sensitivity(10)
@@ -145,18 +145,18 @@ async def test_odd_numbers_of_beads_are_refused(duel, beads):
 
 
 async def test_a_hand_on_a_plate(duel):
-    duel.world.hands.touch_plate("b", PlatePlace.GIMBAL_LEFT)
+    duel.world.stage.touch_plate("b", PlatePlace.GIMBAL_LEFT)
     await duel.clock.advance(0.1)
     assert [(hit.place, hit.kind) for hit in duel.hits.drain()] == [(PlatePlace.GIMBAL_LEFT, HitKind.HAND)]
     with pytest.raises(NotFound):
-        duel.world.hands.touch_plate("c", PlatePlace.FRONT)
+        duel.world.stage.touch_plate("c", PlatePlace.FRONT)
 
 
 async def collide(sim, sensitivity, speed):
     """Drive b backwards into the wall behind it."""
-    sim.world.hands.place("b", Pose(9.7, 5, math.pi))
+    sim.world.stage.place("b", Pose(9.7, 5, math.pi))
     sim.robots["b"][Armor].set_sensitivity(sensitivity)
-    sim.world.hands.push("b", Vector3(x=-speed * 3.4))
+    sim.world.stage.push("b", Vector3(x=-speed * 3.4))
     await sim.clock.advance(1.0)
     return [(hit.place, hit.kind) for hit in sim.hits.drain()]
 

@@ -125,7 +125,7 @@ async def test_the_tag_is_ranged_by_geometry(dog):
     assert reading.azimuth == pytest.approx(math.atan2(4, 3), abs=0.12)
     assert reading.line_of_sight
     dog.world.gadgets.get(BRACELET).place = Point(16, 8)
-    dog.world.hands.place("a", Pose(10, 16, math.pi / 2))  # the wall at x = 12 is in between
+    dog.world.stage.place("a", Pose(10, 16, math.pi / 2))  # the wall at x = 12 is in between
     dog.world.gadgets.get(BRACELET).place = Point(16, 16)
     await dog.clock.advance(0.2)
     behind = tag.tag

@@ -48,7 +48,7 @@ async def test_tof_sees_the_floor_ahead(dog):
 
 
 async def test_tof_sees_an_obstacle_on_its_side_only(dog):
-    dog.world.hands.add_obstacle(Pose(5.6, 5.25), (0.1, 0.4, 0.6))  # front face 0.55 ahead, left of the middle
+    dog.world.stage.add_obstacle(Pose(5.6, 5.25), (0.1, 0.4, 0.6))  # front face 0.55 ahead, left of the middle
     await dog.clock.advance(0.1)
     tof = dog.robot[TimeOfFlight]
     before = tof.reading("head right").distances[3, 6]
@@ -63,7 +63,7 @@ async def test_tof_sees_an_obstacle_on_its_side_only(dog):
 
 
 async def test_tof_reports_too_near(dog):
-    dog.world.hands.place("a", Pose(9.68, 5.0))
+    dog.world.stage.place("a", Pose(9.68, 5.0))
     await dog.clock.advance(0.2)
     grid = dog.robot[TimeOfFlight].reading("head left").distances
     assert np.isneginf(grid[:5]).all()
@@ -84,7 +84,7 @@ async def test_tof_turns_with_the_body(dog):
 async def test_ultrasonic(dog):
     sensors = dog.robot[RangeSensors]
     sensors.measure(True)
-    dog.world.hands.place("a", Pose(8.75, 5.0))
+    dog.world.stage.place("a", Pose(8.75, 5.0))
     await dog.clock.advance(0.2)
     assert sensors.reading("ultrasonic").distance == pytest.approx(10.0 - 8.75 - 0.25, abs=0.05)
 
@@ -93,17 +93,17 @@ async def test_touch(dog):
     events = dog.robot.events.subscribe(Touched)
     assert dog.robot[Touch].last is None
     await dog.clock.advance(1.0)
-    dog.world.hands.touch("a", TouchKind.LONG)
-    dog.world.hands.touch("a", TouchKind.DOUBLE)
+    dog.world.stage.touch("a", TouchKind.LONG)
+    dog.world.stage.touch("a", TouchKind.DOUBLE)
     assert [event.kind for event in events.drain()] == [TouchKind.LONG, TouchKind.DOUBLE]
     assert dog.robot[Touch].last == (1.0, TouchKind.DOUBLE)
     with pytest.raises(NotFound):
-        dog.world.hands.touch("unknown")
+        dog.world.stage.touch("unknown")
 
 
 def test_a_body_without_a_pad_cannot_be_touched(simulate):
     with pytest.raises(ComponentMissing):
-        simulate(body="hermes").world.hands.touch("a")
+        simulate(body="hermes").world.stage.touch("a")
 
 
 async def test_gps_under_the_open_sky(simulate):
@@ -122,7 +122,7 @@ async def test_gps_under_the_open_sky(simulate):
     assert here.latitude == pytest.approx(39.9042 + 10 / 111_035, abs=8 / 111_035)
     assert here.longitude == pytest.approx(116.4074 + 20 / (111_320 * math.cos(math.radians(39.9))), abs=8 / 85_000)
     assert here.altitude == pytest.approx(44.0, abs=15.0)
-    sim.world.hands.place("a", Pose(30, 10))
+    sim.world.stage.place("a", Pose(30, 10))
     await sim.clock.advance(2.0)
     moved = gps.reading
     metres = (moved.longitude - here.longitude) * 111_320 * math.cos(math.radians(39.9))
@@ -162,15 +162,15 @@ async def test_wire_and_wireless_charging(dog):
     battery.set_charge(0.5)
     await dog.clock.advance(1.0)
     assert (battery.state.charging, battery.state.supply) == (False, Supply.NONE)
-    dog.world.hands.plug_in("a")
+    dog.world.stage.plug_in("a")
     await dog.clock.advance(1.0)
     assert (battery.state.charging, battery.state.supply) == (True, Supply.WIRE)
     assert any(event.charging for event in events.drain())
     with pytest.raises(Refused):
         dog.robot[Base].set_velocity(Twist(0.1))
-    dog.world.hands.plug_in("a", wire=False)
+    dog.world.stage.plug_in("a", wire=False)
     dog.robot[Base].set_velocity(Twist(0.1))
-    dog.world.hands.place("a", Pose(0.12 + 0.25 + 0.005, 5.0))
+    dog.world.stage.place("a", Pose(0.12 + 0.25 + 0.005, 5.0))
     dog.robot[Base].set_velocity(Twist())
     await dog.clock.advance(1.0)
     assert (battery.state.charging, battery.state.supply) == (True, Supply.WIRELESS)

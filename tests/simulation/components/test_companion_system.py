@@ -145,7 +145,7 @@ async def test_it_updates_itself_on_the_dock(dog):
     await firmware.set_automatic(True)
     await dog.clock.advance(130.0)
     assert firmware.version == "1.3.0.0"  # not on its dock
-    dog.world.hands.place("a", Pose(0.12 + 0.25 + 0.005, 5.0))
+    dog.world.stage.place("a", Pose(0.12 + 0.25 + 0.005, 5.0))
     await dog.clock.advance(61.0 + 20.0 + 40.0 + 30.0)
     assert firmware.version == "1.3.1.0"
     assert firmware.available is None

@@ -103,13 +103,13 @@ async def test_adapters_measure_what_lies_at_their_inputs(sim):
     adapters = sim.robot[SensorAdapters]
     levels = sim.robot.events.subscribe(AdapterLevelChanged)
     await sim.clock.advance(1.0)
-    sim.world.hands.apply_voltage("a", 2, 1, 3.0)
+    sim.world.stage.apply_voltage("a", 2, 1, 3.0)
     assert (adapters.voltage(2, 1), adapters.level(2, 1), adapters.pulse_period(2, 1)) == (3.0, True, 0.0)
     assert (adapters.voltage(2, 2), adapters.level(2, 2)) == (0.0, False)
     await sim.clock.advance(0.25)
-    sim.world.hands.apply_voltage("a", 2, 1, 2.0)  # still high
+    sim.world.stage.apply_voltage("a", 2, 1, 2.0)  # still high
     await sim.clock.advance(0.25)
-    sim.world.hands.apply_voltage("a", 2, 1, 0.5)
+    sim.world.stage.apply_voltage("a", 2, 1, 0.5)
     assert adapters.pulse_period(2, 1) == pytest.approx(0.5)
     reported = [(event.stamp, event.adapter, event.port, event.level) for event in levels.drain()]
     assert reported == [(pytest.approx(1.0), 2, 1, True), (pytest.approx(1.5), 2, 1, False)]
@@ -120,4 +120,4 @@ async def test_an_adapters_bounds(sim):
         with pytest.raises(NotFound):
             sim.robot[SensorAdapters].level(*place)
     with pytest.raises(InvalidGoal):
-        sim.world.hands.apply_voltage("a", 1, 1, 3.4)
+        sim.world.stage.apply_voltage("a", 1, 1, 3.4)

@@ -228,6 +228,6 @@ async def test_it_keeps_its_pitch_to_horizon_on_slope(simulate):
 
 async def test_lifted_and_put_elsewhere_gimbal_goes_with_robot(sim, gimbal):
     gimbal.set_mode(FollowMode.FREE)
-    sim.world.hands.place("a", Pose(3, 3, 2.0))
+    sim.world.stage.place("a", Pose(3, 3, 2.0))
     await sim.clock.advance(0.5)
     assert gimbal.angles.yaw == pytest.approx(0.0, abs=1e-6)

@@ -71,7 +71,7 @@ async def test_backwards_down_and_across(course):
     sim.robot[Base].set_velocity(Twist(-0.3))
     await sim.clock.advance(1.0)
     assert flags(sim).downhill
-    sim.world.hands.place("a", Pose(3.8, 4.0, math.pi / 2))  # the slope falls to its left
+    sim.world.stage.place("a", Pose(3.8, 4.0, math.pi / 2))  # the slope falls to its left
     sim.robot[Base].set_velocity(STILL)
     await sim.clock.advance(1.0)
     assert sim.robot[Imu].reading.orientation.roll == pytest.approx(-SLOPE, abs=0.01)
@@ -99,7 +99,7 @@ async def test_ice_is_slippery(course):
 
 async def test_on_icy_slopes_it_slides_down(course):
     sim = await course(Pose(2.2, 6.7))
-    sim.world.hands.place("a", Pose(4.0, 6.7))
+    sim.world.stage.place("a", Pose(4.0, 6.7))
     await sim.clock.advance(0.4)
     assert flags(sim).sliding
     assert flags(sim).slipping
@@ -140,7 +140,7 @@ async def test_a_hand_lifts_the_robot_and_lets_go(simulate, world):
     sim = simulate(world, start=Pose(2.0, 3.5), body="robomaster_ep")
     sim.world.start()
     await sim.clock.advance(0.5)
-    sim.world.hands.lift("a", 0.4)
+    sim.world.stage.lift("a", 0.4)
     await sim.clock.advance(1.5)
     assert sim.world.truth.height_of("a") == pytest.approx(0.4, abs=0.01)
     assert flags(sim) == MotionFlags(static=True, picked_up=True)
@@ -152,7 +152,7 @@ async def test_a_hand_lifts_the_robot_and_lets_go(simulate, world):
     assert not flags(sim).slipping
     sim.robot[Base].set_velocity(STILL)
     await sim.clock.advance(1.0)
-    sim.world.hands.let_go("a")
+    sim.world.stage.let_go("a")
     await sim.clock.advance(0.4)
     assert flags(sim).impact_z
     assert not flags(sim).picked_up
@@ -169,7 +169,7 @@ async def test_a_push_is_felt_along_its_axis(simulate, blow, flag):
     sim = simulate(start=Pose(5, 5, 0.8), body="robomaster_ep")
     sim.world.start()
     await sim.clock.advance(0.5)
-    sim.world.hands.push("a", blow)
+    sim.world.stage.push("a", blow)
     await sim.clock.advance(0.1)
     reported = {name for name in ("impact_x", "impact_y", "impact_z") if getattr(flags(sim), name)}
     assert reported == {flag}
@@ -184,7 +184,7 @@ async def test_upside_down_it_drives_no_more(simulate, world):
     sim = simulate(world, start=Pose(2.0, 3.5), body="robomaster_ep")
     sim.world.start()
     await sim.clock.advance(0.5)
-    sim.world.hands.roll_over("a")
+    sim.world.stage.roll_over("a")
     sim.robot[Base].set_velocity(Twist(0.5))
     before = sim.pose
     await sim.clock.advance(1.0)
@@ -192,7 +192,7 @@ async def test_upside_down_it_drives_no_more(simulate, world):
     assert not flags(sim).picked_up
     assert sim.robot[Imu].reading.linear_acceleration.z == pytest.approx(-9.81, abs=0.3)
     assert sim.pose.distance_to(before) < 0.005
-    sim.world.hands.roll_over("a", 0.0)
+    sim.world.stage.roll_over("a", 0.0)
     await sim.clock.advance(1.0)
     assert not flags(sim).rolled_over
     assert sim.pose.distance_to(before) > 0.3

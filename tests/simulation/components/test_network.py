@@ -41,7 +41,7 @@ async def test_every_card_has_its_own_addresses(fleet, forward):
 
 @pytest.mark.world("office")
 async def test_scans_hear_every_network_by_distance(robot, world, forward):
-    world.hands.place("a", Pose(21.0, 5.0))
+    world.stage.place("a", Pose(21.0, 5.0))
     await forward(seconds=1)
     heard = robot[Network].networks
     assert [(network.ssid, network.secured) for network in heard] == [(GUESTS, False), (OFFICE, True)]

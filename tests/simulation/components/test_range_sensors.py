@@ -49,11 +49,11 @@ async def test_distances_to_four_walls(sim, sensors):
 
 async def test_only_things_within_the_cone_count(sim, sensors):
     sensors.measure(True)
-    inside = sim.world.hands.add_obstacle(Pose(5.0, 4.3), (0.1, 0.1, 1.0))
+    inside = sim.world.stage.add_obstacle(Pose(5.0, 4.3), (0.1, 0.1, 1.0))
     await sim.clock.advance(0.1)
     assert sensors.reading("ir_1").distance == pytest.approx(2.0 - RADIUS - 0.05, abs=0.1)
-    sim.world.hands.remove_obstacle(inside)
-    sim.world.hands.add_obstacle(Pose(5.0, 4.8), (0.1, 0.1, 1.0))
+    sim.world.stage.remove_obstacle(inside)
+    sim.world.stage.add_obstacle(Pose(5.0, 4.8), (0.1, 0.1, 1.0))
     await sim.clock.advance(0.1)
     assert sensors.reading("ir_1").distance == pytest.approx(7.0 - RADIUS, rel=0.02)
 
@@ -69,7 +69,7 @@ async def test_nothing_in_reach_reads_infinite(simulate, tmp_path):
 
 async def test_another_robot_and_a_small_thing_are_seen(simulate):
     sim = simulate("obstacle_course", start=Pose(1.1, 6.0), robots=("a", "b"), body="robomaster_ep")
-    sim.world.hands.place("b", Pose(1.1, 7.0))
+    sim.world.stage.place("b", Pose(1.1, 7.0))
     sim.world.start()
     sim.robot[RangeSensors].measure(True)
     await sim.clock.advance(0.1)

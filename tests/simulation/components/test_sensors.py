@@ -102,20 +102,20 @@ async def test_the_lidars_range_ends(simulate):
 async def test_the_lidar_sinks_with_the_body(simulate):
     sim = simulate("office", start=Pose(19.0, 1.0))
     sim.world.start()
-    bed = sim.world.hands.add_obstacle(Pose(19.0, 2.0), (0.5, 0.1, 0.25))  # too low for a standing robot
+    bed = sim.world.stage.add_obstacle(Pose(19.0, 2.0), (0.5, 0.1, 0.25))  # too low for a standing robot
     await sim.clock.advance(0.1)
     assert sim.robot[Lidar].scan.ranges[270] > 1.5
     sim.robot[Legs].lie_down()
     await sim.clock.advance(2.0)
     assert sim.robot[Lidar].scan.ranges[270] == pytest.approx(0.95, abs=0.05)
-    sim.world.hands.remove_obstacle(bed)
+    sim.world.stage.remove_obstacle(bed)
     await sim.clock.advance(0.1)
     assert sim.robot[Lidar].scan.ranges[270] > 1.5
 
 
 async def test_the_lidar_sees_other_robots_and_not_itself(simulate):
     sim = simulate(start=Pose(3, 5), robots=("a", "b"))
-    sim.world.hands.place("b", Pose(5, 5))
+    sim.world.stage.place("b", Pose(5, 5))
     sim.world.start()
     await sim.clock.advance(0.1)
     assert sim.robot[Lidar].scan.ranges[180] == pytest.approx(1.75, abs=0.05)
@@ -128,10 +128,10 @@ async def test_reception_falls_with_distance_and_walls(simulate):
     sim.world.start()
     await sim.clock.advance(1.1)
     near = sim.robot[Network].signal
-    sim.world.hands.place("a", Pose(28.0, 10.5))
+    sim.world.stage.place("a", Pose(28.0, 10.5))
     await sim.clock.advance(1.1)
     far = sim.robot[Network].signal
-    sim.world.hands.place("a", Pose(28.0, 13.5))
+    sim.world.stage.place("a", Pose(28.0, 13.5))
     await sim.clock.advance(1.1)
     behind_walls = sim.robot[Network].signal
     assert -40 < near < -25
@@ -144,7 +144,7 @@ async def test_a_tall_thing_is_seen_and_touched_softly(simulate):
     empty = load_world("empty")
     bin_ = Thing("bin", at=(7.0, 5.0), diameter=0.4, height=0.5, mass=2.0)
     sim = simulate(msgspec.structs.replace(empty, floors=[msgspec.structs.replace(empty.floors[0], things=[bin_])]))
-    sim.world.hands.place("a", Pose(5.0, 5.0))
+    sim.world.stage.place("a", Pose(5.0, 5.0))
     sim.world.start()
     await sim.clock.advance(0.5)
     ahead = len(sim.robot[Lidar].scan.ranges) // 2

@@ -25,7 +25,7 @@ async def test_an_old_battery_holds_less(robot):
 @pytest.mark.slow  # minutes of robot time
 @pytest.mark.world("empty")
 async def test_time_left_follows_what_the_robot_does(robot, world, forward):
-    world.hands.place("a", Pose(5, 5))
+    world.stage.place("a", Pose(5, 5))
     await forward(seconds=60)
     idle = robot[Battery].state.remaining
     robot[Base].set_velocity(Twist(0.6, yaw=0.9))
@@ -56,18 +56,18 @@ async def test_a_hot_battery_lets_nothing_in(robot, forward):
 
 
 async def test_almost_empty_it_beeps_until_something_feeds_it(robot, world, forward):
-    world.hands.place("a", Pose(5, 5))
+    world.stage.place("a", Pose(5, 5))
     robot[Battery].set_charge(0.04)
     await forward(seconds=1)
     assert robot[Battery].state.buzzing
-    world.hands.plug_in("a")
+    world.stage.plug_in("a")
     await forward(seconds=1)
     assert not robot[Battery].state.buzzing
 
 
 async def test_raw_imu_values_are_the_reading_in_counts(robot, world, forward):
     for heading in (0.0, 90.0, 200.0):
-        world.hands.place("a", Pose(5, 5, math.radians(heading)))
+        world.stage.place("a", Pose(5, 5, math.radians(heading)))
         await forward(seconds=0.5)
         raw, reading = robot[ImuConverters].raw, robot[Imu].reading
         assert raw.stamp == reading.stamp

@@ -72,7 +72,7 @@ def reds(frame):
 async def test_a_box_covers_the_pixels_that_geometry_says():
     closet = {"from": [0.5, 0], "to": [0.5, 10]}  # ours becomes the second room, which has a blue carpet
     world, robot, _ = await lab(room(walls=[closet]))
-    world.hands.add_obstacle(Pose(4.25, 5.2), (0.5, 0.5, 0.6))
+    world.stage.add_obstacle(Pose(4.25, 5.2), (0.5, 0.5, 0.6))
     pose = world.truth.pose_of("a")
     frame = await robot[Camera].capture()
     brown = frame.chroma[1].astype(int) - frame.chroma[0] > 20
@@ -113,7 +113,7 @@ async def test_person_stands_where_geometry_says_behind_boxes_hidden():
     assert 2 * columns.mean() == pytest.approx(at[0], abs=6)
     assert 2 * rows.min() >= pixel(robot, pose, 6.0, 5.8, 1.5)[1] - 4
     assert 2 * rows.max() <= pixel(robot, pose, 6.0, 5.8, 0.7)[1] + 4
-    world.hands.add_obstacle(Pose(4.0, 5.4), (0.2, 1.6, 2.2))
+    world.stage.add_obstacle(Pose(4.0, 5.4), (0.2, 1.6, 2.2))
     assert reds(await robot[Camera].capture()).sum() < 0.02 * shirt.sum()
     world.close()
 
@@ -123,7 +123,7 @@ async def test_another_robot_is_seen_and_oneself_is_not():
     frame = await robot[Camera].capture()
     column, row = pixel(robot, world.truth.pose_of("a"), 4.25, 5.0, 0.37)
     assert frame.chroma[0][round(row / 2), round(column / 2)] > 150  # the second robot's blue belt
-    world.hands.place("r0", Pose(8, 1, 0))
+    world.stage.place("r0", Pose(8, 1, 0))
     assert (await robot[Camera].capture()).chroma[0][round(row / 2), round(column / 2)] < 140
     world.close()
 
@@ -294,12 +294,12 @@ async def test_an_unchanged_view_is_not_drawn_again():
     """And anything that changes it is seen at once."""
     floor = room(people=[{"path": [[6.0, 5.8]]}], things=[{"name": "can", "at": [3.6, 5.2]}])
     world, robot, clock = await lab(floor, others=[Pose(4.5, 5, math.pi)])
-    camera, box = robot[Camera], world.hands.add_obstacle(Pose(4.25, 4.2), (0.5, 0.5, 0.6))
+    camera, box = robot[Camera], world.stage.add_obstacle(Pose(4.25, 4.2), (0.5, 0.5, 0.6))
     changes = (
-        lambda: world.hands.place("r0", Pose(4.6, 5, math.pi)),
-        lambda: world.hands.place("a", Pose(2, 5.01)),
+        lambda: world.stage.place("r0", Pose(4.6, 5, math.pi)),
+        lambda: world.stage.place("a", Pose(2, 5.01)),
         lambda: world.truth.thing("can").put(np.array((3.6, 4.9, 0.0))),
-        lambda: world.hands.remove_obstacle(box),
+        lambda: world.stage.remove_obstacle(box),
         lambda: camera.set_exposure(0.5),
     )
     for change in changes:
@@ -355,7 +355,7 @@ async def test_every_floor_of_shipped_worlds_can_be_drawn(name):
     world.equip(robot)
     for floor in range(len(description.floors)):
         places = (Pose(5.0 + step, 5.0, 1.0) for step in range(10))
-        world.hands.place("a", next(at for at in places if not world.truth.in_the_way("a", at, floor)), floor)
+        world.stage.place("a", next(at for at in places if not world.truth.in_the_way("a", at, floor)), floor)
         frame = await robot[Camera].capture()
         assert frame.luma.std() > 10
     world.close()

@@ -25,8 +25,8 @@ def facing(simulate):
     """Robot a looks at an EP that looks back, a metre away."""
     sim = simulate(robots=("a", "b"), body="robomaster_ep")
     sim.world.start()
-    sim.world.hands.place("a", Pose(3.0, 5.0))
-    sim.world.hands.place("b", Pose(4.0, 5.05, np.pi))
+    sim.world.stage.place("a", Pose(3.0, 5.0))
+    sim.world.stage.place("b", Pose(4.0, 5.05, np.pi))
     return sim
 
 
@@ -48,8 +48,8 @@ async def test_a_gimbal_turns(facing):
 
 
 async def test_beads_fly_through_the_picture(facing):
-    facing.world.hands.place("b", Pose(6.0, 5.0, np.pi / 2))
-    facing.world.hands.place("a", Pose(4.0, 5.3, 0.0))
+    facing.world.stage.place("b", Pose(6.0, 5.0, np.pi / 2))
+    facing.world.stage.place("a", Pose(4.0, 5.3, 0.0))
     await facing.clock.advance(0.5)
     before = await picture(facing)
     facing.robots["b"][Blaster].fire()
@@ -64,7 +64,7 @@ async def test_the_car_is_seen_from_inside(simulate):
     sim = simulate("office", robots=("a",))
     sim.world.start()
     lift = sim.world.building.lift
-    sim.world.hands.place("a", lift.frame.compose(Pose(0.3, 0.0, np.pi)))
+    sim.world.stage.place("a", lift.frame.compose(Pose(0.3, 0.0, np.pi)))
     await sim.clock.advance(0.5)
     image = await picture(sim)
     row = image[200, 640]

@@ -40,9 +40,9 @@ async def test_tags_on_walls_docks_and_shelves():
 async def test_tags_that_hands_hang_up_and_move():
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(APRIL))
     with lab() as room:
-        hands, read = room.world.hands, {}
+        stage, read = room.world.stage, {}
         for text in [*map(str, range(40)), "7"]:  # more than the drawing cache holds
-            number = hands.add_tag(text, Pose(4.0, 5.3, np.pi), size=0.3)
+            number = stage.add_tag(text, Pose(4.0, 5.3, np.pi), size=0.3)
             if text in ("7", "39"):
                 (seen,) = await room.see("tags")
                 corners, numbers, _ = detector.detectMarkers(await picture(room))
@@ -51,10 +51,10 @@ async def test_tags_that_hands_hang_up_and_move():
                 assert read[text] == pytest.approx((seen.box.x, seen.box.y), abs=0.004)
             else:
                 await picture(room)
-            hands.remove_tag(number)
+            stage.remove_tag(number)
         assert await room.see("tags") == []
-        number = hands.add_tag("roboglot", Pose(4.0, 5.3, np.pi), kind=TagKind.QR, size=0.3)
-        hands.move_tag(number, Pose(4.0, 4.9, np.pi), 0)
+        number = stage.add_tag("roboglot", Pose(4.0, 5.3, np.pi), kind=TagKind.QR, size=0.3)
+        stage.move_tag(number, Pose(4.0, 4.9, np.pi), 0)
         (seen,) = await room.see("tags")
     assert (seen.kind, seen.text) == (TagKind.QR, "roboglot")
     assert seen.box.x > read["7"][0] + 0.05
@@ -62,22 +62,22 @@ async def test_tags_that_hands_hang_up_and_move():
 
 def test_only_tags_that_exist_can_be_hung_up():
     with lab() as room:
-        hands = room.world.hands
+        stage = room.world.stage
         for text, kind in (("587", TagKind.APRIL), ("x", TagKind.APRIL), ("", TagKind.QR), ("x" * 107, TagKind.QR)):
             with pytest.raises(ValueError, match=r"AprilTag|QR"):
-                hands.add_tag(text, Pose(4, 5), kind=kind)
+                stage.add_tag(text, Pose(4, 5), kind=kind)
         with pytest.raises(ValueError, match="no place"):
-            hands.add_tag("1", Pose(40, 5))
+            stage.add_tag("1", Pose(40, 5))
         with pytest.raises(ValueError, match="large"):
-            hands.add_tag("1", Pose(4, 5), size=3.0)
+            stage.add_tag("1", Pose(4, 5), size=3.0)
         for number in range(16):
-            hands.add_tag(str(number), Pose(4, 5))
+            stage.add_tag(str(number), Pose(4, 5))
         with pytest.raises(ValueError, match="16"):
-            hands.add_tag("1", Pose(4, 5))
+            stage.add_tag("1", Pose(4, 5))
         with pytest.raises(NotFound):
-            hands.remove_tag(16)
+            stage.remove_tag(16)
         with pytest.raises(NotFound):
-            hands.move_tag(16, Pose(4, 5), 0)
+            stage.move_tag(16, Pose(4, 5), 0)
 
 
 async def test_a_qr_code_can_be_read():
@@ -106,7 +106,7 @@ async def test_a_person_covers_their_box():
     with lab(people=[anna], start=Pose(1.5, 5)) as room:
         (seen,) = await room.see("people")
         with_her = await picture(room)
-        room.world.hands.person("anna").place(0.6, 9.0)
+        room.world.stage.person("anna").place(0.6, 9.0)
         await room.clock.advance(0.1)
         without = await picture(room)
     changed = np.abs(with_her.astype(int) - without)[:400] > 12  # her shadow lies below

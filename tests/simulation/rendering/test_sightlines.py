@@ -21,7 +21,7 @@ def deserted(name):
 async def test_as_many_rays_as_you_like(name, size):
     clock = LockstepClock()
     world = World(deserted(name), [RobotPlacement("a"), RobotPlacement("b")], clock=clock)
-    world.hands.add_obstacle(Pose(size[0] / 2, 2.0, 0.7), (0.6, 0.3, 0.9))
+    world.stage.add_obstacle(Pose(size[0] / 2, 2.0, 0.7), (0.6, 0.3, 0.9))
     world.start()
     await clock.advance(0.1)  # otherwise the physics does not know yet where things are
     random = np.random.default_rng(3)

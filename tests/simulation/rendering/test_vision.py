@@ -78,9 +78,9 @@ async def test_a_desk_hides_the_legs_only():
 async def test_people_hide_one_another_and_keep_their_numbers():
     with lab(people=[ANNA, {"name": "ben", "path": [[4.6, 5.0]], "facing": 180, "height": 1.9, "radius": 0.3}]) as room:
         assert len(await room.see("people")) == 1
-        room.world.hands.person("ben").place(4.6, 6.2, 180)
+        room.world.stage.person("ben").place(4.6, 6.2, 180)
         before = await room.see("people")
-        room.world.hands.person("ben").place(4.6, 3.8, 180)
+        room.world.stage.person("ben").place(4.6, 3.8, 180)
         after = await room.see("people")
     assert [seen.number for seen in before] == [seen.number for seen in after] == [1, 2]  # ben is nearer
     assert before[0].place.y > 1.0 > -1.0 > after[0].place.y
@@ -88,7 +88,7 @@ async def test_people_hide_one_another_and_keep_their_numbers():
 
 async def test_another_floor_is_another_world():
     with lab(people=[ANNA], floors=2) as room:
-        room.world.hands.place("a", Pose(2, 5), floor=1)
+        room.world.stage.place("a", Pose(2, 5), floor=1)
         assert await room.see("people") == []
 
 
@@ -106,7 +106,7 @@ async def test_face_is_a_strangers_until_it_is_known():
         (known,) = await room.see("faces")
         database.close()
     assert (stranger.name, known.name) == ("", "Anna")
-    assert stranger.print == room.world.hands.person("anna").face
+    assert stranger.print == room.world.stage.person("anna").face
     assert known.age == pytest.approx(30.0, abs=6.0)
     assert known.emotion is Emotion.HAPPY
     assert_box(known.box, block((5.9, 4.91, 1.5), (6.1, 5.09, 1.77)))
@@ -114,7 +114,7 @@ async def test_face_is_a_strangers_until_it_is_known():
 
 async def test_a_face_must_look_here_and_be_near():
     with lab(people=[ANNA]) as room:
-        anna = room.world.hands.person("anna")
+        anna = room.world.stage.person("anna")
         anna.place(6.0, 5.0, 100)
         assert await room.see("faces") == []
         assert len(await room.see("people")) == 1
@@ -128,7 +128,7 @@ async def test_a_face_must_look_here_and_be_near():
 @pytest.mark.parametrize("gesture", Gesture)
 async def test_every_gesture_is_reported_after_a_moment(gesture):
     with lab(people=[ANNA]) as room:
-        room.world.hands.person("anna").gesture(gesture, seconds=2.0)
+        room.world.stage.person("anna").gesture(gesture, seconds=2.0)
         assert await room.see("gestures", 0.35) == []
         (seen,) = await room.see("gestures", 1.0)
         assert seen.gesture is gesture
@@ -137,7 +137,7 @@ async def test_every_gesture_is_reported_after_a_moment(gesture):
 
 async def test_gestures_are_made_towards_the_robot():
     with lab(people=[ANNA]) as room:
-        anna = room.world.hands.person("anna")
+        anna = room.world.stage.person("anna")
         anna.place(6.0, 5.0, 0)
         anna.gesture(Gesture.STOP, seconds=5.0)
         assert await room.see("gestures", 1.0) == []
@@ -172,9 +172,9 @@ async def test_a_marker_cannot_be_read(change, furniture):
 
 async def test_obstacle_before_a_marker_hides_it():
     with lab(markers=[ONE]) as room:
-        number = room.world.hands.add_obstacle(Pose(5, 5))
+        number = room.world.stage.add_obstacle(Pose(5, 5))
         assert await room.see("markers") == []
-        room.world.hands.remove_obstacle(number)
+        room.world.stage.remove_obstacle(number)
         assert len(await room.see("markers")) == 1
 
 
@@ -262,7 +262,7 @@ async def test_lines_of_all_colours_are_seen_where_visible():
     ]
     with lab(lines=lines) as room:
         assert {line.colour for line in await room.see("lines")} == {Colour.RED, Colour.GREEN}
-        room.world.hands.add_obstacle(Pose(4.3, 5.2), (0.3, 0.2, 0.5))
+        room.world.stage.add_obstacle(Pose(4.3, 5.2), (0.3, 0.2, 0.5))
         red = next(line for line in await room.see("lines") if line.colour is Colour.RED)
     assert red.points[-1].y == pytest.approx(appears(4.14, 5.2, 0.0)[1], abs=0.02)
 
@@ -272,14 +272,14 @@ async def test_lines_of_all_colours_are_seen_where_visible():
 
 async def test_another_robot_is_seen_and_hidden():
     with lab(robots=("a", "b")) as room:
-        room.world.hands.place("b", Pose(5, 5.5))
+        room.world.stage.place("b", Pose(5, 5.5))
         (seen,) = await room.see("robots")
         assert seen.distance == pytest.approx(2.8, rel=0.1)
         assert (seen.place.x, seen.place.y) == (pytest.approx(3.0, abs=0.3), pytest.approx(0.5, abs=0.15))
         around = [(5 + 0.25 * math.cos(a / 8), 5.5 + 0.25 * math.sin(a / 8)) for a in range(50)]
         assert_box(seen.box, [(x, y, z) for x, y in around for z in (0.03, 0.4)])
         assert await room.see("robots", robot="b") == []  # it looks the other way
-        room.world.hands.add_obstacle(Pose(3.5, 5.25), (0.2, 1.5, 1.0))
+        room.world.stage.add_obstacle(Pose(3.5, 5.25), (0.2, 1.5, 1.0))
         assert await room.see("robots") == []
 
 

@@ -1,4 +1,4 @@
-"""Repeats, in a rerun, recorded inputs from outside: interventions, commands at the console, answers."""
+"""Repeats, in a rerun, recorded external inputs: interventions, commands at the console, answers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from roboglot.control import lease_server
 from roboglot.model.client_context import set_client
 from roboglot.model.errors import RobotError
 from roboglot.model.inputs import noted_stage
-from roboglot.model.inputs.outside import ANSWER, Input
+from roboglot.model.inputs.external import ANSWER, Input
 from roboglot.operations import BadParameters
 from roboglot.programs.errors import ProgramError
 from roboglot.protocols.robomaster.ports import pilot_port
@@ -85,7 +85,7 @@ class Repeater:
     def __init__(self, runtime: Runtime) -> None:
         self._runtime, self._robots = runtime, runtime.fleet.robots
         for robot in self._robots.values():
-            robot.outside.play()
+            robot.inputs.play()
 
     @cached_property
     def _desk(self) -> desk.Desk:
@@ -101,16 +101,16 @@ class Repeater:
         return True
 
     def _answer(self, given: Input) -> bool:
-        outside, number = self._robots[given.robot].outside, int(str(given.values["number"]))
-        if not outside.waits(given.name, number):
+        inputs, number = self._robots[given.robot].inputs, int(str(given.values["number"]))
+        if not inputs.waits(given.name, number):
             return False
-        outside.answer(given.name, number, str(given.values["said"]))
+        inputs.answer(given.name, number, str(given.values["said"]))
         return True
 
     async def _do(self, given: Input, values: Mapping[str, str]) -> None:
         match given.kind:
-            case noted_stage.HANDS:
-                noted_stage.do_again(self._runtime.fleet.world.hands, given)
+            case noted_stage.STAGE:
+                noted_stage.do_again(self._runtime.fleet.world.stage, given)
             case desk.COMMAND:
                 asked = cast(Mapping[str, object], values["values"])
                 await self._desk.command(given.robot, given.name, asked, values["by"])

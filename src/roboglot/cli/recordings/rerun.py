@@ -150,7 +150,7 @@ async def run(recording: Recording, config: Config) -> list[str]:
     inputs = Inputs(recording, runtime.clock, lambda place: _line(runtime, place), repeat)
     for robot in runtime.fleet.robots.values():
         robot.tap.listen(inputs.count)
-        robot.outside.listen(inputs.notice)
+        robot.inputs.listen(inputs.notice)
     try:
         await runtime.start()
         start = recording.epoch or runtime.clock.epoch() - runtime.clock.time()

@@ -250,7 +250,7 @@ class Classes:
         if do == "lock" and name not in locked:
             locked.add(name)
             await self._stop(name)
-            with robot.outside.noting(LEASE, "give", {"who": TEACHER}):
+            with robot.inputs.noting(LEASE, "give", {"who": TEACHER}):
                 await robot[Lease].take(TEACHER)
         elif do in ("unlock", "close") and name in locked:
             locked.discard(name)
@@ -282,5 +282,5 @@ class Classes:
 
 async def _release(robot: Robot) -> None:
     """Release exclusive control of a robot. Raises RobotError."""
-    with robot.outside.noting(LEASE, "release", {"who": ""}):
+    with robot.inputs.noting(LEASE, "release", {"who": ""}):
         await robot[Lease].release()

@@ -1,1 +1,1 @@
-"""Inputs from outside, other than requests at doors, recorded and repeated; fairness between clients and robots."""
+"""External inputs other than requests at doors, noted and repeated; fairness between clients and robots."""

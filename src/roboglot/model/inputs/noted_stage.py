@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar, cast, get_type_hints
 import msgspec
 
 from roboglot.extras import lazy
-from roboglot.model.inputs.outside import Input, Outside
+from roboglot.model.inputs.external import ExternalInputs, Input
 from roboglot.model.sound import Samples, Sound
 from roboglot.model.stage import Stage, StagePerson
 
@@ -20,41 +20,41 @@ if TYPE_CHECKING:
 else:
     np = lazy("numpy")
 
-HANDS = "hands"  # the kind of these inputs
+STAGE = "hands"  # the kind of these inputs, as in recordings of version 0.2
 PERSON, OPTIONS = "person", "options"
 LOOKS = frozenset({"world_file", PERSON})  # methods that change nothing
 T = TypeVar("T")
 S = TypeVar("S", bound=Stage)
 
 
-def noted(stage: S, outside: Outside) -> S:
+def noted(stage: S, inputs: ExternalInputs) -> S:
     """Wrap ``stage`` to note its changes, for callers outside the world."""
-    return cast(S, _Noted(stage, Stage, outside, {}))
+    return cast(S, _Noted(stage, Stage, inputs, {}))
 
 
 class _Noted:
     """Wrapper of a stage or a person; ``given`` is added to each note."""
 
-    def __init__(self, inner: object, kind: type, outside: Outside, given: Mapping[str, object]) -> None:
-        self._inner, self._kind, self._outside, self._given = inner, kind, outside, given
+    def __init__(self, inner: object, kind: type, inputs: ExternalInputs, given: Mapping[str, object]) -> None:
+        self._inner, self._kind, self._inputs, self._given = inner, kind, inputs, given
 
     def __getattr__(self, name: str) -> object:
         value = getattr(self._inner, name)
         if name == PERSON:
             return self._person
-        if not self._outside.watched or name in LOOKS or not inspect.isfunction(getattr(self._kind, name, None)):
+        if not self._inputs.watched or name in LOOKS or not inspect.isfunction(getattr(self._kind, name, None)):
             return value
         return partial(self._carry_out, name, value)
 
     def _person(self, name: str) -> StagePerson:
-        person = _Noted(cast(Stage, self._inner).person(name), StagePerson, self._outside, {PERSON: name})
+        person = _Noted(cast(Stage, self._inner).person(name), StagePerson, self._inputs, {PERSON: name})
         return cast(StagePerson, person)
 
     def _carry_out(self, name: str, method: Callable[..., T], /, *args: object, **named: object) -> T:
         values = _signature(self._kind, name).bind(None, *args, **named).arguments
         values.pop("self")
         whole = {**self._given, **{key: msgspec.to_builtins(value, enc_hook=_samples) for key, value in values.items()}}
-        with self._outside.noting(HANDS, name, whole):
+        with self._inputs.noting(STAGE, name, whole):
             return method(*args, **named)
 
 

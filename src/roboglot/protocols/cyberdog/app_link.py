@@ -14,7 +14,7 @@ from functools import lru_cache
 from urllib.parse import unquote
 
 from roboglot.model.clock import Clock
-from roboglot.model.inputs.outside import Outside
+from roboglot.model.inputs.external import ExternalInputs
 from roboglot.model.tap import Tap
 from roboglot.protocols.cyberdog.app_line import BROKEN, DONE, AppLine, Credentials, delivery
 from roboglot.protocols.cyberdog.frame_queue import Delivery
@@ -67,7 +67,7 @@ class AppLink:
         *,
         ticks: Callable[[str], pb.Ticks],
         tap: Tap | None = None,
-        outside: Outside | None = None,
+        inputs: ExternalInputs | None = None,
         on_host: Callable[[str], None] = lambda _: None,
     ) -> None:
         """``on_host`` is called with the host that is connected."""
@@ -82,7 +82,7 @@ class AppLink:
         self._app_port = app_port
         self._ticks = ticks
         self._tap = tap
-        self._outside = outside or Outside("", clock)
+        self._inputs = inputs or ExternalInputs("", clock)
         known = self._configured or (f"{last}:{app_port}" if last else "")
         self._target = known if route.unasked or not self._configured else ""
         self._pace = route.pace
@@ -193,12 +193,12 @@ class AppLink:
         finally:
             self._line = None
             self._set_connected(False)
-            await (line.close() if self._ended else self._outside.call_out("close", line.close))
+            await (line.close() if self._ended else self._inputs.call_out("close", line.close))
 
     async def _beat(self, target: str, line: AppLine) -> bool:
         heard, own = False, self._address
         if own in WILDCARDS:
-            own = await self._outside.call_out("route", lambda: _route_to(target))
+            own = await self._inputs.call_out("route", lambda: _route_to(target))
         last = self._clock.time()
         while self._target == target:
             began, asked, ticks = self._clock.time(), len(self._asking), self._ticks(own)
@@ -220,7 +220,7 @@ class AppLink:
         return heard
 
     async def _got_through(self, line: AppLine, ticks: pb.Ticks) -> bool:
-        asking = self._outside.call_out(HEARTBEAT, lambda: line.heartbeat(ticks))
+        asking = self._inputs.call_out(HEARTBEAT, lambda: line.heartbeat(ticks))
         try:
             outcome = await self._clock.wait_for(asking, HEARTBEAT_DEADLINE)
         except TimeoutError:
@@ -271,7 +271,7 @@ class AppLink:
         if self._tap is not None and self._tap.watched:
             self._tap.push("cyberdog", self._target, key, text)
         try:
-            asking = self._outside.call_out(key, lambda: line.push(code, text))
+            asking = self._inputs.call_out(key, lambda: line.push(code, text))
             outcome = await self._clock.wait_for(asking, PUSH_DEADLINE)
         except TimeoutError:
             limited_log.warning(

@@ -154,7 +154,7 @@ class CyberDogDoor:
             ),
             ticks=lambda own: ticks(context, own),
             tap=robot.tap,
-            outside=robot.outside,
+            inputs=robot.inputs,
             on_host=self._keep_app,
         )
         context = self._parts(app)

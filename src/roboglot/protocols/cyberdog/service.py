@@ -13,7 +13,7 @@ import grpc
 
 from roboglot.model.admission import NO_PROOF, Proof, ProofKind, Right, Unknown
 from roboglot.model.client_context import identity, set_client
-from roboglot.model.inputs.outside import CALLED_OFF
+from roboglot.model.inputs.external import CALLED_OFF
 from roboglot.protocols.cyberdog.app_link import host_of
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.camera.camera import get_file
@@ -175,8 +175,8 @@ class Service:
                 await self._count(peer, len(chunk.buffer))
 
     def _note_end(self, peer: str, code: int, asked: float | None) -> None:
-        outside = self._context.robot.outside
-        outside.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
+        inputs = self._context.robot.inputs
+        inputs.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
 
     async def _write(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
         """Write to a client; the time that this takes is not robot time.

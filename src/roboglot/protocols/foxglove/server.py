@@ -42,7 +42,7 @@ class FoxgloveDoor:
         if config.enabled:
             browsers = Browsers(f"[{DOOR}]", config.origins, config.hosts)
             channel = taking_turns(Channel(self._open, Right.SEE, SUBPROTOCOLS, binary=True), robot, stops)
-            channel = noted(channel, robot.outside, DOOR, "/")
+            channel = noted(channel, robot.inputs, DOOR, "/")
             self._socket = WebSocketServer(
                 {"/": channel}, address, config.port, browsers, robot.admission, tls, door=DOOR
             )

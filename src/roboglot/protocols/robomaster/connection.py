@@ -13,8 +13,8 @@ from types import MappingProxyType
 from typing import cast
 
 from roboglot.model.components.system.link import Link
+from roboglot.model.inputs.external import CAME, GONE
 from roboglot.model.inputs.fairness import Fairness, Use
-from roboglot.model.inputs.outside import CAME, GONE
 from roboglot.model.response_delay import delay_response
 from roboglot.protocols.robomaster.answers import Answer, FastPath
 from roboglot.protocols.robomaster.context import Context, act_as
@@ -102,7 +102,7 @@ class ControlConnection(asyncio.Protocol):
         transport.set_write_buffer_limits(high=OUTPUT_MAX)
         probe_for_life(transport)
         self._greeting.known = transport.get_extra_info("sockname") is None  # a serial line: browsers cannot reach it
-        self._context.robot.outside.note_client(CAME, DOOR, self._name)
+        self._context.robot.inputs.note_client(CAME, DOOR, self._name)
         log.info("robomaster: %s connected", self._shown)
 
     def data_received(self, data: bytes) -> None:
@@ -152,7 +152,7 @@ class ControlConnection(asyncio.Protocol):
         if self not in self._connections:
             return
         self._connections.discard(self)
-        self._context.robot.outside.note_client(GONE, DOOR, self._name)
+        self._context.robot.inputs.note_client(GONE, DOOR, self._name)
         self._repeated = NOTHING
         self._commands.clear()
         if self._resting:

@@ -129,7 +129,7 @@ class VisualDoor:
         }
         robot = self._service.robot
         fair = {path: taking_turns(channel, robot, lambda text: stops(str(text))) for path, channel in found.items()}
-        return {path: noted(channel, robot.outside, self.name, path) for path, channel in fair.items()}
+        return {path: noted(channel, robot.inputs, self.name, path) for path, channel in fair.items()}
 
     def _end_programs_of(self, who: str) -> None:
         """End the programs of a client that lost rights, as they might depend on them."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 OBSTACLES_MAX = 16
 PASSENGERS_MAX = 4
-TAGS_MAX = 16  # put up by hands
+TAGS_MAX = 16  # added through the stage
 SHELF_PARTS = 5  # four legs and a board
 AWAY = (0.0, 0.0, -50.0)  # where absent props wait
 
@@ -32,7 +32,7 @@ class Props:
         self.solids: dict[str, tuple[int, Solid]] = {}
         self.revisions: dict[int, int] = defaultdict(int)  # number of changes per floor
         self.tags: dict[int, tuple[int, PrintedTag]] = {}
-        """Printed codes that hands hung up, by number: floor and code; nothing collides with them."""
+        """Printed codes that were hung up, by number: floor and code; nothing collides with them."""
 
     def put(self, key: str, floor: int, solid: Solid) -> None:
         """Place a box, or move it."""

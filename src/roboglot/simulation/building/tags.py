@@ -1,4 +1,4 @@
-"""Poses of printed codes: fixed on walls, moving with docks and shelves, and hung up by hands."""
+"""Poses of printed codes: fixed on walls, moving with docks and shelves, and hung up through the stage."""
 
 from __future__ import annotations
 

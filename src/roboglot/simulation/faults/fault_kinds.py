@@ -67,8 +67,8 @@ class FragileWorld(Protocol):
         """Docks, shelves, the lift."""
 
     @property
-    def own_hands(self) -> Stage:
-        """Hands that move and place things."""
+    def own_stage(self) -> Stage:
+        """Stage by which faults move and place things."""
 
     @property
     def truth(self) -> Truth:
@@ -153,7 +153,7 @@ def lost_localization(
     assert target.name is not None
     world = target.world
     if x is not None and y is not None:
-        world.own_hands.place(target.name, Pose(x, y, math.radians(degrees)), floor)
+        world.own_stage.place(target.name, Pose(x, y, math.radians(degrees)), floor)
         return _nothing
     here, random = world.truth.pose_of(target.name), world.chance("lost_localization")
     storey = world.description.floors[world.truth.floor_of(target.name)]
@@ -163,7 +163,7 @@ def lost_localization(
             storey.origin[0] + storey.size[0] * x, storey.origin[1] + storey.size[1] * y, math.tau * (yaw - 0.5)
         )
         if spot.distance_to(here) >= KIDNAP_DISTANCE and world.truth.has_room(target.name, spot):
-            world.own_hands.place(target.name, spot)
+            world.own_stage.place(target.name, spot)
             return _nothing
     raise ValueError(f"there is no other place for {target.name} on this floor")
 
@@ -172,10 +172,10 @@ def lost_localization(
 def blocked_path(target: Target, *, ahead: float = 1.0, width: float = 0.6, height: float = 1.0) -> Undo:
     assert target.name is not None
     world, pose = target.world, target.world.truth.pose_of(target.name)
-    number = world.own_hands.add_obstacle(
+    number = world.own_stage.add_obstacle(
         pose.compose(Pose(ahead)), (width, width, height), world.truth.floor_of(target.name)
     )
-    return lambda: world.own_hands.remove_obstacle(number)
+    return lambda: world.own_stage.remove_obstacle(number)
 
 
 @_kind()
@@ -211,8 +211,8 @@ def lift_occupied(target: Target, *, people: int = 3) -> Undo:
 def lift_door_blocked(target: Target, *, floor: int | None = None) -> Undo:
     lift, world = target.lift, target.world
     doorway = lift.frame.compose(Pose((lift.section.size[0] + SHAFT_WALL) / 2))
-    number = world.own_hands.add_obstacle(doorway, (0.3, 0.3, 0.8), lift.floor if floor is None else floor)
-    return lambda: world.own_hands.remove_obstacle(number)
+    number = world.own_stage.add_obstacle(doorway, (0.3, 0.3, 0.8), lift.floor if floor is None else floor)
+    return lambda: world.own_stage.remove_obstacle(number)
 
 
 @_kind()

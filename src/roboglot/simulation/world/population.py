@@ -1,4 +1,4 @@
-"""The robots and people of one world by name, for its truth, hands and steps."""
+"""The robots and people of one world by name, for its truth, stage and steps."""
 
 from __future__ import annotations
 

@@ -23,8 +23,8 @@ from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
 from roboglot.model.background import load
 from roboglot.model.clock import Clock, PatientClock, RealClock, Timer
 from roboglot.model.geometry import Pose
+from roboglot.model.inputs.external import ExternalInputs
 from roboglot.model.inputs.noted_stage import noted
-from roboglot.model.inputs.outside import Outside
 from roboglot.model.robot import Description, Robot
 from roboglot.model.sound import claps
 from roboglot.simulation.bodies.assembly import SimulatedRobot
@@ -46,7 +46,6 @@ from roboglot.simulation.sound.voice import hummed
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.environment import Environment
-from roboglot.simulation.world.hands import Hands
 from roboglot.simulation.world.lag_monitor import Pace
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
@@ -55,6 +54,7 @@ from roboglot.simulation.world.sight import Sight
 from roboglot.simulation.world.sightlines import SightLines
 from roboglot.simulation.world.ticking import Ticking
 from roboglot.simulation.world.truth import Truth
+from roboglot.simulation.world.world_stage import WorldStage
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -95,8 +95,8 @@ def _no_plugins() -> Iterator[None]:
 class World:
     """A described world with robots in it, and its time. Raises ValueError in plain words if it cannot be built.
 
-    ``truth`` reads the world's real state; ``hands`` change it, and their actions are noted in ``outside``;
-    ``own_hands`` are those of the world itself; ``faults`` break things.
+    ``truth`` reads the world's real state; ``stage`` changes it, and its calls are noted in ``inputs``;
+    ``own_stage`` is not noted, for the world itself; ``faults`` break things.
     """
 
     def __init__(
@@ -131,9 +131,9 @@ class World:
             self._population.hull(placement.name).place(*start)
         self._loading: asyncio.Task[None] | None = None
         self.truth = Truth(self._population, self._environment)
-        self.own_hands = Hands(self._population, self._environment, clock, lambda: self.faults)
-        self.outside = Outside("", clock)
-        self.hands = noted(self.own_hands, self.outside)
+        self.own_stage = WorldStage(self._population, self._environment, clock, lambda: self.faults)
+        self.inputs = ExternalInputs("", clock)
+        self.stage = noted(self.own_stage, self.inputs)
         self.faults = Faults(self, description.faults)
         self._robot_ticks = RobotTicks(self._physics.tables, TICK)
         self._ticking = Ticking(self._physics, self._crowd, self._robot_ticks, TICK)

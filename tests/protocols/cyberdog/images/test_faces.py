@@ -51,7 +51,7 @@ async def test_faces_are_renamed_and_deleted(client, app, robot, anna, passing) 
 
 
 async def test_a_face_being_entered_keeps_its_member(client, app, robot, anna, world, passing) -> None:
-    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
+    world.stage.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
     await client.ask(7001, {"command": 0, "username": "ben"})
     assert await client.ask(1022, {"member": "ben"}) == {"success": True}
     await passing(lambda: app.of(7003))
@@ -59,7 +59,7 @@ async def test_a_face_being_entered_keeps_its_member(client, app, robot, anna, w
     assert await client.ask(7001, {"command": 0, "username": "anna"}) == {"result": 0}
     assert await client.ask(1024, {"pre_name": "anna", "new_name": "eva"}) == {"success": True}
     assert (await client.ask(1021, {"account": "eva"}))["accounts"][0]["face_state"] == 2
-    world.hands.place("a", Pose(anna.pose.x - 3.0, anna.pose.y, 0.0))
+    world.stage.place("a", Pose(anna.pose.x - 3.0, anna.pose.y, 0.0))
     await passing(lambda: len(app.of(7003)) == 2)
     assert app.of(7003)[1] == {"result": 0, "username": "eva"}
     assert robot[Members].get("eva").face
@@ -67,7 +67,7 @@ async def test_a_face_being_entered_keeps_its_member(client, app, robot, anna, w
 
 
 async def test_no_one_is_recognised_there(client, app, robot, anna, world, passing) -> None:
-    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
+    world.stage.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
     await robot[Members].add("anna")
     await robot[Members].set_face("anna", anna.face)
     assert await client.ask(7002, {"command": 0, "timeout": 2}) == {"result": 0}
@@ -77,7 +77,7 @@ async def test_no_one_is_recognised_there(client, app, robot, anna, world, passi
 
 @pytest.mark.slow  # minutes; in short: test_no_one_is_recognised_there
 async def test_enrolling_fails_without_a_face(client, app, robot, anna, world, passing, forward) -> None:
-    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
+    world.stage.place("a", Pose(1.0, 1.0, 3.14))  # facing a wall
     assert await client.ask(7001, {"command": 1}) == {"result": 5903}
     assert await client.ask(7001, {"command": 0, "username": "anna"}) == {"result": 0}
     assert await client.ask(7001, {"command": 1}) == {"result": 0}

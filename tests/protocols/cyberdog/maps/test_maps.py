@@ -98,7 +98,7 @@ async def test_in_map_of_earlier_life_robot_is_searched(client, door, robot, wor
     await client.ask(6009, {"type": 5, "map_name": "old"})
     robot[Mapping].clear()  # as another door may do, or a restart
     begun = world.truth.pose_of("a")
-    world.hands.place("a", Pose(2.5, 6.6, 1.0))  # and it was carried away meanwhile
+    world.stage.place("a", Pose(2.5, 6.6, 1.0))  # and it was carried away meanwhile
     await forward(seconds=0.5)
     again = Stream(client, 6004, {"type": 7})
     await passing(lambda: again.ended)
@@ -117,7 +117,7 @@ async def test_the_dock_goes_with_the_map(client, door, robot, world, forward, p
     await client.ask(6009, {"type": 5, "map_name": "old"})
     begun = world.truth.pose_of("a")
     assert robot[DockContact].docked
-    world.hands.place("a", begun.compose(Pose(1.2, 0.4, 0.6)))  # off the dock, and restarted there
+    world.stage.place("a", begun.compose(Pose(1.2, 0.4, 0.6)))  # off the dock, and restarted there
     await forward(seconds=0.5)
     robot[Mapping].clear()
     robot[Docking].set_home(None)
@@ -130,7 +130,7 @@ async def test_the_dock_goes_with_the_map(client, door, robot, world, forward, p
 
 
 async def test_failed_charging_is_reported_with_the_reason(client, robot, world, forward, passing: Passing) -> None:
-    world.hands.place("a", Pose(6.0, 6.0, 0.0))
+    world.stage.place("a", Pose(6.0, 6.0, 0.0))
     await forward(seconds=0.5)
     robot[Docking].set_home(None)
     stream = Stream(client, 6004, {"type": 9})

@@ -28,7 +28,7 @@ async def made(client: Client, robot, forward, passing, name: str) -> None:
 
 
 async def test_from_the_map_to_the_goal(client: Client, robot, world, forward, passing, monkeypatch) -> None:
-    world.hands.place("a", Pose(16.0, 10.0, 1.0))
+    world.stage.place("a", Pose(16.0, 10.0, 1.0))
     await made(client, robot, forward, passing, "yard")
     kept = await robot[MapLibrary].get("yard")
     assert kept.outdoor
@@ -78,7 +78,7 @@ async def test_satellites_that_see_the_robot_elsewhere_confirm_nothing(
     client: Client, robot, world, forward, passing, monkeypatch
 ) -> None:
     """The lidar alone would find it: the map is the same; but it is a yard elsewhere."""
-    world.hands.place("a", Pose(16.0, 10.0, 1.0))
+    world.stage.place("a", Pose(16.0, 10.0, 1.0))
     await made(client, robot, forward, passing, "yard")
     robot[Mapping].clear()
     reading = robot[Gps].reading
@@ -98,7 +98,7 @@ async def test_carried_robot_is_not_placed_where_it_was(client: Client, robot, w
     await forward(seconds=2)
     begun = world.truth.pose_of("a").compose(robot[Localization].pose.inverse())
     assert robot[Localization].quality > 0.5
-    world.hands.place("a", Pose(2.5, 6.6, 1.0))
+    world.stage.place("a", Pose(2.5, 6.6, 1.0))
     await forward(seconds=0.1)  # its own estimate is still good
     assert robot[Localization].quality > 0.5
     stream = Stream(client, 6004, {"type": 7})

@@ -17,7 +17,7 @@ LOW = (0.3, 3.0, 0.08)  # m; invisible to lidar and depth camera
 async def test_a_navigation_that_bumps_fails_with_304(client, robot, world, forward, passing) -> None:
     await forward(seconds=1)
     await localized(client, passing)
-    world.hands.add_obstacle(Pose(2.0, 5.0), LOW)
+    world.stage.add_obstacle(Pose(2.0, 5.0), LOW)
     stream = Stream(client, 6004, {"type": 1, "goalX": 4.0, "goalY": 0.0})
     await passing(lambda: stream.ended)
     assert stream.codes[-1] == 304
@@ -26,7 +26,7 @@ async def test_a_navigation_that_bumps_fails_with_304(client, robot, world, forw
 
 
 async def test_servo_frames_into_a_wall_are_refused(client, app, robot, world, forward, passing) -> None:
-    world.hands.place("a", Pose(9.5, 5.0, 0.0))
+    world.stage.place("a", Pose(9.5, 5.0, 0.0))
     await client.ask(10001)
     await passing(lambda: app.connected)
     for _ in range(20):

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.world("playground", body="cyberdog2")
 @pytest.fixture(autouse=True)
 async def middle(world, robot, forward):
     """The robot stands in the middle of the room, some time after its start."""
-    world.hands.place("a", Pose(4.0, 2.5, 0.0))
+    world.stage.place("a", Pose(4.0, 2.5, 0.0))
     await forward(seconds=0.5)
 
 
@@ -91,7 +91,7 @@ async def test_a_lying_dog_gets_up_for_a_figure(client, robot, forward) -> None:
 
 
 async def test_obstacle_before_a_figure_is_reported(client, robot, world, forward) -> None:
-    world.hands.place("a", Pose(0.45, 4.0, math.pi))  # before the wall
+    world.stage.place("a", Pose(0.45, 4.0, math.pi))  # before the wall
     await forward(seconds=0.5)
     assert (await answered(client, 1004, {"motion_id": 132}, forward))["code"] == 3041
 

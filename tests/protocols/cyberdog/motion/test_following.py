@@ -51,7 +51,7 @@ async def test_long_loss_of_the_person_ends_following(client, app, robot, world,
     await passing(lambda: any(push["body_info_roi"] for push in app.of(6007)))
     await client.ask(6008, {"roi": app.of(6007)[-1]["body_info_roi"][0]["roi"]})
     await passing(lambda: 503 in stream.codes)
-    world.hands.place("a", Pose(1.0, 1.0, 3.14))  # carried away, its nose to the wall
+    world.stage.place("a", Pose(1.0, 1.0, 3.14))  # carried away, its nose to the wall
     await passing(lambda: stream.ended)
     assert stream.answers[-1] == {"result": 3}
     assert stream.codes[-2:] == [504, 505]
@@ -100,7 +100,7 @@ async def test_thing_in_picture_is_followed_wherever_it_goes(
 
 
 async def test_a_wall_is_no_thing_to_follow(client: Client, robot, world, passing, forward) -> None:
-    world.hands.place("a", Pose(5.0, 2.5, -1.57))  # only the south wall ahead
+    world.stage.place("a", Pose(5.0, 2.5, -1.57))  # only the south wall ahead
     await forward(seconds=0.3)
     stream = Stream(client, 6004, {"type": 13, "object_tracking": True})
     await passing(lambda: 501 in stream.codes)

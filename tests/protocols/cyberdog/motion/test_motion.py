@@ -33,7 +33,7 @@ def robot(walker: tuple[World, Robot]) -> Robot:
 @pytest.fixture
 def world(walker: tuple[World, Robot]) -> World:
     world, _ = walker
-    world.hands.place("a", Pose(6.0, 10.0, 0.0))
+    world.stage.place("a", Pose(6.0, 10.0, 0.0))
     return world
 
 

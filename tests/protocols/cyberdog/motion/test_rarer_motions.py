@@ -36,7 +36,7 @@ TROT = [
 @pytest.fixture(autouse=True)
 async def middle(world, robot, forward):
     """The robot stands where there is room, some time after its start."""
-    world.hands.place("a", Pose(3.0, 6.2, 0.0))
+    world.stage.place("a", Pose(3.0, 6.2, 0.0))
     await forward(seconds=0.5)
 
 
@@ -211,21 +211,21 @@ def test_each_refusal_of_a_motion_has_its_reason() -> None:
 
 
 async def test_a_dog_that_was_knocked_over_says_so(client, robot, world, forward) -> None:
-    world.hands.roll_over("a")
+    world.stage.roll_over("a")
     await forward(seconds=1)
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 115
-    world.hands.roll_over("a", 0.0)
+    world.stage.roll_over("a", 0.0)
     await forward(seconds=1)
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 111
 
 
 async def test_someone_takes_the_dog_up(client, robot, world, forward) -> None:
-    world.hands.lift("a")
+    world.stage.lift("a")
     await forward(seconds=1)
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 114
     walk = {"motion_id": 303, "vel_des": [0.2, 0.0, 0.0], "duration": 1000}
     assert (await client.ask(1004, walk))["code"] == 3003  # its feet find no floor
-    world.hands.let_go("a")
+    world.stage.let_go("a")
     await forward(seconds=2)
     assert (await client.ask(10001))["motion_status"]["motion_id"] in (111, 112)
     await frames(client, forward, 6, motion_id=302, vel_des=[0.1, 0.0, 0.0])  # at times all feet are in the air
@@ -240,7 +240,7 @@ async def test_someone_takes_the_dog_up(client, robot, world, forward) -> None:
 async def test_foresighted_walks_lift_feet_over_obstacles(
     client, robot, world, forward, number: int, over: bool
 ) -> None:
-    world.hands.place("a", Pose(3.2, 2.0, 0.0))
+    world.stage.place("a", Pose(3.2, 2.0, 0.0))
     await forward(seconds=0.5)
     asking = asyncio.ensure_future(
         client.ask(1004, {"motion_id": number, "vel_des": [0.4, 0.0, 0.0], "duration": 4000})

@@ -31,7 +31,7 @@ async def unheard(app):
 @pytest.fixture
 async def stands(robot, world, forward):
     """A dog that stands before the flight."""
-    world.hands.place("a", BEFORE_THE_STEP)
+    world.stage.place("a", BEFORE_THE_STEP)
     await forward(seconds=0.5)
 
 
@@ -54,7 +54,7 @@ async def test_up_it_aligns_after_the_answer(stands, client, robot, world, forwa
 
 
 async def test_down_it_looks_for_the_landings_edge(client, robot, world, forward) -> None:
-    world.hands.place("a", Pose(5.55, 4.0, math.pi - 0.2))
+    world.stage.place("a", Pose(5.55, 4.0, math.pi - 0.2))
     await forward(seconds=0.5)
     assert await client.ask(1100, {"data": True}) == {"success": False}  # there are no stairs
     action = await begun(client, robot, forward, up=False)
@@ -64,7 +64,7 @@ async def test_down_it_looks_for_the_landings_edge(client, robot, world, forward
 
 
 async def test_missing_step_is_reported_and_disturbs_no_one(client, robot, world, forward) -> None:
-    world.hands.place("a", Pose(2.0, 2.0))
+    world.stage.place("a", Pose(2.0, 2.0))
     await forward(seconds=0.5)
     driving = robot[Driving].drive(Twist(yaw=0.1))
     for up in (True, False):
@@ -128,7 +128,7 @@ async def test_it_stops_when_the_app_is_lost(
 ) -> None:
     monkeypatch.setattr(alignment, "ALIGN_MAX", 600.0)
     action = await begun(client, robot, forward)
-    world.hands.lift("a", 0.0)  # held back, it never arrives
+    world.stage.lift("a", 0.0)  # held back, it never arrives
     app.silent = False
     await client.ask(10001)
     await passing(lambda: door._context.app.connected)

@@ -66,10 +66,10 @@ async def test_the_transcripts_are_true(
     here = world.truth.pose_of("a")
     causes: dict[str, Callable[[], object]] = {
         "time": lambda: None,
-        "hand": lambda: world.hands.touch_plate("a", PlatePlace.REAR),
-        "claps": lambda: world.hands.make_sound(claps(2), Point(here.x + 1, here.y)),
-        "volts": lambda: world.hands.apply_voltage("a", 3, 2, 2.5),
-        "place": lambda: world.hands.place("a", Pose(4.5, 3.4, 0.0)),
+        "hand": lambda: world.stage.touch_plate("a", PlatePlace.REAR),
+        "claps": lambda: world.stage.make_sound(claps(2), Point(here.x + 1, here.y)),
+        "volts": lambda: world.stage.apply_voltage("a", 3, 2, 2.5),
+        "place": lambda: world.stage.place("a", Pose(4.5, 3.4, 0.0)),
         "keys": lambda: (robot[InputDevice].click(MouseButton.LEFT), robot[InputDevice].press("w")),
     }
 

@@ -84,7 +84,7 @@ async def test_robomasterpy_works_unmodified(robot, world, forward, vendor_ports
         sys.executable, str(TOUR), address, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
     )
     said: list[str] = []
-    ended = asyncio.ensure_future(listen(tour, said, lambda: world.hands.touch_plate("a", PlatePlace.REAR)))
+    ended = asyncio.ensure_future(listen(tour, said, lambda: world.stage.touch_plate("a", PlatePlace.REAR)))
     try:
         async with asyncio.timeout(200):  # the whole tour, on a busy machine
             while not ended.done():

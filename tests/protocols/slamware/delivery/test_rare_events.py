@@ -121,7 +121,7 @@ async def test_a_lost_robot_lets_orders_wait(
     here = world.truth.pose_of("a").relative_to(screen.origin)
     match helped_by:
         case "dock":
-            world.hands.place("a", screen.origin)
+            world.stage.place("a", screen.origin)
         case "pose":
             await screen.client.put(f"{slam}/pose", json={"x": here.x, "y": here.y, "yaw": here.yaw})
         case _:

@@ -64,7 +64,7 @@ async def test_relation_of_the_robot_to_elevators(client: httpx.AsyncClient, for
 async def test_to_a_place_on_another_floor_and_back(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:
-    world.hands.person("person 0 0").place(28.5, 10.5)  # people there would block the way, as PATH_OCCUPIED says
+    world.stage.person("person 0 0").place(28.5, 10.5)  # people there would block the way, as PATH_OCCUPIED says
     await forward(seconds=1)
     await drive_to(client, forward, origin, 10.0, 5.0)
     await two_floors(robot, client, origin)

@@ -91,12 +91,12 @@ class FloorWalk:
             self.witness.robot[LiftClient].call(self._draw.randint(0, 1))
 
     async def box(self) -> None:
-        hands = self.witness.world.hands
+        stage = self.witness.world.stage
         if self._box is not None:
-            hands.remove_obstacle(self._box)
+            stage.remove_obstacle(self._box)
             self._box = None
         elif self.witness.pose.distance_to(Point(2.6, 10.0)) > 1.2:
-            self._box = hands.add_obstacle(Pose(2.6, 10.0), (0.4, 0.4, 0.6), self._draw.randint(0, 1))
+            self._box = stage.add_obstacle(Pose(2.6, 10.0), (0.4, 0.4, 0.6), self._draw.randint(0, 1))
 
     async def restart(self) -> None:
         kind = self._draw.choice(["RestartModeSoft", "RestartModeBase"])

@@ -95,7 +95,7 @@ async def two_floors(robot: Robot, client: httpx.AsyncClient, origin: Pose) -> N
 async def map_two_floors(robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward) -> Pose:
     """Map the way to the lift, and load that as both floors; return the map's origin in the world."""
     origin = world.truth.pose_of("a")
-    world.hands.person("person 0 0").place(28.5, 10.5)  # out of the way
+    world.stage.person("person 0 0").place(28.5, 10.5)  # out of the way
     await forward(seconds=1)
     await drive_to(client, forward, origin, 10.0, 5.0)
     await two_floors(robot, client, origin)

@@ -95,7 +95,7 @@ async def test_one_robot_at_time_in_a_restricted_area(
 ) -> None:
     starts = {"a": Pose(3.0, 4.5), "b": Pose(7.0, 3.0)}
     for name, pose in starts.items():
-        world.hands.place(name, pose)
+        world.stage.place(name, pose)
     await clock.advance(0.5)
     for name, robot in fleet.robots.items():
         robot[Mapping].clear()

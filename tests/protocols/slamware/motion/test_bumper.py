@@ -30,7 +30,7 @@ async def triggered(client: httpx.AsyncClient) -> int:
 async def test_wall_ends_move_and_only_backwards_is_free(
     client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    world.hands.place("a", Pose(9.5, 5.0, 0.0))
+    world.stage.place("a", Pose(9.5, 5.0, 0.0))
     await forward(seconds=1)
     reply = await push(client, FORWARD)
     await forward(seconds=1.5)
@@ -51,9 +51,9 @@ async def test_wall_ends_move_and_only_backwards_is_free(
 
 
 async def test_a_robot_in_plain_view_is_not_shoved(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    world.hands.place("a", Pose(2.0, 5.0, 0.0))
+    world.stage.place("a", Pose(2.0, 5.0, 0.0))
     box = Pose(4.0, 5.0)
-    world.hands.add_obstacle(box, (0.3, 0.3, 0.15))  # lower than the lidar's plane
+    world.stage.add_obstacle(box, (0.3, 0.3, 0.15))  # lower than the lidar's plane
     await forward(seconds=1)
     reply = await push(client, FORWARD)
     for _ in range(12):
@@ -67,8 +67,8 @@ async def test_a_robot_in_plain_view_is_not_shoved(client: httpx.AsyncClient, wo
 async def test_emergency_braking_ends_the_move_with_its_reason(
     client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    world.hands.place("a", Pose(3.0, 5.0, 0.0))
-    world.hands.add_obstacle(Pose(5.0, 5.0), (0.3, 1.0, 1.0))
+    world.stage.place("a", Pose(3.0, 5.0, 0.0))
+    world.stage.add_obstacle(Pose(5.0, 5.0), (0.3, 1.0, 1.0))
     await forward(seconds=1)
     for _ in range(20):
         reply = await push(client, FORWARD)

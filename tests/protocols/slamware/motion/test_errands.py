@@ -78,7 +78,7 @@ async def test_going_home_without_docking_ends_at_landing_point(
 async def test_current_action_is_new_while_old_one_brakes(
     client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    world.hands.place("a", Pose(5.0, 5.0))
+    world.stage.place("a", Pose(5.0, 5.0))
     await client.put("/api/core/slam/v1/localization/pose", json={"x": 5.0 - 0.375, "y": 0})
     await forward(seconds=1)
     home = await start(client, "GoHomeAction")
@@ -104,7 +104,7 @@ async def test_docked_robot_stays_if_it_need_not_dock(
 async def test_back_to_landing_point_when_dock_is_gone(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    world.hands.place("a", Pose(5.0, 5.0))
+    world.stage.place("a", Pose(5.0, 5.0))
     await client.put("/api/core/slam/v1/localization/pose", json={"x": 0, "y": 0})
     await forward(seconds=1)
     await client.put("/api/core/slam/v1/homepose", json={"x": 1.0, "y": 0.0, "yaw": 0.0})

@@ -178,7 +178,7 @@ async def test_a_path_is_found_without_going(
 async def test_remote_control_stops_by_itself(
     client: httpx.AsyncClient, world: World, forward: Forward, options: dict[str, object], twist: Twist
 ) -> None:
-    world.hands.place("a", Pose(5.0, 5.0))
+    world.stage.place("a", Pose(5.0, 5.0))
     await forward(seconds=1)
     before = world.truth.pose_of("a")
     info = await start(client, "MoveByAction", **options)  # type: ignore[arg-type]
@@ -193,7 +193,7 @@ async def test_remote_control_stops_by_itself(
 
 
 async def test_remote_control_goes_on_while_repeated(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    world.hands.place("a", Pose(3.0, 5.0))
+    world.stage.place("a", Pose(3.0, 5.0))
     await forward(seconds=1)
     ids = set()
     for _ in range(20):
@@ -208,7 +208,7 @@ async def test_remote_control_goes_on_while_repeated(client: httpx.AsyncClient, 
 
 @pytest.mark.parametrize("angle", [math.pi / 2, -2.5, 7.0])
 async def test_turn_by_an_angle(client: httpx.AsyncClient, world: World, forward: Forward, angle: float) -> None:
-    world.hands.place("a", Pose(5.0, 5.0, 0.3))
+    world.stage.place("a", Pose(5.0, 5.0, 0.3))
     await forward(seconds=1)
     info = await start(client, "RotateAction", angle=angle)
     assert await finish(client, forward, info["action_id"]) == SUCCESS
@@ -266,7 +266,7 @@ async def test_the_dock_can_take_pose(robot: Robot, client: httpx.AsyncClient) -
 
 
 async def test_a_new_action_takes_over(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
-    world.hands.place("a", Pose(5.0, 5.0))
+    world.stage.place("a", Pose(5.0, 5.0))
     await forward(seconds=1)
     turning = await start(client, "RotateAction", angle=20.0)
     await forward(seconds=1)
@@ -281,7 +281,7 @@ async def test_a_new_action_takes_over(client: httpx.AsyncClient, world: World, 
 async def test_the_stop_button_stops_what_anybody_began(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
-    world.hands.place("a", Pose(3.0, 5.0))
+    world.stage.place("a", Pose(3.0, 5.0))
     await forward(seconds=1)
     action = robot[Driving].drive(Twist(x=0.5), source="someone else")
     await forward(seconds=1)

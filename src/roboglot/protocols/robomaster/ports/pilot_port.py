@@ -13,7 +13,7 @@ from typing import cast
 
 from roboglot.model.components.interaction.input_device import InputDevice, MouseButton
 from roboglot.model.errors import InvalidGoal, RobotError
-from roboglot.model.inputs.outside import Input
+from roboglot.model.inputs.external import Input
 from roboglot.model.robot import Robot
 from roboglot.protocols.robomaster.foreign_protocols import Greeting, turn_away_strangers
 from roboglot.protocols.robomaster.limits import PILOT_LINE_MAX, PILOTS_MAX
@@ -112,7 +112,7 @@ def _act(robot: Robot, text: str) -> None:
     act = ACTS[words[0]] if words and words[0] in ACTS else None
     if act is None:
         raise InvalidGoal(f"it is one of {', '.join(ACTS)}")
-    with robot.outside.noting(PILOT, LINE, {"text": text}):
+    with robot.inputs.noting(PILOT, LINE, {"text": text}):
         act(robot[InputDevice], words[1:])
 
 
@@ -120,7 +120,7 @@ def _let_go(robot: Robot) -> None:
     """Release all keys and buttons."""
     if InputDevice in robot:
         device = robot[InputDevice]
-        with robot.outside.noting(PILOT, LET_GO, {}):
+        with robot.inputs.noting(PILOT, LET_GO, {}):
             _release(device, device.state.keys)
             device.click()
             device.move_mouse(0.0, 0.0)

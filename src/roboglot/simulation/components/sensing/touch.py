@@ -1,4 +1,4 @@
-"""The touch pad, touched by the world's hands."""
+"""The touch pad, touched through the world's stage."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class TouchSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedTouch(Touch):
-    """Touch pad pressed by ``Hands.touch``."""
+    """Touch pad pressed by ``Stage.touch``."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

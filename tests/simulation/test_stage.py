@@ -31,13 +31,13 @@ async def test_the_documented_example(robot, world, forward):
     await names["test_picked_up"](robot, world, forward)
 
 
-def test_hands_find_only_what_is_there(simulate):
+def test_stage_find_only_what_is_there(simulate):
     sim = simulate()
     for touch in (
-        lambda: sim.world.hands.lift("z"),
-        lambda: sim.world.hands.push("z", Vector3()),
-        lambda: sim.world.hands.touch_plate("a", "roof"),
-        lambda: sim.world.hands.apply_voltage("a", 9, 1, 1.0),
+        lambda: sim.world.stage.lift("z"),
+        lambda: sim.world.stage.push("z", Vector3()),
+        lambda: sim.world.stage.touch_plate("a", "roof"),
+        lambda: sim.world.stage.apply_voltage("a", 9, 1, 1.0),
         lambda: sim.world.truth.thing("moon"),
     ):
         with pytest.raises(NotFound):
@@ -46,7 +46,7 @@ def test_hands_find_only_what_is_there(simulate):
 
 async def test_somebody_more_stands_in_way_until_taken_away(simulate):
     sim = simulate("empty")
-    hands, start = sim.world.hands, sim.world.hands.robots[0].pose
+    hands, start = sim.world.stage, sim.world.stage.robots[0].pose
     ahead = start.compose(Pose(1.2, 0.0))
     assert hands.add_person(ahead) == "visitor 1"
     with pytest.raises(ValueError, match="already"):
@@ -70,7 +70,7 @@ async def test_somebody_more_stands_in_way_until_taken_away(simulate):
 async def battle(simulate, seed):
     """All that two robots feel who shoot at each other on the ramp."""
     sim = simulate("obstacle_course", start=Pose(2.0, 4.0), robots=("a", "b"), body="robomaster_ep", seed=seed)
-    sim.world.hands.place("b", Pose(4.9, 4.0, 3.1))
+    sim.world.stage.place("b", Pose(4.9, 4.0, 3.1))
     felt = []
     for robot in sim.robots.values():
         robot.events.listen(ArmorHit, lambda event: felt.append(repr(event)))
@@ -99,7 +99,7 @@ async def test_the_same_seed_gives_the_same_battle(simulate):
 async def test_robot_put_elsewhere_has_its_weight(simulate):
     sim = simulate("empty", start=Pose(4.0, 5.0))
     sim.world.start()
-    hands, hull = sim.world.hands, sim.world._physics.hulls["a"]
+    hands, hull = sim.world.stage, sim.world._physics.hulls["a"]
     hands.lift("a")
     await sim.clock.advance(1.0)
     hands.place("a", Pose(6.0, 5.0))
@@ -120,17 +120,17 @@ PLACES = {  # in the office, for a universal of 0.25 m radius
 async def test_no_robot_is_put_into_anything(simulate, what):
     sim = simulate("office", robots=("a", "b"))
     world, before = sim.world, sim.pose
-    at = PLACES[what] or world.hands.person(what).pose
+    at = PLACES[what] or world.stage.person(what).pose
     with pytest.raises(Refused, match=f"{what} is in the way"):
-        world.hands.place("a", at)
+        world.stage.place("a", at)
     assert sim.pose == before
 
 
 async def test_robots_may_touch_walls_and_stand_below_boards(simulate):
     sim = simulate(replace(load_world("empty"), floors=(under_a_board(),)), start=Pose(6.0, 5.0))
     radius = sim.robot.description.radius
-    sim.world.hands.place("a", Pose(5.0, radius))
-    sim.world.hands.place("a", Pose(4.0, 5.0))  # the board is above it
+    sim.world.stage.place("a", Pose(5.0, radius))
+    sim.world.stage.place("a", Pose(4.0, 5.0))  # the board is above it
     sim.world.start()
     await sim.clock.advance(2.0)
     assert sim.pose.distance_to(Pose(4.0, 5.0)) < 0.01
@@ -147,15 +147,15 @@ async def test_no_robot_is_put_into_an_empty_shaft(simulate, floor):
     sim = simulate("office")
     middle = Pose(*known(sim.world.description.lift).at)
     if floor == known(sim.world.description.lift).parked_at:
-        sim.world.hands.place("a", middle, floor)
+        sim.world.stage.place("a", middle, floor)
     else:
         with pytest.raises(Refused, match="a gap in the floor is in the way"):
-            sim.world.hands.place("a", middle, floor)
+            sim.world.stage.place("a", middle, floor)
 
 
 async def test_nothing_is_put_into_a_robot(simulate):
     sim = simulate("empty", start=Pose(5.0, 5.0))
-    hands, there = sim.world.hands, Pose(5.2, 5.1)
+    hands, there = sim.world.stage, Pose(5.2, 5.1)
     box, name = hands.add_obstacle(Pose(8.0, 8.0)), hands.add_person(Pose(2.0, 2.0))
     for put in (
         lambda: hands.add_obstacle(there),
@@ -172,10 +172,10 @@ async def test_nothing_is_put_into_a_robot(simulate):
 
 async def test_robot_goes_back_only_to_a_free_start(simulate):
     sim = simulate("empty", start=Pose(5.0, 5.0))
-    sim.world.hands.place("a", Pose(8.0, 8.0))
-    box = sim.world.hands.add_obstacle(Pose(5.0, 5.0))
+    sim.world.stage.place("a", Pose(8.0, 8.0))
+    box = sim.world.stage.add_obstacle(Pose(5.0, 5.0))
     with pytest.raises(Refused, match="cannot go back to its start: furniture is in the way"):
-        sim.world.hands.reset("a")
-    sim.world.hands.remove_obstacle(box)
-    sim.world.hands.reset("a")
+        sim.world.stage.reset("a")
+    sim.world.stage.remove_obstacle(box)
+    sim.world.stage.reset("a")
     assert sim.pose.distance_to(Pose(5.0, 5.0)) < 0.01

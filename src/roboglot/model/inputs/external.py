@@ -43,8 +43,8 @@ class Input(NamedTuple):
 Listener = Callable[[Input], None]
 
 
-class Outside:
-    """Inputs of one robot, or of a world. Make ``values`` only while they are ``watched``."""
+class ExternalInputs:
+    """External inputs of one robot, or of a world. Build ``values`` only while they are ``watched``."""
 
     def __init__(self, robot: str, clock: Clock) -> None:
         self._robot, self._clock = robot, clock
@@ -91,7 +91,7 @@ class Outside:
         finally:
             _carried_out.reset(before)
 
-    # -- answers from outside --
+    # -- answers of external peers --
 
     async def call_out(self, name: str, work: Callable[[], Awaitable[str]]) -> str:
         """Call an external peer by ``work`` and return its one-word answer, which is noted as an input.

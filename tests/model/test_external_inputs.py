@@ -1,4 +1,4 @@
-"""Inputs from outside: noted, let in when robots have come to rest, and played instead of asked for."""
+"""External inputs: noted, let in when robots have come to rest, and played instead of asked for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from roboglot.model.clock import LockstepClock
-from roboglot.model.inputs.outside import ANSWER, Input, Outside
+from roboglot.model.inputs.external import ANSWER, ExternalInputs, Input
 
 
 @pytest.fixture
@@ -21,15 +21,15 @@ async def never() -> str:
 
 
 async def test_time_waits_for_an_answer(clock: LockstepClock) -> None:
-    outside, noted = Outside("a", clock), list[Input]()
-    outside.listen(noted.append)
+    inputs, noted = ExternalInputs("a", clock), list[Input]()
+    inputs.listen(noted.append)
 
     async def answered() -> str:
         await asyncio.sleep(0.01)  # of the machine
         return "ok"
 
     async def ask() -> float:
-        assert await outside.call_out("heartbeat", answered) == "ok"
+        assert await inputs.call_out("heartbeat", answered) == "ok"
         return clock.time()
 
     await clock.advance(1.0)
@@ -42,21 +42,21 @@ async def test_time_waits_for_an_answer(clock: LockstepClock) -> None:
 
 
 async def test_rerun_makes_no_outside_calls(clock: LockstepClock) -> None:
-    outside = Outside("a", clock)
-    outside.play()
-    asking = asyncio.ensure_future(outside.call_out("push", never))
+    inputs = ExternalInputs("a", clock)
+    inputs.play()
+    asking = asyncio.ensure_future(inputs.call_out("push", never))
     await clock.advance(1.0)
-    assert (outside.waits("push", 1), outside.waits("push", 2), outside.waits("close", 1)) == (True, False, False)
-    outside.answer("push", 1, "unavailable")
+    assert (inputs.waits("push", 1), inputs.waits("push", 2), inputs.waits("close", 1)) == (True, False, False)
+    inputs.answer("push", 1, "unavailable")
     assert await asking == "unavailable"
 
 
 async def test_given_up_call_is_answered_no_more(clock: LockstepClock) -> None:
-    outside = Outside("a", clock)
-    outside.play()
+    inputs = ExternalInputs("a", clock)
+    inputs.play()
     with pytest.raises(TimeoutError):
-        await asyncio.gather(clock.wait_for(outside.call_out("push", never), 2.0), clock.advance(3.0))
-    assert not outside.waits("push", 1)
+        await asyncio.gather(clock.wait_for(inputs.call_out("push", never), 2.0), clock.advance(3.0))
+    assert not inputs.waits("push", 1)
 
 
 async def test_arrivals_come_one_by_one_at_rest(clock: LockstepClock) -> None:
@@ -85,10 +85,10 @@ async def test_time_stops_between_timers_of_an_instant(clock: LockstepClock) -> 
 
 
 async def test_consequences_of_an_input_are_no_inputs(clock: LockstepClock) -> None:
-    outside, noted = Outside("", clock), list[Input]()
-    outside.listen(noted.append)
-    with outside.noting("command", "go", {}):
-        assert not outside.watched
-        with outside.noting("hands", "push", {}):
+    inputs, noted = ExternalInputs("", clock), list[Input]()
+    inputs.listen(noted.append)
+    with inputs.noting("command", "go", {}):
+        assert not inputs.watched
+        with inputs.noting("hands", "push", {}):
             pass
     assert [one.name for one in noted] == ["go"]

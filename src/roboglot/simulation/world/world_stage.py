@@ -1,4 +1,4 @@
-"""Hands in a world: the model's ``Stage`` on the physics, for tests, consoles and agents."""
+"""The model's ``Stage`` on the physics of one world."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ TAG_HEIGHT_MAX = 5.0  # m
 TAG_SIZE_MIN, TAG_SIZE_MAX = 0.02, 2.0  # m, as in world files
 
 
-class Hands(Stage):
-    """Hands of one world."""
+class WorldStage(Stage):
+    """Stage of one world."""
 
     def __init__(
         self, population: Population, environment: Environment, clock: Clock, faults: Callable[[], Faults]
