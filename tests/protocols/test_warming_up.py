@@ -36,9 +36,9 @@ MOVE_BY = {"action_name": "slamtec.agent.actions.MoveByAction", "options": {"dir
 def warming_up(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     navigation = robot[Navigation]
     assert isinstance(navigation, GridNavigation)
-    course = navigation._course
-    monkeypatch.setattr(course, "planner", None)
-    monkeypatch.setattr(course, "unavailable", NotReady("navigation is warming up: its kernels are being compiled"))
+    context = navigation._context
+    monkeypatch.setattr(context, "planner", None)
+    monkeypatch.setattr(context, "unavailable", NotReady("navigation is warming up: its kernels are being compiled"))
 
 
 @pytest.fixture

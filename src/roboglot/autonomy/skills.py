@@ -18,7 +18,7 @@ from roboglot.autonomy.docking.tag_docking import MarkDocking
 from roboglot.autonomy.following.following import SightFollowing
 from roboglot.autonomy.landmarks.landmark_map import LandmarkKeeper
 from roboglot.autonomy.navigation.area_monitor import AreaWatch
-from roboglot.autonomy.navigation.course import Course
+from roboglot.autonomy.navigation.context import NavigationContext
 from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.navigation.restricted import RestrictedAreas
@@ -89,7 +89,7 @@ class Autonomy:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = self.robot = robot
-        self._course: Course | None = None
+        self._context: NavigationContext | None = None
         self._docking: RearDocking | None = None
         self._delivery: QueueDelivery | None = None
         self._area_watch: AreaWatch | None = None
@@ -123,19 +123,19 @@ class Autonomy:
             robot.add(Following, SightFollowing(robot))
         belief = driving.belief = Belief(robot[Odometry])
         self._traffic = Traffic(robot, belief)
-        self._course = Course(robot, belief, self._traffic)
+        self._context = NavigationContext(robot, belief, self._traffic)
         self._localization = LidarLocalization(robot, belief)
         robot.add(Localization, self._localization)
         robot.add(Mapping, LidarMapping(robot, belief))
-        navigation = GridNavigation(robot, self._course)
+        navigation = GridNavigation(robot, self._context)
         robot.add(Navigation, navigation)
         robot.add(TagDocking, MarkDocking(robot, navigation, driving))
-        robot.add(Sweeping, LaneSweeping(robot, self._course, navigation))
+        robot.add(Sweeping, LaneSweeping(robot, self._context, navigation))
         if LiftClient in robot:
-            self._floors = LiftFloors(robot, self._course, navigation)
+            self._floors = LiftFloors(robot, self._context, navigation)
             robot.add(Floors, self._floors)
         if Jack in robot:
-            self._carried = CarriedLegs(robot, belief, self._course.load)
+            self._carried = CarriedLegs(robot, belief, self._context.load)
         if MapAnnotations in robot:
             self._add_annotated(robot, belief)
         if DockContact in robot:
@@ -166,11 +166,11 @@ class Autonomy:
         """Load the kernels; return at once, or with ``wait`` once all is ready."""
         if self._shoves is not None:
             self._shoves.start()
-        if self._course is None:
+        if self._context is None:
             return
         if self._loading is None:
             self._loading = asyncio.create_task(
-                self._load(self._course, wait=wait), name=f"kernels for {self._robot.id}"
+                self._load(self._context, wait=wait), name=f"kernels for {self._robot.id}"
             )
             if self._delivery is not None:
                 self._delivery.start()
@@ -201,7 +201,7 @@ class Autonomy:
             if part is not None:
                 part.close()
 
-    async def _load(self, course: Course, *, wait: bool) -> None:
+    async def _load(self, context: NavigationContext, *, wait: bool) -> None:
         """Load the kernels in a thread; compile missing ones first, with progress in the log.
 
         With ``wait`` there is no fault meanwhile: no time passes, and a lockstep run is the same on every machine.
@@ -214,29 +214,29 @@ class Autonomy:
                 self._robot.id,
                 len(lacking),
             )
-            course.unavailable = NotReady("navigation is warming up: its kernels are being compiled")
+            context.unavailable = NotReady("navigation is warming up: its kernels are being compiled")
             if not wait:
-                self._report(FaultLevel.WARNING, str(course.unavailable))
+                self._report(FaultLevel.WARNING, str(context.unavailable))
         try:
             if lacking:
                 await compile_beside(NAVIGATION, _log_progress)
             slam_class, planner_class = await load(_estimator_and_planner)
         except Exception as error:
             reason = str(error) or type(error).__name__
-            course.unavailable = Refused(f"no mapping and no navigation: {reason}")
-            self._report(FaultLevel.ERROR, str(course.unavailable))
-            log.error("robot %s has %s", self._robot.id, course.unavailable)
+            context.unavailable = Refused(f"no mapping and no navigation: {reason}")
+            self._report(FaultLevel.ERROR, str(context.unavailable))
+            log.error("robot %s has %s", self._robot.id, context.unavailable)
             log.debug("cannot load the kernels", exc_info=error)
             return
         self._report(None, "")
-        course.unavailable = None
-        self._slam = slam_class(self._robot, course.belief)
+        context.unavailable = None
+        self._slam = slam_class(self._robot, context.belief)
         if Settings in self._robot:
             self._memory = OdometryMemory(self._robot, self._slam)
         if self._localization:
             self._localization.estimator = self._slam
-        course.planner = planner = planner_class(course.belief, self._robot.description.radius, course.load)
-        self._stop_treading = self._robot.events.listen(ScanTaken, lambda _: planner.tread(course.belief.pose))
+        context.planner = planner = planner_class(context.belief, self._robot.description.radius, context.load)
+        self._stop_treading = self._robot.events.listen(ScanTaken, lambda _: planner.tread(context.belief.pose))
         log.info("robot %s can map and navigate (kernels loaded in %.1f s)", self._robot.id, perf_counter() - begun)
         if isinstance(self._robot.clock, RealClock):  # loads the cameras' kernels before a client asks for a picture
             with contextlib.suppress(KernelsUnavailable):

@@ -60,7 +60,7 @@ class Inputs:
         self._tasks: set[asyncio.Task[None]] = set()
         self._heard: Counter[Key] = Counter()
         self._wanted_inputs: Counter[Key] = Counter()
-        self._patience = HEARD_SECONDS_MAX
+        self._wait_max = HEARD_SECONDS_MAX
         self.unheard: list[str] = []  # inputs without effect, described
 
     def count(self, exchange: Exchange) -> None:
@@ -96,14 +96,14 @@ class Inputs:
             self._answered += 1
             self._wanted[reply.robot, reply.door, Direction.REPLY] += 1
         if not await self._wait_for(self._wanted):
-            self._patience = LOOK
+            self._wait_max = LOOK
 
     async def _give(self, given: Input) -> None:
         """Apply an input that is not a request."""
         match given.kind:
             case external.ANSWER:
                 if not await self._wait_until(lambda: self._repeat(given)):
-                    self._patience = LOOK  # later inputs will differ as well
+                    self._wait_max = LOOK  # later inputs will differ as well
                     self._miss(f"{given.robot} was not waiting for an answer to {given.name}", given.stamp)
             case external.CAME:
                 path = str(given.values.get("path", ""))
@@ -159,7 +159,7 @@ class Inputs:
         return await self._wait_until(heard)
 
     async def _wait_until(self, done: Callable[[], Awaitable[object]]) -> bool:
-        deadline = time.monotonic() + self._patience  # noqa: TID251 - robot time stands still
+        deadline = time.monotonic() + self._wait_max  # noqa: TID251 - robot time stands still
         while not await done():
             if time.monotonic() > deadline:  # noqa: TID251
                 return False

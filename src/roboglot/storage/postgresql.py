@@ -61,7 +61,7 @@ class PostgreSQL:
         self._own = threading.local()
         self._opened: list[psycopg.Connection[object]] = []
         self._opening = threading.Lock()
-        self._patience = CLAIM_MAX
+        self._lock_timeout = CLAIM_MAX
         self._threads = ThreadPoolExecutor(
             max_workers=connections,
             thread_name_prefix="database",
@@ -77,7 +77,7 @@ class PostgreSQL:
             raise
         if is_exposed(self._opened[0].pgconn.hostaddr.decode(), _option(self._opened[0], b"sslmode")):
             log.warning(EXPOSED)
-        self._patience = 0  # who loses a robot later must not wait for it
+        self._lock_timeout = 0  # who loses a robot later must not wait for it
 
     def on(self, disk: Disk) -> PostgreSQL:
         """Return the same database for the robot with this disk: while the disk is full, writing raises DiskFull."""
@@ -158,7 +158,7 @@ class PostgreSQL:
         for robot in self._robots:
             query, lock = "SELECT pg_try_advisory_lock(%s, hashtext(%s))", (CLAIM_LOCKS, robot)
             (free,) = connection.execute(query, lock).fetchone() or (False,)
-            if not free and self._patience:
+            if not free and self._lock_timeout:
                 free = self._waited(connection, lock)
             if not free:
                 connection.close()
@@ -166,8 +166,8 @@ class PostgreSQL:
 
     def _waited(self, connection: psycopg.Connection[object], lock: tuple[int, str]) -> bool:
         """Wait for a robot's lock; return whether it was released in time."""
-        log.info("another program serves robot %s: waiting %d ms for its end", lock[1], self._patience)
-        connection.execute(f"SET lock_timeout = {self._patience}".encode())
+        log.info("another program serves robot %s: waiting %d ms for its end", lock[1], self._lock_timeout)
+        connection.execute(f"SET lock_timeout = {self._lock_timeout}".encode())
         try:
             connection.execute("SELECT pg_advisory_lock(%s, hashtext(%s))", lock)
         except psycopg.errors.LockNotAvailable:

@@ -24,7 +24,7 @@ HEAD_MAX = 32 * 1024
 class BoundedConnection(HttpToolsProtocol):
     """Closes connections that send no complete head in time."""
 
-    _patience: asyncio.TimerHandle | None = None
+    _timeout: asyncio.TimerHandle | None = None
     _head_bytes = 0
     _parsed_bytes = 0  # of the request's headers, also of those after a body in chunks
 
@@ -37,17 +37,17 @@ class BoundedConnection(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        if self._patience is None and self.cycle is not None and self.cycle.response_complete:
+        if self._timeout is None and self.cycle is not None and self.cycle.response_complete:
             self._wait()  # also for bytes that do not start a request yet
-        waiting = self._patience
+        waiting = self._timeout
         super().data_received(data)
-        if waiting is not None and self._patience is waiting:
+        if waiting is not None and self._timeout is waiting:
             self._head_bytes += len(data)
             if self._head_bytes > HEAD_MAX:
                 self.transport.close()
 
     def on_message_begin(self) -> None:
-        if self._patience is None:  # immediately after the last request
+        if self._timeout is None:  # immediately after the last request
             self._wait()
         self._parsed_bytes = 0
         super().on_message_begin()
@@ -71,9 +71,9 @@ class BoundedConnection(HttpToolsProtocol):
 
     def _wait(self) -> None:
         self._head_bytes = 0
-        self._patience = self.loop.call_later(REQUEST_SECONDS_MAX, self.transport.close)
+        self._timeout = self.loop.call_later(REQUEST_SECONDS_MAX, self.transport.close)
 
     def _wait_no_more(self) -> None:
-        if self._patience is not None:
-            self._patience.cancel()
-            self._patience = None
+        if self._timeout is not None:
+            self._timeout.cancel()
+            self._timeout = None

@@ -64,14 +64,14 @@ class TlsEnd(asyncio.Protocol):
         self._replied = 0
         self._stays: bool | None = None  # since the end of the other side's data: the inner protocol has answers
         self._host = ""
-        self._patience: asyncio.TimerHandle | None = None
+        self._timeout: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Limit the time for the handshake."""
         self._transport = cast(asyncio.Transport, transport)
         self._gone = self._transport.is_closing  # bound once: called for every message
         self._host = (transport.get_extra_info("peername") or ("",))[0]
-        self._patience = asyncio.get_running_loop().call_later(HANDSHAKE_SECONDS_MAX, self._transport.abort)
+        self._timeout = asyncio.get_running_loop().call_later(HANDSHAKE_SECONDS_MAX, self._transport.abort)
 
     def data_received(self, data: bytes) -> None:
         """Continue the handshake, or decrypt after it."""
@@ -189,9 +189,9 @@ class TlsEnd(asyncio.Protocol):
             self._transport.write(self._outgoing.read())
 
     def _calm_down(self) -> None:
-        if self._patience is not None:
-            self._patience.cancel()
-            self._patience = None
+        if self._timeout is not None:
+            self._timeout.cancel()
+            self._timeout = None
 
 
 class TlsPort(TlsEnd):

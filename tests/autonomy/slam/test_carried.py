@@ -7,7 +7,7 @@ import pytest
 
 from roboglot.autonomy.docking.shelf_legs import CarriedLegs, Load, standing_among
 from roboglot.autonomy.navigation.planner import Planner
-from roboglot.autonomy.navigation.terms import Terms
+from roboglot.autonomy.navigation.planning_options import PlanningOptions
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.autonomy.slam.scan_points import ScanReader
@@ -64,8 +64,8 @@ class Drive:
         self.belief.map.evidence[int((y - corner.y) / RESOLUTION), int((x - corner.x) / RESOLUTION)] = 500
 
     def plan(self, goal):
-        terms = Terms(now=20.0, top=1.0, acceleration=1.0, tolerance=0.05, drawn=Annotations())
-        return self.planner.task(Point(0.0, 0.0), [goal], terms).solve()
+        options = PlanningOptions(now=20.0, top=1.0, acceleration=1.0, tolerance=0.05, drawn=Annotations())
+        return self.planner.task(Point(0.0, 0.0), [goal], options).solve()
 
     def jack(self, monkeypatch, loaded):
         monkeypatch.setattr(type(self.robot[Jack]), "loaded", loaded)

@@ -8,8 +8,8 @@ import pytest
 from roboglot.autonomy.docking.shelf_legs import Load
 from roboglot.autonomy.navigation.low_sight import NONE, LowView
 from roboglot.autonomy.navigation.planner import MOVING_SECONDS, OBSTACLE_SECONDS, Planner
+from roboglot.autonomy.navigation.planning_options import KeepClear, PlanningOptions
 from roboglot.autonomy.navigation.route import Route
-from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.autonomy.traffic.right_of_way import Way
@@ -37,9 +37,11 @@ def planner(belief: Belief) -> Planner:
     return Planner(belief, RADIUS, Load())
 
 
-def plan(planner: Planner, shunned: Shunned = ()) -> Route:
-    terms = Terms(now=20.0, top=1.0, acceleration=1.0, tolerance=0.05, drawn=Annotations(), shunned=shunned)
-    return planner.task(Point(), [Point(4.0, 0.0)], terms).solve()
+def plan(planner: Planner, keep_clear: KeepClear = ()) -> Route:
+    options = PlanningOptions(
+        now=20.0, top=1.0, acceleration=1.0, tolerance=0.05, drawn=Annotations(), keep_clear=keep_clear
+    )
+    return planner.task(Point(), [Point(4.0, 0.0)], options).solve()
 
 
 @pytest.mark.world("empty")

@@ -16,7 +16,7 @@ import numpy as np
 from roboglot.autonomy.building.floor_storage import FloorStorage, Storey
 from roboglot.autonomy.building.lift_queue import Turn, turn
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
-from roboglot.autonomy.navigation.course import Course, Goal
+from roboglot.autonomy.navigation.context import Goal, NavigationContext
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.slam.scan_points import ScanReader, sees
 from roboglot.model.actions import Action, ActionStatus
@@ -52,9 +52,9 @@ STAY_PERIOD = 0.5  # s between two looks at a car in which the ride was given up
 class LiftFloors(Floors):
     """Floors reached by lift: straight through the door by the lidar, without mapping in the car."""
 
-    def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
-        self.robot, self.belief, self.navigation = robot, course.belief, navigation
-        self._course = course
+    def __init__(self, robot: Robot, context: NavigationContext, navigation: GridNavigation) -> None:
+        self.robot, self.belief, self.navigation = robot, context.belief, navigation
+        self._context = context
         self._others = FloorStorage(robot)
         self._current = 0
         self._changing = asyncio.Lock()  # one exchange of floors at a time
@@ -128,10 +128,10 @@ class LiftFloors(Floors):
         if float(np.hypot(*(line - (here.x, here.y)).T).min()) > reach:
             return
         await self.robot.clock.sleep(LOOKS)  # on a floor that it does not know, it has no map yet
-        planner, scan = await self._course.ready(), self.robot[Lidar].scan
+        planner, scan = await self._context.ready(), self.robot[Lidar].scan
         if scan is not None:  # it has not looked out for others since it got in
             planner.observe(self.belief.reader.read(scan), self.belief.pose, self.robot.clock.time())
-        place = await self._course.waiting_place(here.point, [(line, reach)])
+        place = await self._context.waiting_place(here.point, [(line, reach)])
         if place is not None:
             with contextlib.suppress(RobotError):  # it is for others: the ride does not depend on it
                 await self.navigation.drive(action, Goal((place,), NavigationOptions(tolerance=0.2)))

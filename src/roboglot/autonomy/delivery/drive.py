@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 
 from roboglot.autonomy.delivery.rules import place_named
-from roboglot.autonomy.navigation.course import SPEED_MAX
+from roboglot.autonomy.navigation.context import SPEED_MAX
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.delivery import Failure, Policy

@@ -12,7 +12,7 @@ import numpy as np
 from roboglot.autonomy.docking.dock_finder import SEARCH_REACH, Echoes, dock_fronts, find_dock
 from roboglot.autonomy.docking.known_dock import KnownDock
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
-from roboglot.autonomy.navigation.course import Goal
+from roboglot.autonomy.navigation.context import Goal
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.scan_points import ScanReader

@@ -6,7 +6,7 @@ import math
 
 from roboglot.autonomy.docking.mark_tracker import SENSES, MarkWatch
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
-from roboglot.autonomy.navigation.course import Goal
+from roboglot.autonomy.navigation.context import Goal
 from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.model.actions import Action

@@ -9,7 +9,7 @@ from dataclasses import field
 from msgspec.structs import astuple
 
 from roboglot.autonomy.navigation.base_actions import PERIOD, stand_still, start_on_base
-from roboglot.autonomy.navigation.latency_prediction import Foresight
+from roboglot.autonomy.navigation.latency_prediction import PosePredictor
 from roboglot.autonomy.navigation.speed_profile import APPROACH_GAIN, Ramp, cruise_speed, trapezoid_time
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.displacement import Carried
@@ -241,7 +241,7 @@ class OdometryDriving(Driving):
     async def _approach(self, action: Action, move: _Move) -> None:
         """Drive until close enough to brake. Raises Blocked without progress, Refused off the floor."""
         base, odometry, clock = self._robot[Base], self._robot[Odometry], self._robot.clock
-        foresight = Foresight(base, clock)
+        predictor = PosePredictor(base, clock)
         # A correction after overshooting must be able to move, however slow the plan was.
         move.straight.top, move.turn.top = max(move.straight.top, 0.05), max(move.turn.top, 0.1)
         if base.delay > 0.0:  # late commands must not be hurried
@@ -252,7 +252,7 @@ class OdometryDriving(Driving):
                 best_at = clock.time()
                 move.straight.speed = move.turn.speed = 0.0
             check_on_floor(self._robot)
-            pose = foresight.ahead(odometry.reading.pose)
+            pose = predictor.ahead(odometry.reading.pose)
             distance, angle = move.remaining(pose)
             if distance <= CLOSE and abs(angle) <= CLOSE_YAW:
                 return
@@ -265,7 +265,7 @@ class OdometryDriving(Driving):
                 )
             command = move.command(pose, distance, angle)
             base.set_velocity(command)
-            foresight.sent(command)
+            predictor.sent(command)
             await clock.sleep(PERIOD)
 
 

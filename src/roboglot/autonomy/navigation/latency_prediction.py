@@ -11,8 +11,8 @@ from roboglot.model.geometry import Pose, Twist
 COMMANDS_MAX = 256  # commands remembered
 
 
-class Foresight:
-    """Prediction for one move, from the commands that odometry does not show yet."""
+class PosePredictor:
+    """Predictor for one move, from the commands that odometry does not show yet."""
 
     def __init__(self, base: Base, clock: Clock) -> None:
         self._base, self._clock = base, clock

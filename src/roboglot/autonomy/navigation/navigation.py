@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.navigation.base_actions import start_on_base
-from roboglot.autonomy.navigation.course import Course, Goal
-from roboglot.autonomy.navigation.journey import Journey
+from roboglot.autonomy.navigation.context import Goal, NavigationContext
+from roboglot.autonomy.navigation.drive_progress import DriveProgress
 from roboglot.autonomy.navigation.pilot import Pilot
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import Localization
@@ -34,16 +34,16 @@ NEAR = 0.5  # m from a stop that count as reached, in a tour
 class GridNavigation(Navigation):
     """Navigation on the grid map; drives wait for estimator and planner."""
 
-    def __init__(self, robot: Robot, course: Course) -> None:
+    def __init__(self, robot: Robot, context: NavigationContext) -> None:
         self._robot = robot
-        self._course = course
+        self._context = context
 
     def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
         goal = _checked(goals, options)
-        self._course.check_available()
+        self._context.check_available()
 
         async def run(action: Action) -> None:
-            await self._drive(action, goal, action.report, Journey())
+            await self._drive(action, goal, action.report, DriveProgress())
 
         return abort_with_map(self._robot, start_on_base(self._robot, "navigate to", run, goal=goal, source=source))
 
@@ -52,12 +52,12 @@ class GridNavigation(Navigation):
         action: Action,
         goal: Goal,
         report: Callable[[NavigationFeedback], None] | None = None,
-        journey: Journey | None = None,
+        drive_progress: DriveProgress | None = None,
     ) -> None:
         """Drive to the goals, with retries, within an action that holds the base. Raises Blocked, Unreachable.
 
-        ``report`` gets the progress; None for actions that report their own. ``journey`` counts the goals passed, even
-        if the drive fails. The action is aborted if the map is replaced: on another map the goals are elsewhere.
+        ``report`` gets the progress; None for actions that report their own. ``drive_progress`` counts goals passed,
+        even if the drive fails. The action is aborted if the map is replaced: on another map the goals are elsewhere.
         """
 
         def check_map(event: MapReplaced) -> None:
@@ -66,17 +66,17 @@ class GridNavigation(Navigation):
 
         end_watch = self._robot.events.listen(MapReplaced, check_map)
         try:
-            await self._drive(action, goal, report or _unheard, journey or Journey())
+            await self._drive(action, goal, report or _unheard, drive_progress or DriveProgress())
         finally:
             end_watch()
 
     async def _drive(
-        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], journey: Journey
+        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], drive_progress: DriveProgress
     ) -> None:
         tries_left = goal.options.retries
         while True:
             try:
-                await self._attempt(action, goal, report, journey)
+                await self._attempt(action, goal, report, drive_progress)
                 return
             except (Blocked, Unreachable):
                 if tries_left == 0:
@@ -85,11 +85,11 @@ class GridNavigation(Navigation):
             await self._robot.clock.sleep(RETRY_AFTER)
 
     async def _attempt(
-        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], journey: Journey
+        self, action: Action, goal: Goal, report: Callable[[NavigationFeedback], None], drive_progress: DriveProgress
     ) -> None:
-        left = goal.points[journey.passed :]
+        left = goal.points[drive_progress.passed :]
         report(NavigationFeedback(stage="planning", remaining=Path(), milestones=left, time_to_goal=0.0))
-        pilot = Pilot(self._course, await self._course.ready(), action, goal, report, journey)
+        pilot = Pilot(self._context, await self._context.ready(), action, goal, report, drive_progress)
         try:
             await pilot.drive()
         finally:
@@ -97,18 +97,18 @@ class GridNavigation(Navigation):
 
     async def plan(self, start: Point, goal: Point) -> Path:
         _checked((start, goal), NavigationOptions())
-        route = await self._course.plan(start, (goal,), NavigationOptions())
+        route = await self._context.plan(start, (goal,), NavigationOptions())
         return Path.through([(x, y) for x, y in route.vertices.tolist()])
 
     async def visiting_order(self, places: Sequence[Point], *, round_trip: bool = False) -> Sequence[int]:
         if not places:
             return []
         _checked(places, NavigationOptions())
-        await self._course.ready()  # the kernels are loaded from here on
+        await self._context.ready()  # the kernels are loaded from here on
         from roboglot.kernels.touring import EXACT_MAX, visiting_order
 
         stops = (self._robot[Localization].pose.point, *places)
-        costs = await (self._lengths(stops) if len(places) <= EXACT_MAX else self._course.lengths(stops, NEAR))
+        costs = await (self._lengths(stops) if len(places) <= EXACT_MAX else self._context.lengths(stops, NEAR))
         if round_trip and not np.isfinite(costs).all():
             raise Unreachable("one of the places is unreachable")
         straight = np.array([[a.distance_to(b) for b in stops] for a in stops])
@@ -129,7 +129,7 @@ class GridNavigation(Navigation):
         if start.distance_to(goal) == 0.0:
             return 0.0
         try:
-            return (await self._course.plan(start, (goal,), NavigationOptions(tolerance=NEAR))).length
+            return (await self._context.plan(start, (goal,), NavigationOptions(tolerance=NEAR))).length
         except Unreachable:
             return math.inf
 

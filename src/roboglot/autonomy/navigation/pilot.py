@@ -1,7 +1,7 @@
 """One drive to goals: set out, follow the route, turn, and repeat until the goal is reached; or give up.
 
-Knows poses and the base; no world. Scans are evaluated in lookout.py, routes chosen in replanner.py, and giving up is
-decided in patience.py.
+Knows poses and the base, no world. path_monitor.py evaluates scans, replanner.py chooses routes, progress_checker.py
+decides when to give up.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from enum import Enum, auto
 from typing import TYPE_CHECKING
 
 from roboglot.autonomy.navigation.base_actions import stand_still
-from roboglot.autonomy.navigation.course import Course, Goal
+from roboglot.autonomy.navigation.context import Goal, NavigationContext
+from roboglot.autonomy.navigation.drive_progress import DriveProgress
 from roboglot.autonomy.navigation.follower import PERIOD, Follower
-from roboglot.autonomy.navigation.journey import Journey
-from roboglot.autonomy.navigation.lookout import Lookout
-from roboglot.autonomy.navigation.patience import Patience
+from roboglot.autonomy.navigation.path_monitor import PathMonitor
+from roboglot.autonomy.navigation.progress_checker import ProgressChecker
 from roboglot.autonomy.navigation.replanner import Replanner
 from roboglot.autonomy.traffic.giving_way import GivingWay
 from roboglot.model.actions import Action
@@ -50,31 +50,31 @@ class Pilot:
 
     def __init__(
         self,
-        course: Course,
+        context: NavigationContext,
         planner: Planner,
         action: Action,
         goal: Goal,
         report: Callable[[NavigationFeedback], None],
-        journey: Journey,
+        drive_progress: DriveProgress,
     ) -> None:
-        self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
-        self._traffic = course.traffic
-        self._tuning, self._base = course.tuning, course.robot[Base]
-        self._action, self._goal, self._journey = action, goal, journey
+        self._robot, self._clock, self._belief = context.robot, context.robot.clock, context.belief
+        self._traffic = context.traffic
+        self._tuning, self._base = context.tuning, context.robot[Base]
+        self._action, self._goal, self._drive_progress = action, goal, drive_progress
         self._publish, self._stage, self._reported_at = report, "", -math.inf
-        self._lookout = Lookout(course, planner, action)
-        self._replanner = Replanner(course, planner, goal, journey, self._lookout)
-        self._giving_way = GivingWay(course, self._lookout, action)
+        self._path_monitor = PathMonitor(context, planner, action)
+        self._replanner = Replanner(context, planner, goal, drive_progress, self._path_monitor)
+        self._giving_way = GivingWay(context, self._path_monitor, action)
         patience = self._tuning.patience_for(goal.options.tracks)
-        self._patience = Patience(self._clock, self._belief, self._tuning, patience)
-        self._top = course.top_speed(goal.options)
+        self._progress = ProgressChecker(self._clock, self._belief, self._tuning, patience)
+        self._top = context.top_speed(goal.options)
         holonomic = self._base.limits.holonomic
         self._there = self._tuning.there_for(goal.options.tolerance, holonomic=holonomic)
         self._tries_left = self._tuning.corrections_for(holonomic=holonomic)
 
     def close(self) -> None:
         """Stop listening and planning."""
-        self._lookout.close()
+        self._path_monitor.close()
         self._traffic.rest()
         self._replanner.close()
 
@@ -95,9 +95,9 @@ class Pilot:
 
     async def _set_out(self) -> Follower:
         """Wait for a scan and a route. Raises Blocked, Unreachable, NotLocalized."""
-        await self._lookout.first_scan()
+        await self._path_monitor.first_scan()
         follower = Follower(self._base.limits, self._top, await self._first_route())
-        self._lookout.follower = follower
+        self._path_monitor.follower = follower
         return follower
 
     async def _first_route(self, left: float = math.inf) -> Route:
@@ -108,13 +108,13 @@ class Pilot:
             route = await self._replanner.first()
             if route and not self._replanner.is_too_long(route, left, self._clock.time() - begun):
                 return route
-            self._patience.check_place()
-            if self._clock.time() - begun > self._patience.seconds:
-                raise Blocked(f"the way was blocked for {self._patience.seconds:g} s")
+            self._progress.check_place()
+            if self._clock.time() - begun > self._progress.seconds:
+                raise Blocked(f"the way was blocked for {self._progress.seconds:g} s")
             if not published:
                 published = True
                 self._robot.events.publish(PathBlocked(stamp=self._clock.time(), action=self._action))
-            self._journey.waits(self._robot, self._action)
+            self._drive_progress.waits(self._robot, self._action)
             self._report("waiting", Path(), 0.0)
             if self._giving_way.is_due_without_route():
                 left += await self._giving_way.go_aside(self._top)
@@ -144,13 +144,13 @@ class Pilot:
         if self._is_over(follower, pose):
             return State.TURNING
         if self._replanner.advance(follower):
-            self._patience.take(follower.left)
-        if not self._lookout.watches(follower) or self._belief.in_doubt:
+            self._progress.take(follower.left)
+        if not self._path_monitor.monitors(follower) or self._belief.in_doubt:
             follower.stop_at = follower.along
         self._base.set_velocity(follower.command(pose))
         waiting = follower.stop_at - follower.along < self._tuning.waiting_gap and follower.speed < WAITING_SPEED
         if waiting:
-            self._journey.waits(self._robot, self._action)
+            self._drive_progress.waits(self._robot, self._action)
         self._report_progress(follower, pose, "waiting" if waiting else "driving")
         return State.GIVING_WAY if self._giving_way.is_due(follower) else State.FOLLOWING
 
@@ -160,26 +160,26 @@ class Pilot:
         aside = await self._giving_way.give_way(follower)
         self._replanner.begin_again(follower)
         follower.take(await self._first_route(follower.left + aside))
-        self._lookout.follower = follower  # the robot may have given way again meanwhile, along another route
-        self._patience.take(follower.left)
-        self._patience.restart()
+        self._path_monitor.follower = follower  # the robot may have given way again meanwhile, along another route
+        self._progress.take(follower.left)
+        self._progress.restart()
         return State.FOLLOWING
 
     def _is_over(self, follower: Follower, pose: Pose) -> bool:
         """Return whether to brake at the end of the route. Raises Blocked or NotLocalized to give up."""
-        patience, tuning = self._patience, self._tuning
+        progress, tuning = self._progress, self._tuning
         follower.locate(pose)
-        self._journey.far += follower.speed * PERIOD
+        self._drive_progress.far += follower.speed * PERIOD
         self._count(follower, pose)
         if follower.last and pose.distance_to(follower.end) <= self._there:
             return True
-        stood = patience.stood
-        patience.check_place()
-        if patience.look(follower):
-            self._journey.since = math.inf
-        if patience.spent:
-            where = f"{follower.left:.1f} m before the goal{self._lookout.squeeze}"
-            raise Blocked(f"the way was blocked for {patience.seconds:g} s, {where}")
+        stood = progress.stood
+        progress.check_place()
+        if progress.look(follower):
+            self._drive_progress.since = math.inf
+        if progress.spent:
+            where = f"{follower.left:.1f} m before the goal{self._path_monitor.gap_message}"
+            raise Blocked(f"the way was blocked for {progress.seconds:g} s, {where}")
         if stood <= tuning.good_enough_seconds or not self._is_near(follower, pose):
             return False
         if follower.last:
@@ -223,7 +223,7 @@ class Pilot:
 
     async def _arrive(self, follower: Follower) -> State:
         """Check the final pose once it is certain: accept it, try again, or raise Blocked."""
-        await self._patience.be_certain(self._goal.options.tolerance)
+        await self._progress.be_certain(self._goal.options.tolerance)
         pose, goal, options = self._belief.pose, self._goal.points[-1], self._goal.options
         good, tolerance = self._tuning.good, options.tolerance
         faces = options.yaw is None or abs(wrap_angle(options.yaw - pose.yaw)) <= self._tuning.good_yaw
@@ -243,7 +243,7 @@ class Pilot:
         """Stand while paused."""
         if await self._action.hold(self._brake):
             follower.halt()
-            self._patience.restart()
+            self._progress.restart()
             self._replanner.distrust()
 
     # -- feedback --
@@ -258,8 +258,8 @@ class Pilot:
 
     def _count(self, follower: Follower, pose: Pose) -> None:
         """Report the passed goals one by one."""
-        while self._journey.passed < self._replanner.passed(follower):
-            self._journey.passed += 1
+        while self._drive_progress.passed < self._replanner.passed(follower):
+            self._drive_progress.passed += 1
             self._report(self._stage, *self._left(follower, pose))
 
     def _left(self, follower: Follower, pose: Pose) -> tuple[Path, float]:
@@ -273,7 +273,7 @@ class Pilot:
             NavigationFeedback(
                 stage=stage,
                 remaining=remaining,
-                milestones=self._goal.points[self._journey.passed :],
+                milestones=self._goal.points[self._drive_progress.passed :],
                 time_to_goal=seconds,
             )
         )

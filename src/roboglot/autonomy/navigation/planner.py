@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from roboglot.autonomy.docking.shelf_legs import Load
 from roboglot.autonomy.navigation.low_memory import LowMemory
 from roboglot.autonomy.navigation.low_sight import LowView
+from roboglot.autonomy.navigation.planning_options import KeepClear, PlanningOptions
 from roboglot.autonomy.navigation.route import Route
 from roboglot.autonomy.navigation.rules import GridFrame, Layers, layers
 from roboglot.autonomy.navigation.scan_memory import Cells, ScanMemory
-from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.slam.evidence import RESOLUTION, is_too_large
 from roboglot.autonomy.slam.scan_points import ScanPoints
@@ -71,7 +71,7 @@ class PlanningTask:
     tracks: Tracks
     straight: bool = False
     explains: bool = False  # computes the width of the narrowest place when there is no route
-    shunned: Shunned = ()
+    keep_clear: KeepClear = ()
 
     def solve(self) -> Route:
         """Return the route through all goals. Raises Unreachable."""
@@ -168,16 +168,16 @@ class PlanningTask:
         return cost
 
     def _shunning(self, cost: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return ``cost`` raised on the shunned ways, which makes routes longer there but not slower."""
-        raised = cost.copy() if self.shunned else cost
-        shun(raised, GridFrame(self.corner, self.evidence.shape), self.shunned)
+        """Return ``cost`` raised on the keep_clear ways, which makes routes longer there but not slower."""
+        raised = cost.copy() if self.keep_clear else cost
+        shun(raised, GridFrame(self.corner, self.evidence.shape), self.keep_clear)
         return raised
 
     def waiting_place(self) -> Point | None:
-        """Return the nearest place off the shunned ways; None: there is none nearby."""
+        """Return the nearest place off the keep_clear ways; None: there is none nearby."""
         frame = GridFrame(self.corner, self.evidence.shape)
         cost = self._shunning(self.cost(layers(self.drawn, frame, self.tracks, self.start, self.goals)))
-        return waiting_place(cost, self.evidence, frame, self.start, self.shunned)
+        return waiting_place(cost, self.evidence, frame, self.start, self.keep_clear)
 
     def _reopen(self, cost: NDArray[np.float32]) -> None:
         """Open the cells of the robot's own track, as far as the hull fits."""
@@ -337,28 +337,28 @@ class Planner:
         """Return the distance along ``path`` until a point is within ``margin`` m of the hull, m; inf: none is."""
         return float(free_way(path, points, pose.x, pose.y, self.radius + margin))
 
-    def task(self, start: Point, goals: Sequence[Point], terms: Terms) -> PlanningTask:
+    def task(self, start: Point, goals: Sequence[Point], options: PlanningOptions) -> PlanningTask:
         """Return a planning task on copies of the map and of the remembered obstacles. Raises Unreachable."""
         grid = self._belief.map
-        shown = grid.evidence if terms.obstacles and terms.things else without_doubtful(grid)
+        shown = grid.evidence if options.obstacles and options.things else without_doubtful(grid)
         evidence, seen, trodden, corner = self._window(shown, start, *goals)
         return PlanningTask(
             evidence,
-            seen if terms.obstacles else np.zeros_like(seen),
+            seen if options.obstacles else np.zeros_like(seen),
             trodden,
             corner,
             start,
             tuple(goals),
-            terms.now - OBSTACLE_SECONDS,
+            options.now - OBSTACLE_SECONDS,
             self.radius,
-            terms.top,
-            terms.acceleration,
-            terms.tolerance,
-            terms.drawn,
-            terms.tracks,
-            terms.straight,
-            not terms.obstacles,
-            terms.shunned,
+            options.top,
+            options.acceleration,
+            options.tolerance,
+            options.drawn,
+            options.tracks,
+            options.straight,
+            not options.obstacles,
+            options.keep_clear,
         )
 
     def _window(self, shown: NDArray[np.int16], *points: Point) -> Window:

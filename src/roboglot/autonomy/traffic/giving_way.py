@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.autonomy.navigation.base_actions import stand_still
-from roboglot.autonomy.navigation.course import Course
+from roboglot.autonomy.navigation.context import NavigationContext
 from roboglot.autonomy.navigation.follower import PERIOD, Follower
-from roboglot.autonomy.navigation.lookout import Lookout
+from roboglot.autonomy.navigation.path_monitor import PathMonitor
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.navigation import NavigationOptions
@@ -40,9 +40,9 @@ Points = NDArray[np.float64]
 class GivingWay:
     """Right of way of others during one drive: decides when to give way, and does so."""
 
-    def __init__(self, course: Course, lookout: Lookout, action: Action) -> None:
-        self._course, self._lookout, self._action = course, lookout, action
-        self._robot, self._clock, self._traffic = course.robot, course.robot.clock, course.traffic
+    def __init__(self, context: NavigationContext, path_monitor: PathMonitor, action: Action) -> None:
+        self._context, self._path_monitor, self._action = context, path_monitor, action
+        self._robot, self._clock, self._traffic = context.robot, context.robot.clock, context.traffic
         self._ruled_since = self._faced_since = math.inf
         self._faced = self._asides = 0
 
@@ -54,11 +54,11 @@ class GivingWay:
             self._ruled_since = self._faced_since = math.inf
             return False
         ruled = traffic.meeting is not None and traffic.meeting.stands_in_it
-        return self._is_due(ruled, self._lookout.blocked and traffic.is_faced(self._course.belief.pose))
+        return self._is_due(ruled, self._path_monitor.blocked and traffic.is_faced(self._context.belief.pose))
 
     def is_due_without_route(self) -> bool:
         """Return whether to give way without a route of its own: this robot may block the others' routes."""
-        pose, traffic = self._course.belief.pose, self._traffic
+        pose, traffic = self._context.belief.pose, self._traffic
         return self._is_due(traffic.is_in_the_way(pose), traffic.is_faced(pose))
 
     def _is_due(self, ruled: bool, faced: bool) -> bool:
@@ -73,12 +73,12 @@ class GivingWay:
             return False
         if now - self._faced_since > FACED_AFTER + FACED_MORE * chance(self._robot.id, self._faced):
             return True
-        return now - self._faced_since > BACKS_OUT_AFTER and self._traffic.should_back_out(self._course.belief.pose)
+        return now - self._faced_since > BACKS_OUT_AFTER and self._traffic.should_back_out(self._context.belief.pose)
 
     async def give_way(self, follower: Follower) -> float:
         """Move aside, and wait until the way is free, or for a while; return the metres driven."""
         carrot, beyond = follower.carrot()
-        path = follower.route.ahead(self._course.belief.pose, carrot, beyond, OLD_WAY)
+        path = follower.route.ahead(self._context.belief.pose, carrot, beyond, OLD_WAY)
         ruled = self._ruled_since < math.inf
         try:
             aside = await self.go_aside(follower.top)
@@ -90,19 +90,19 @@ class GivingWay:
                 most = FACED_AFTER + FACED_MORE
             await self._wait(path, least, most, ruled)
         finally:
-            self._lookout.follower = follower
+            self._path_monitor.follower = follower
         return aside
 
     async def go_aside(self, top: float) -> float:
         """Leave the others' ways at up to ``top`` m/s, if there is room, and stop; return the metres driven."""
-        pose, traffic = self._course.belief.pose, self._traffic
+        pose, traffic = self._context.belief.pose, self._traffic
         ruled = self._ruled_since < math.inf
         self._asides += 1
         self._faced += not ruled
         ways = traffic.ways_to_clear() if ruled else [*traffic.ways_to_clear(), *traffic.ways_of_faced(pose)]
         self._ruled_since = self._faced_since = math.inf
         traffic.giving_way = True
-        self._lookout.follower = None
+        self._path_monitor.follower = None
         traffic.rest()
         try:
             route, aside = await self._route_aside(ways), 0.0
@@ -113,23 +113,23 @@ class GivingWay:
             await stand_still(self._robot)
         finally:
             traffic.giving_way = False
-            self._lookout.follower = None
+            self._path_monitor.follower = None
         return aside
 
     async def _route_aside(self, ways: list[tuple[Points, float]]) -> Route | None:
-        here = self._course.belief.pose.point
-        place = await self._course.waiting_place(here, ways)
+        here = self._context.belief.pose.point
+        place = await self._context.waiting_place(here, ways)
         if place is None:
             return None
         try:
-            return await self._course.plan(here, (place,), NavigationOptions(tolerance=0.2))
+            return await self._context.plan(here, (place,), NavigationOptions(tolerance=0.2))
         except Unreachable:
             return None
 
     async def _go(self, follower: Follower, *, ruled: bool) -> None:
         """Drive along the route while there is progress; ``ruled``: at most until no robot that goes first is near."""
-        belief, base = self._course.belief, self._robot[Base]
-        self._lookout.follower = follower
+        belief, base = self._context.belief, self._robot[Base]
+        self._path_monitor.follower = follower
         begun = moved = due = self._clock.time()
         while (now := self._clock.time()) - begun < GO_SECONDS and now - moved < STUCK_SECONDS:
             if await self._action.hold(lambda: base.set_velocity(STILL)):
@@ -141,7 +141,7 @@ class GivingWay:
             due = due if ruled and self._traffic.is_beside(pose) else now
             if now - due > RULED_AFTER:
                 return
-            if not self._lookout.watches(follower) or belief.in_doubt:
+            if not self._path_monitor.monitors(follower) or belief.in_doubt:
                 follower.stop_at = follower.along
             base.set_velocity(follower.command(pose))
             if follower.speed > STANDS or abs(follower.yaw_rate) > STANDS:
@@ -155,7 +155,7 @@ class GivingWay:
         while True:
             await self._clock.sleep(LOOK)
             now = self._clock.time()
-            if not traffic.is_in_the_way(self._course.belief.pose):
+            if not traffic.is_in_the_way(self._context.belief.pose):
                 free_since = now
             if now - begun > most or now - free_since > RULED_AFTER:
                 return

@@ -113,7 +113,7 @@ class HeadTooLong(Exception):
 class HttpConnection(HttpToolsProtocol):
     """HTTP connection with limits on number, duration and size."""
 
-    _patience: asyncio.TimerHandle | None = None
+    _timeout: asyncio.TimerHandle | None = None
     _deadline: float | None = None  # by the loop's clock; None: no deadline
     _receiving = False  # between the first byte of a request and its last
     _in_head = False
@@ -143,8 +143,8 @@ class HttpConnection(HttpToolsProtocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._guard(None)
-        if self._patience is not None:
-            self._patience.cancel()
+        if self._timeout is not None:
+            self._timeout.cancel()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -302,18 +302,18 @@ class HttpConnection(HttpToolsProtocol):
         """Drop the connection in ``seconds`` unless called again; None: no deadline."""
         # One timer stays armed, however many requests arrive: two timers per request cost as much as its answer.
         self._deadline = None if seconds is None else self.loop.time() + seconds
-        if self._deadline is None or (self._patience is not None and self._patience.when() <= self._deadline):
+        if self._deadline is None or (self._timeout is not None and self._timeout.when() <= self._deadline):
             return
-        if self._patience is not None:
-            self._patience.cancel()
-        self._patience = self.loop.call_at(self._deadline, self._out_of_patience)
+        if self._timeout is not None:
+            self._timeout.cancel()
+        self._timeout = self.loop.call_at(self._deadline, self._on_timeout)
 
-    def _out_of_patience(self) -> None:
-        self._patience = None
+    def _on_timeout(self) -> None:
+        self._timeout = None
         if self._deadline is None:
             return
         if self._deadline > self.loop.time():
-            self._patience = self.loop.call_at(self._deadline, self._out_of_patience)
+            self._timeout = self.loop.call_at(self._deadline, self._on_timeout)
         else:
             self.transport.abort()
 

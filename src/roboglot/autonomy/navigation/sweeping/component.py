@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from roboglot.autonomy.navigation.base_actions import start_on_base
-from roboglot.autonomy.navigation.course import Course, Goal
-from roboglot.autonomy.navigation.journey import Journey
+from roboglot.autonomy.navigation.context import Goal, NavigationContext
+from roboglot.autonomy.navigation.drive_progress import DriveProgress
 from roboglot.autonomy.navigation.navigation import GridNavigation
 from roboglot.autonomy.navigation.sweeping.lanes import Stretch, SweptPart, open_stretches, parts, zigzag
 from roboglot.autonomy.navigation.sweeping.swept import Swept
@@ -34,8 +34,8 @@ PASSES = 30  # of improving the order of the parts
 class LaneSweeping(Sweeping):
     """Sweeping part by part in a short order, lanes to and fro; unreachable lanes are left out and reported."""
 
-    def __init__(self, robot: Robot, course: Course, navigation: GridNavigation) -> None:
-        self._robot, self._course, self._navigation = robot, course, navigation
+    def __init__(self, robot: Robot, context: NavigationContext, navigation: GridNavigation) -> None:
+        self._robot, self._context, self._navigation = robot, context, navigation
 
     def sweep(self, areas: Sequence[Area] = (), *, width: float | None = None, source: str = "") -> Action:
         wanted, apart = self._checked(areas, width)
@@ -49,7 +49,7 @@ class LaneSweeping(Sweeping):
         return await self._ways(*self._checked(areas, width))
 
     def _checked(self, areas: Sequence[Area], width: float | None) -> tuple[tuple[Area, ...], float]:
-        wanted = tuple(areas) or self._course.drawn.areas_of(AreaKind.COVERAGE)
+        wanted = tuple(areas) or self._context.drawn.areas_of(AreaKind.COVERAGE)
         if not 0 < len(wanted) <= AREAS_MAX:
             raise InvalidGoal("no area to sweep is drawn on the map" if not wanted else f"more than {AREAS_MAX} areas")
         numbers = [v for a in wanted for v in (a.start.x, a.start.y, a.end.x, a.end.y, a.half_width)]
@@ -65,7 +65,7 @@ class LaneSweeping(Sweeping):
         from roboglot.kernels.touring import visiting_order
 
         here = self._robot[Localization].pose.point
-        floor, frame = await self._course.open_floor(here)
+        floor, frame = await self._context.open_floor(here)
         found: list[SweptPart] = [part for area in areas for part in parts(area, floor, frame, width)]
         middles = [here, *(part[len(part) // 2].start for part in found)]
         costs = np.array([[a.distance_to(b) for b in middles] for a in middles])
@@ -78,10 +78,10 @@ class LaneSweeping(Sweeping):
         lanes = [Stretch(*way[k : k + 2]) for way in ways for k in range(0, len(way), 2)]
         if not lanes:
             raise Unreachable("there is no open floor to sweep")
-        with Swept(self._robot, self._course.belief, action, lanes) as swept:
+        with Swept(self._robot, self._context.belief, action, lanes) as swept:
             await self._drive(action, lanes)
             if left := swept.left():  # the obstacle may be gone, with open floor before and behind it
-                floor, frame = await self._course.open_floor(self._robot[Localization].pose.point)
+                floor, frame = await self._context.open_floor(self._robot[Localization].pose.point)
                 await self._drive(action, [open_ for lane in left for open_ in open_stretches(lane, floor, frame)])
             swept.report(final=True)
         if swept.done == 0.0:
@@ -92,10 +92,10 @@ class LaneSweeping(Sweeping):
         at = 0
         while at < len(lanes):
             points = [point for lane in lanes[at : at + LANES_AT_ONCE] for point in (lane.start, lane.end)]
-            journey = Journey()
+            drive_progress = DriveProgress()
             try:
                 goal = Goal(tuple(points), NavigationOptions(tolerance=TOLERANCE), straight=True)
-                await self._navigation.drive(action, goal, journey=journey)
+                await self._navigation.drive(action, goal, drive_progress=drive_progress)
                 at += LANES_AT_ONCE
             except (Unreachable, Blocked):
-                at += journey.passed // 2 + 1
+                at += drive_progress.passed // 2 + 1

@@ -14,7 +14,7 @@ BLOCKED_SECONDS = 180.0  # s of waiting before BaseBlocked is published
 
 
 @dataclass(slots=True)
-class Journey:
+class DriveProgress:
     """Progress of one drive: goals passed, and time spent before obstacles.
 
     ``obeyed``: annotations at the time of the last way over known floor, None before the first: an obstacle that closes

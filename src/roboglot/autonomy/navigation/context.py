@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from roboglot.autonomy.computing import computed
 from roboglot.autonomy.docking.shelf_legs import Load
 from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
+from roboglot.autonomy.navigation.planning_options import KeepClear, PlanningOptions
 from roboglot.autonomy.navigation.rules import GridFrame
-from roboglot.autonomy.navigation.terms import Shunned, Terms
 from roboglot.autonomy.slam.belief import Belief
 from roboglot.autonomy.traffic.traffic import Traffic
 from roboglot.model.components.mapping.annotations import Annotations, MapAnnotations
@@ -42,7 +42,7 @@ class Goal:
 
 
 @dataclass(slots=True)
-class Course:
+class NavigationContext:
     """``planner`` is None until the kernels are loaded; ``unavailable``: the error if that takes long or failed."""
 
     robot: Robot
@@ -98,7 +98,7 @@ class Course:
         task = planner.task(
             start,
             goals,
-            Terms(
+            PlanningOptions(
                 now=self.robot.clock.time(),
                 top=self.top_speed(options),
                 acceleration=limits.linear_acceleration,
@@ -108,15 +108,15 @@ class Course:
                 obstacles=obstacles,
                 things=things,
                 straight=straight,
-                shunned=self.traffic.ways_to_avoid() if obstacles else (),
+                keep_clear=self.traffic.ways_to_avoid() if obstacles else (),
             ),
         )
         return await computed(self.robot.clock, task.solve)
 
-    async def waiting_place(self, here: Point, ways: Shunned) -> Point | None:
+    async def waiting_place(self, here: Point, ways: KeepClear) -> Point | None:
         """Return the nearest place that keeps the distances to ``ways`` (map); None if there is none nearby."""
         planner = await self.ready()
-        task = planner.task(here, (here,), replace(self._slowly(0.0), shunned=ways))
+        task = planner.task(here, (here,), replace(self._slowly(0.0), keep_clear=ways))
         return await computed(self.robot.clock, task.waiting_place)
 
     async def lengths(self, stops: tuple[Point, ...], reach: float) -> NDArray[np.float64]:
@@ -131,7 +131,7 @@ class Course:
         task = planner.task(around, (around,), self._slowly(0.0))
         return await computed(self.robot.clock, task.floor)
 
-    def _slowly(self, tolerance: float) -> Terms:
-        """Return terms for questions that do not depend on speed."""
+    def _slowly(self, tolerance: float) -> PlanningOptions:
+        """Return options for plans that do not depend on speed."""
         now = self.robot.clock.time()
-        return Terms(now=now, top=1.0, acceleration=1.0, tolerance=tolerance, drawn=self.drawn)
+        return PlanningOptions(now=now, top=1.0, acceleration=1.0, tolerance=tolerance, drawn=self.drawn)

@@ -1,4 +1,4 @@
-"""The lookout of a robot that drives behind another one."""
+"""The path_monitor of a robot that drives behind another one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roboglot.autonomy.navigation.lookout import Lookout
+from roboglot.autonomy.navigation.path_monitor import PathMonitor
 from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
 from roboglot.model.clock import LockstepClock
 from roboglot.model.geometry import Point, Pose
@@ -36,7 +36,7 @@ async def test_robot_ahead_is_no_obstacle_while_driving_behind(speed: float, oth
     route = SimpleNamespace(ahead=lambda *_: path, centre=lambda *_: (1.0, False))
     follower: Any = SimpleNamespace(route=route, along=0.0, speed=speed, carrot=lambda: (Point(), 0.0))
     for _ in range(6):
-        Lookout._look_ahead(watch, follower, Pose(), path, path[:0])
+        PathMonitor._look_ahead(watch, follower, Pose(), path, path[:0])
         await clock.advance(1.0)
     assert clock.time() - 1.0 - watch.blocked_at == pytest.approx(held_up)
     assert len(published) == 1

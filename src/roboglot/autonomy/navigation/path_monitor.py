@@ -1,4 +1,4 @@
-"""Lookout along the path ahead by the newest scans: obstacles, close passages, width of gaps."""
+"""Monitors the path ahead by every scan: obstacles, narrow passages, the width of gaps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from roboglot.autonomy.navigation.course import Course
+from roboglot.autonomy.navigation.context import NavigationContext
 from roboglot.autonomy.navigation.follower import PERIOD, Follower
 from roboglot.autonomy.navigation.low_sight import LowSight
 from roboglot.autonomy.navigation.narrow_passage import NarrowPassage
@@ -26,14 +26,14 @@ FOLLOWS = 0.3  # m/s above which a robot among others is not held up, but drives
 ANNOUNCED_MAX = 12.0  # m of the planned way that are announced to others
 
 
-class Lookout:
-    """Lookout on every scan until ``close``; ``follower``: set while there is a route to check."""
+class PathMonitor:
+    """Monitor on every scan until ``close``; ``follower``: set while there is a route to check."""
 
-    def __init__(self, course: Course, planner: Planner, action: Action) -> None:
-        self._robot, self._clock, self._belief = course.robot, course.robot.clock, course.belief
-        self._tuning, self._planner, self._action = course.tuning, planner, action
-        self._traffic = course.traffic
-        self._narrow, self._low = NarrowPassage(planner.radius), LowSight(course.robot)
+    def __init__(self, context: NavigationContext, planner: Planner, action: Action) -> None:
+        self._robot, self._clock, self._belief = context.robot, context.robot.clock, context.belief
+        self._tuning, self._planner, self._action = context.tuning, planner, action
+        self._traffic = context.traffic
+        self._narrow, self._low = NarrowPassage(planner.radius), LowSight(context.robot)
         self._scan_at = -math.inf
         self.follower: Follower | None = None
         self.blocked, self.blocked_at = False, -math.inf
@@ -46,16 +46,16 @@ class Lookout:
         self._stop()
 
     @property
-    def sees(self) -> bool:
+    def has_recent_scan(self) -> bool:
         """True if the newest scan is recent enough to drive."""
         return self._clock.time() - self._scan_at <= self._tuning.scan_age_max
 
-    def watches(self, follower: Follower) -> bool:
-        """True if the lookout checks this route, and has a recent scan."""
-        return self.follower is follower and self.sees
+    def monitors(self, follower: Follower) -> bool:
+        """True if it checks this route, and has a recent scan."""
+        return self.follower is follower and self.has_recent_scan
 
     @property
-    def squeeze(self) -> str:
+    def gap_message(self) -> str:
         """Message about a gap too narrow for the hull; "" if there is none."""
         needed = 2.0 * (self._planner.radius + self._tuning.touch_margin)
         return f": a gap is {self.gap:.2f} m wide, {needed:.2f} m are needed" if self.gap < needed else ""
@@ -63,7 +63,7 @@ class Lookout:
     async def first_scan(self) -> None:
         """Wait for a recent scan. Raises Blocked if there is none in time, Refused at once if the base is held."""
         deadline = self._clock.time() + self._tuning.patience
-        while not self.sees:
+        while not self.has_recent_scan:
             if (refusal := self._robot[Base].refusal) is not None:
                 raise refusal.again()
             if self._clock.time() > deadline:

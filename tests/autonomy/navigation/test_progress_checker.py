@@ -1,4 +1,4 @@
-"""Patience of a drive: new plans alone are no progress, and ways are not tried for ever."""
+"""ProgressChecker of a drive: new plans alone are no progress, and ways are not tried for ever."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from roboglot.autonomy.navigation.journey import Journey
-from roboglot.autonomy.navigation.patience import Patience
+from roboglot.autonomy.navigation.drive_progress import DriveProgress
 from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
+from roboglot.autonomy.navigation.progress_checker import ProgressChecker
 from roboglot.autonomy.navigation.replanner import Replanner
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.motion.navigation import Tracks
@@ -20,58 +20,58 @@ from roboglot.model.errors import Blocked, NotLocalized
 from roboglot.model.geometry import Point, Pose
 
 
-def made(clock: LockstepClock, **belief: Any) -> Patience:
+def made(clock: LockstepClock, **belief: Any) -> ProgressChecker:
     believed: Any = SimpleNamespace(
         **{"localizing": True, "lost": None, "quality": 1.0, "sigma": 0.003, "compared_at": -math.inf, **belief}
     )
-    return Patience(clock, believed, PilotTuning(), 30.0)
+    return ProgressChecker(clock, believed, PilotTuning(), 30.0)
 
 
 async def test_another_way_alone_is_no_progress() -> None:
     clock = LockstepClock()
-    patience = made(clock)
+    checker = made(clock)
     follower: Any = SimpleNamespace(left=5.0, speed=0.0)
-    assert patience.look(follower)
+    assert checker.look(follower)
     for _ in range(31):
         await clock.advance(1.0)
-        patience.take(5.0)
-        assert not patience.look(follower)
-    assert patience.spent
+        checker.take(5.0)
+        assert not checker.look(follower)
+    assert checker.spent
 
 
 async def test_getting_closer_is_progress() -> None:
     clock = LockstepClock()
-    patience = made(clock)
+    checker = made(clock)
     follower: Any = SimpleNamespace(left=5.0, speed=0.0)
     for _ in range(40):
         await clock.advance(1.0)
         follower.left -= 0.11
-        assert patience.look(follower)
-    assert not patience.spent
+        assert checker.look(follower)
+    assert not checker.spent
 
 
 async def test_wheels_that_turn_in_vain_are_reported() -> None:
     clock = LockstepClock()
-    patience = made(clock)
+    checker = made(clock)
     follower: Any = SimpleNamespace(left=5.0, speed=0.3)
-    patience.look(follower)
+    checker.look(follower)
     await clock.advance(3.5)
     with pytest.raises(Blocked):
-        patience.look(follower)
+        checker.look(follower)
 
 
 async def test_lost_robot_gives_up() -> None:
     clock = LockstepClock()
-    patience = made(clock, quality=0.1)
-    patience.check_place()
+    checker = made(clock, quality=0.1)
+    checker.check_place()
     await clock.advance(5.5)
     with pytest.raises(NotLocalized):
-        patience.check_place()
+        checker.check_place()
 
 
 def replanning(tuning: PilotTuning, *, leaves: float | None = None, turning: float = 0.0) -> tuple[Replanner, Any]:
     """Return a replanner before an obstacle, and its follower. ``leaves``: s until a robot leaves the route."""
-    course: Any = SimpleNamespace(
+    context: Any = SimpleNamespace(
         robot=SimpleNamespace(clock=LockstepClock(), events=SimpleNamespace(listen=lambda *_: lambda: None)),
         tuning=tuning,
         belief=SimpleNamespace(pose=Pose()),
@@ -79,7 +79,7 @@ def replanning(tuning: PilotTuning, *, leaves: float | None = None, turning: flo
             is_blocked_by_others=lambda *_, **__: leaves is not None, seconds_until_clear=lambda _: leaves
         ),
     )
-    lookout: Any = SimpleNamespace(
+    path_monitor: Any = SimpleNamespace(
         blocked=True,
         blocked_at=0.0 if leaves is not None else -100.0,
         blocked_place=Point(),
@@ -96,7 +96,7 @@ def replanning(tuning: PilotTuning, *, leaves: float | None = None, turning: flo
     )
     goal: Any = SimpleNamespace(points=(Point(),))
     planner: Any = None
-    return Replanner(course, planner, goal, Journey(), lookout), follower
+    return Replanner(context, planner, goal, DriveProgress(), path_monitor), follower
 
 
 def planned(length: float) -> Any:
@@ -106,9 +106,9 @@ def planned(length: float) -> Any:
 async def test_going_around_is_bounded() -> None:
     replanner, follower = replanning(PilotTuning(arounds_max=3))
     for _ in range(3):
-        replanner._lookout.blocked = True
+        replanner._path_monitor.blocked = True
         assert replanner._take(follower, planned(6.0))
-    replanner._lookout.blocked = True
+    replanner._path_monitor.blocked = True
     with pytest.raises(Blocked, match="3 times"):
         replanner._take(follower, planned(6.0))
 
@@ -116,7 +116,7 @@ async def test_going_around_is_bounded() -> None:
 async def go_around(replanner: Replanner, follower: Any, seconds: float) -> None:
     """Take eight ways that are blocked one after the other."""
     for _ in range(8):
-        replanner._lookout.blocked = True
+        replanner._path_monitor.blocked = True
         assert replanner._take(follower, planned(6.0))
         await replanner._clock.sleep(seconds)
 
@@ -138,7 +138,7 @@ async def test_goal_blocked_on_all_sides_is_given_up() -> None:
 async def test_others_and_the_way_do_not_count(place: float, seconds: float, leaves: float | None) -> None:
     """Obstacles far from the goal, for a moment only, or robots."""
     replanner, follower = replanning(PilotTuning(), leaves=leaves)
-    replanner._lookout.blocked_place = Point(place)
+    replanner._path_monitor.blocked_place = Point(place)
     await advancing(replanner._clock, go_around(replanner, follower, seconds))
 
 
@@ -159,16 +159,16 @@ def test_strict_tracks_make_patient() -> None:
 
 async def test_nothing_succeeds_while_place_is_uncertain() -> None:
     clock = LockstepClock()
-    patience = made(clock, is_certain=False)
-    believed: Any = patience._belief
-    waiting = asyncio.ensure_future(patience.be_certain(0.05))
+    checker = made(clock, is_certain=False)
+    believed: Any = checker._belief
+    waiting = asyncio.ensure_future(checker.be_certain(0.05))
     await clock.advance(10.0)
     assert not waiting.done()
     believed.is_certain = True
     await clock.advance(0.2)
     assert waiting.done()
     believed.is_certain = False
-    waiting = asyncio.ensure_future(patience.be_certain(0.05))
+    waiting = asyncio.ensure_future(checker.be_certain(0.05))
     await clock.advance(PilotTuning().found_seconds + 1.0)
     with pytest.raises(NotLocalized, match="do not confirm the place"):
         await waiting

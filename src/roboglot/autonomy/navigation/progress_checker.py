@@ -1,4 +1,4 @@
-"""Patience of a drive: gives up without progress, with slipping wheels, or when lost."""
+"""Checks the progress of a drive, which ends without any, with slipping wheels, or when the robot is lost."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from roboglot.model.errors import Blocked, NotLocalized
 LOOK = 0.1  # s between two looks at whether the place is certain
 
 
-class Patience:
-    """Patience of one drive, updated at every step; ``seconds``: allowed time without getting closer."""
+class ProgressChecker:
+    """Checker of one drive, updated at every step; ``seconds``: allowed time without getting closer."""
 
     def __init__(self, clock: Clock, belief: Belief, tuning: PilotTuning, seconds: float) -> None:
         self._clock, self._belief, self._tuning = clock, belief, tuning
