@@ -39,7 +39,7 @@ refuses is in [Slamware REST](../protocols/slamware.md#why-was-i-refused).
 Pair = tuple[Exchange, Exchange]
 
 
-class Hands:
+class Stage:
     """Events around the robot in the example."""
 
     def __init__(self, server: RobotServer) -> None:
@@ -86,7 +86,7 @@ def played() -> dict[str, Pair]:
 
     with serving(world="office", body="hermes", lockstep=True) as server:
         server.call(server.robot.tap.listen, note)
-        example().play(server.address, WorldStage(server))
+        example().play(server.address, Stage(server))
     return pairs
 
 

@@ -26,7 +26,7 @@ DOCK, PLACE = "0d0c0000-1f6e-4c43-8a5e-9b3d2f1c0a77", "4b8a7f2c-1f6e-4c43-8a5e-9
 SECONDS_MAX = 240  # s of robot time for anything awaited
 
 
-class WorldStage(Protocol):
+class Stage(Protocol):
     """Events around the robot meanwhile."""
 
     def wait(self, seconds: float) -> None:
@@ -45,7 +45,7 @@ class WorldStage(Protocol):
 class Client:
     """A client that opens a connection for each request: the robot restarts in between."""
 
-    def __init__(self, address: str, hands: Hands) -> None:
+    def __init__(self, address: str, hands: Stage) -> None:
         self.wait = hands.wait
         self._address = address
 
@@ -99,7 +99,7 @@ class Client:
         self.until(f"{MOTION}/actions/{action}", lambda found: found["state"]["status"] == 4)
 
 
-def play(address: str, hands: Hands) -> None:
+def play(address: str, hands: Stage) -> None:
     """Use everything."""
     client = Client(address, hands)
     client.wait(2)
@@ -229,7 +229,7 @@ def motion(client: Client) -> None:
     client.done(back)
 
 
-def industry(client: Client, hands: Hands) -> None:
+def industry(client: Client, hands: Stage) -> None:
     """A round, and a call that a client carries out."""
     client.post(f"{ARTIFACT}/pois", {"id": PLACE, "pose": {"x": 22.5, "y": 10.5, "yaw": 0}, "metadata": ROOM})
     stops = [{"display_name": "101", "action": "load", "wait_time": 5}]
@@ -323,7 +323,7 @@ def devices(client: Client) -> None:
     client.get("/api/platform/v1/events")
 
 
-def health(client: Client, hands: Hands) -> None:
+def health(client: Client, hands: Stage) -> None:
     """A fault that comes, is seen and is dismissed."""
     hands.break_lidar()
     client.wait(5)

@@ -1,5 +1,5 @@
 """The console's robot in lockstep, for agents."""
 
-from tests.console.conftest import shown
+from tests.console.conftest import served
 
-__all__ = ["shown"]
+__all__ = ["served"]

@@ -19,7 +19,7 @@ from roboglot.cli.mcp import command
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.geometry import Pose
 from roboglot.testing.addresses import free_port
-from tests.console.conftest import Shown
+from tests.console.conftest import ServedConsole
 from tests.narrowing import of_kind
 
 if TYPE_CHECKING:
@@ -31,12 +31,12 @@ PNG, JPEG = "iVBORw0KGgo", "/9j/"
 
 
 @contextlib.asynccontextmanager
-async def passing(shown: Shown) -> AsyncIterator[None]:
+async def passing(served: ServedConsole) -> AsyncIterator[None]:
     """Robot time passes as fast as it goes while someone waits for the robot."""
 
     async def pass_time() -> None:
         while True:
-            await shown.clock.advance(0.05)
+            await served.clock.advance(0.05)
             await asyncio.sleep(0)
 
     task = asyncio.create_task(pass_time())
@@ -65,9 +65,9 @@ async def refusal(client: Client, tool: str, **values: Any) -> str:
     return " ".join(getattr(part, "text", "") for part in answer.content)
 
 
-def tools(shown: Shown) -> Client:
+def tools(served: ServedConsole) -> Client:
     """Return the protocol's own client of the tools over this console."""
-    return tools_of(shown.url)
+    return tools_of(served.url)
 
 
 def tools_of(console: str) -> Client:
@@ -78,22 +78,22 @@ def tools_of(console: str) -> Client:
     return Client(make_server(ConsoleClient(console)))
 
 
-async def test_over_standard_input(shown: Shown) -> None:
+async def test_over_standard_input(served: ServedConsole) -> None:
     from mcp import Client, StdioServerParameters
 
-    command = StdioServerParameters(command=sys.executable, args=["-m", "roboglot", "mcp", "--console", shown.url])
+    command = StdioServerParameters(command=sys.executable, args=["-m", "roboglot", "mcp", "--console", served.url])
     async with Client(command) as client:
         assert {tool.name for tool in (await client.list_tools()).tools} >= TOOLS
         assert [robot["name"] for robot in await call(client, "robots")] == ["a"]
 
 
-async def test_over_streamable_http(shown: Shown) -> None:
+async def test_over_streamable_http(served: ServedConsole) -> None:
     from mcp import Client
     from uvicorn import Config, Server
 
     from roboglot.agents.server import make_server
 
-    app = make_server(ConsoleClient(shown.url)).streamable_http_app()
+    app = make_server(ConsoleClient(served.url)).streamable_http_app()
     server = Server(Config(app, log_config=None))
     with socket.create_server(("127.0.0.1", 0)) as listening:
         serving = asyncio.create_task(server.serve([listening]))
@@ -105,11 +105,11 @@ async def test_over_streamable_http(shown: Shown) -> None:
 
 
 @pytest.mark.slow  # a separate process: the same server as above, the same process as test_over_standard_input
-async def test_the_command_serves_streamable_http(shown: Shown) -> None:
+async def test_the_command_serves_streamable_http(served: ServedConsole) -> None:
     from mcp import Client
 
     port = free_port()
-    arguments = ("-m", "roboglot", "mcp", "--console", shown.url, "--http", str(port))
+    arguments = ("-m", "roboglot", "mcp", "--console", served.url, "--http", str(port))
     process = await asyncio.create_subprocess_exec(sys.executable, *arguments, stderr=asyncio.subprocess.PIPE)
     try:
         assert process.stderr is not None
@@ -139,61 +139,61 @@ def test_a_port_that_cannot_be_is_refused(port: str) -> None:
     assert "is not in the range" in done.output
 
 
-async def test_go_to_drives_there_and_reports_the_end(shown: Shown) -> None:
-    async with tools(shown) as client:
-        async with passing(shown):
+async def test_go_to_drives_there_and_reports_the_end(served: ServedConsole) -> None:
+    async with tools(served) as client:
+        async with passing(served):
             result = await call(client, "go_to", x=1.0, y=0.5)
         assert result["status"] == "SUCCEEDED"
         assert result["pose"][:2] == pytest.approx([1.0, 0.5], abs=0.15)
-        assert shown.robot[Localization].pose.distance_to(Pose(1.0, 0.5, 0.0)) < 0.15
+        assert served.robot[Localization].pose.distance_to(Pose(1.0, 0.5, 0.0)) < 0.15
 
 
-async def test_drive_brakes_by_itself_and_is_bounded(shown: Shown) -> None:
-    async with tools(shown) as client:
-        async with passing(shown):
+async def test_drive_brakes_by_itself_and_is_bounded(served: ServedConsole) -> None:
+    async with tools(served) as client:
+        async with passing(served):
             result = await call(client, "drive", x=0.3, seconds=1.0)
         assert result["status"] == "SUCCEEDED"
         assert 0.1 < result["pose"][0] < 0.4
         assert "less than or equal to 2" in await refusal(client, "drive", x=0.3, seconds=3.0)
 
 
-async def test_stop_ends_what_moves(shown: Shown) -> None:
-    async with tools(shown) as client:
+async def test_stop_ends_what_moves(served: ServedConsole) -> None:
+    async with tools(served) as client:
         await call(client, "go_to", x=3.0, y=0.0, wait=0)
-        async with passing(shown):
+        async with passing(served):
             await client.call_tool("stop", {})
-        assert not shown.robot.actions.running("base")
+        assert not served.robot.actions.running("base")
 
 
-async def test_map_and_camera_are_pictures(shown: Shown) -> None:
+async def test_map_and_camera_are_pictures(served: ServedConsole) -> None:
     from mcp.types import ImageContent
 
-    async with tools(shown) as client, passing(shown):
+    async with tools(served) as client, passing(served):
         for tool, start in (("map_picture", PNG), ("look", JPEG)):
             (picture,) = (await client.call_tool(tool, {})).content
             assert isinstance(picture, ImageContent)
             assert picture.data.startswith(start)
 
 
-async def test_a_program_prints(shown: Shown) -> None:
-    async with tools(shown) as client:
-        async with passing(shown):
+async def test_a_program_prints(served: ServedConsole) -> None:
+    async with tools(served) as client:
+        async with passing(served):
             run = await call(client, "run_program", source="print('hello from', 6 * 7)\n")
         assert "hello from 42" in " ".join(line["text"] for line in run["log"])
         assert run["state"] not in ("run", "run_wait")
 
 
-async def test_a_fault_and_its_end(shown: Shown) -> None:
-    async with tools(shown) as client:
-        kind = next(kind.name for kind in shown.desk.stage.fault_kinds if kind.of_robot)
+async def test_a_fault_and_its_end(served: ServedConsole) -> None:
+    async with tools(served) as client:
+        kind = next(kind.name for kind in served.desk.stage.fault_kinds if kind.of_robot)
         assert await call(client, "inject_fault", kind=kind, robot="a")
-        assert shown.desk.stage.faults
+        assert served.desk.stage.faults
         await client.call_tool("clear_faults", {})
-        assert not shown.desk.stage.faults
+        assert not served.desk.stage.faults
 
 
-async def test_refusals_say_why(shown: Shown) -> None:
-    async with tools(shown) as client:
+async def test_refusals_say_why(served: ServedConsole) -> None:
+    async with tools(served) as client:
         assert "no robot 'b'" in await refusal(client, "where_am_i", robot="b")
         for plan in ({"plan": [], "plans": []}, {"plan": [{"do": "drive", "z": 1.0}]}):
             assert "Extra inputs are not permitted" in await refusal(client, "rehearse", **plan)
@@ -201,19 +201,19 @@ async def test_refusals_say_why(shown: Shown) -> None:
             assert "start it with `roboglot up`" in await refusal(lost, "robots")
 
 
-async def test_a_plan_is_tried_before_the_robot_moves(shown: Shown) -> None:
-    before = shown.robot[Localization].pose
+async def test_a_plan_is_tried_before_the_robot_moves(served: ServedConsole) -> None:
+    before = served.robot[Localization].pose
     free = [{"do": "go_to", "x": 1.0, "y": 0.5}, {"do": "drive", "yaw": 1.0, "seconds": 1.0}]
-    async with tools(shown) as client:
+    async with tools(served) as client:
         result = await call(client, "rehearse", plan=free)
         assert result["safe"], result
         assert [step["status"] for step in result["steps"]] == ["SUCCEEDED", "SUCCEEDED"]
         assert result["path"][-1] == pytest.approx([1.0, 0.5], abs=0.15)
-        (placed,) = shown.desk.stage.robots
-        shown.desk.stage.add_obstacle(placed.pose.compose(Pose(0.9, 0.0)))
+        (placed,) = served.desk.stage.robots
+        served.desk.stage.add_obstacle(placed.pose.compose(Pose(0.9, 0.0)))
         result = await call(client, "rehearse", plan=[{"do": "drive", "x": 1.0, "seconds": 2.0}])
         assert not result["safe"]
         assert {hit["what"] for hit in result["hits"]} == {"a box"}
         assert result["hits"][0]["point"][0] < 0.7
         assert "at most 20" in await refusal(client, "rehearse", plan=free * 11)
-    assert shown.robot[Localization].pose == before
+    assert served.robot[Localization].pose == before

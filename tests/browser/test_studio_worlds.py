@@ -17,7 +17,7 @@ from roboglot.shards.classes import FleetClasses
 from roboglot.testing.addresses import free_addresses
 from tests.browser.served import Served, shows, until
 from tests.browser.test_studio import FOREVER, READY, Open, loaded, phase, studio
-from tests.console.conftest import Shown
+from tests.console.conftest import ServedConsole
 from tests.console.test_classes import world
 
 __all__ = ["studio"]  # the fixture
@@ -26,7 +26,7 @@ Page = Any
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def worlds(tmp_path: Path) -> AsyncIterator[list[Shown]]:
+async def worlds(tmp_path: Path) -> AsyncIterator[list[ServedConsole]]:
     """Two worlds that share a classroom, as ``roboglot fleet up --worlds 2`` has them."""
     classes = FleetClasses(tmp_path)
     await classes.open()
@@ -67,7 +67,7 @@ async def joins(page: Page, code: str, name: str) -> None:
 
 
 @pytest.mark.slow  # long; a class: test_studio_class.py
-async def test_two_pupils_in_worlds_of_their_own(browser: Any, worlds: list[Shown]) -> None:
+async def test_two_pupils_in_worlds_of_their_own(browser: Any, worlds: list[ServedConsole]) -> None:
     first, second = worlds
     async with pages(browser, first.url, first.url, first.url) as (teacher, anna, ben):
         await teacher.click("#tab-group")

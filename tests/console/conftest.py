@@ -26,7 +26,7 @@ OTHER_ADDRESS = str(IPv4Address(ADDRESS) + 1)
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class ServedConsole:
     """A robot, its clock, and where its console is."""
 
     runtime: Runtime
@@ -67,7 +67,7 @@ def _fetch(request: Request) -> tuple[int, Any]:
 
 
 @pytest_asyncio.fixture
-async def shown(tmp_path: Path) -> AsyncIterator[Shown]:
+async def served(tmp_path: Path) -> AsyncIterator[ServedConsole]:
     """A runtime as ``roboglot up --world empty --lockstep`` starts it; the console takes any port."""
     base = load_config(None, {"data": str(tmp_path), "world": "empty", "lockstep": True})
     config = replace(base, robots=(RobotConfig("a", "universal", ADDRESS),), console=ConsoleConfig(port=0))
@@ -76,5 +76,5 @@ async def shown(tmp_path: Path) -> AsyncIterator[Shown]:
     assert runtime.console is not None
     await runtime.start()
     await runtime.console.ready()
-    yield Shown(runtime, runtime.fleet.robots["a"], runtime.clock, runtime.console.address)
+    yield ServedConsole(runtime, runtime.fleet.robots["a"], runtime.clock, runtime.console.address)
     await runtime.close()

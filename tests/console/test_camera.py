@@ -18,20 +18,20 @@ from roboglot.console.camera import Calls
 from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.sound import SAMPLE_RATE, Sound
 from roboglot.wire.ice import offer_loopback
-from tests.console.conftest import Shown
+from tests.console.conftest import ServedConsole
 from tests.narrowing import of_kind
 
 PITCH = 1000  # Hz
 
 
-async def call(shown: Shown, *kinds: str) -> RTCPeerConnection:
+async def call(served: ServedConsole, *kinds: str) -> RTCPeerConnection:
     """Return a page's end of a call for media of ``kinds``."""
     offer_loopback()
     peer = RTCPeerConnection(RTCConfiguration(iceServers=[]))
     for kind in kinds:
         peer.addTransceiver(kind, direction="recvonly")
     await peer.setLocalDescription(await peer.createOffer())
-    status, words = await shown.ask("/api/robots/a/camera/call", {"offer": peer.localDescription.sdp})
+    status, words = await served.ask("/api/robots/a/camera/call", {"offer": peer.localDescription.sdp})
     assert status == 200, words
     await peer.setRemoteDescription(RTCSessionDescription(words["answer"], "answer"))
     return peer
@@ -43,15 +43,15 @@ def pitch_of(samples: Any) -> float:
     return 0.0 if samples.max() < 100 else float(np.fft.rfftfreq(len(samples), 1 / SAMPLE_RATE)[spectrum.argmax()])
 
 
-async def test_a_page_hears_what_the_robot_hears(shown: Shown) -> None:
-    peer = await call(shown, "video", "audio")
+async def test_a_page_hears_what_the_robot_hears(served: ServedConsole) -> None:
+    peer = await call(served, "video", "audio")
     (receiver,) = (each for each in peer.getReceivers() if each.track.kind == "audio")
     wave = 8000 * np.sin(2 * np.pi * PITCH / SAMPLE_RATE * np.arange(60 * SAMPLE_RATE))
-    shown.robot[Speaker].play(Sound("tone", wave.astype(np.int16)))
+    served.robot[Speaker].play(Sound("tone", wave.astype(np.int16)))
 
     async def pass_time() -> None:
         while True:
-            await shown.clock.advance(0.02)
+            await served.clock.advance(0.02)
             await asyncio.sleep(0.005)
 
     passing, heard = asyncio.ensure_future(pass_time()), 0.0
@@ -65,13 +65,13 @@ async def test_a_page_hears_what_the_robot_hears(shown: Shown) -> None:
         await peer.close()
 
 
-async def test_sound_comes_as_an_endless_wav_file(shown: Shown) -> None:
+async def test_sound_comes_as_an_endless_wav_file(served: ServedConsole) -> None:
     wave = 8000 * np.sin(2 * np.pi * PITCH / SAMPLE_RATE * np.arange(60 * SAMPLE_RATE))
-    shown.robot[Speaker].play(Sound("tone", wave.astype(np.int16)))
-    playing = await asyncio.to_thread(urlopen, f"{shown.url}/api/robots/a/sound.wav")
+    served.robot[Speaker].play(Sound("tone", wave.astype(np.int16)))
+    playing = await asyncio.to_thread(urlopen, f"{served.url}/api/robots/a/sound.wav")
     file = bytearray()
     while len(file) < 44 + SAMPLE_RATE:
-        await shown.clock.advance(0.02)
+        await served.clock.advance(0.02)
         file += await asyncio.to_thread(playing.read1)
     playing.close()
     with wave_module.open(io.BytesIO(file)) as sound:
@@ -80,8 +80,8 @@ async def test_sound_comes_as_an_endless_wav_file(shown: Shown) -> None:
     assert pitch_of(samples) == pytest.approx(PITCH, rel=0.05)
 
 
-async def test_page_asking_for_pictures_only_gets_no_sound(shown: Shown) -> None:
-    peer = await call(shown, "video")
+async def test_page_asking_for_pictures_only_gets_no_sound(served: ServedConsole) -> None:
+    peer = await call(served, "video")
     assert "m=audio" not in peer.remoteDescription.sdp
     await peer.close()
 

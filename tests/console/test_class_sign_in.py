@@ -20,7 +20,7 @@ from roboglot.config import AccessConfig
 from roboglot.operations import Right
 from roboglot.shards.classes import FleetClasses
 from roboglot.shards.plan import checked, plan_fleet
-from tests.console.conftest import ADDRESS, OTHER_ADDRESS, Shown
+from tests.console.conftest import ADDRESS, OTHER_ADDRESS, ServedConsole
 from tests.console.test_classes import asked, grid, opened, world
 from tests.console.test_studio_socket import SAVE, Page
 
@@ -37,14 +37,14 @@ def post(url: str, shows: dict[str, str]) -> tuple[int, dict[str, Any], str]:
             return error.code, json.loads(error.read()), ""
 
 
-async def signed(shown: Shown, **shows: str) -> tuple[int, dict[str, Any], str]:
-    return await asyncio.to_thread(post, shown.url, shows)
+async def signed(served: ServedConsole, **shows: str) -> tuple[int, dict[str, Any], str]:
+    return await asyncio.to_thread(post, served.url, shows)
 
 
 @asynccontextmanager
-async def paged(shown: Shown, cookie: str) -> AsyncIterator[Page]:
+async def paged(served: ServedConsole, cookie: str) -> AsyncIterator[Page]:
     """Yield the studio's page of the client with this cookie."""
-    url = shown.url.replace("http", "ws") + "/studio"
+    url = served.url.replace("http", "ws") + "/studio"
     async with connect(url, max_size=None, additional_headers={"Cookie": cookie}) as socket:
         made = Page(socket)
         await made.say(type="open", robot="a")
@@ -93,13 +93,13 @@ async def test_a_code_lets_pupils_into_their_worlds(tmp_path: Path) -> None:
 async def test_old_class_admits_no_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The class is closed until its teacher is back."""
     asking = AccessConfig(on=True, local=True)
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as shown, paged(shown, "") as teacher:
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=asking) as served, paged(served, "") as teacher:
         code = await opened(teacher)
-        assert (await signed(shown, name="Anna", code=code))[0] == 200
+        assert (await signed(served, name="Anna", code=code))[0] == 200
         monkeypatch.setattr("roboglot.console.studio.classroom.OPEN_SECONDS", 0.0)
         await asked(teacher, do="open", code=code)
         await grid(teacher, name="Anna")
-        status, answer, _ = await signed(shown, name="Ben", code=code)
+        status, answer, _ = await signed(served, name="Ben", code=code)
         assert (status, answer["error"]) == (401, "this class is over, unless its teacher comes back")
 
 
@@ -109,8 +109,8 @@ async def test_rights_that_are_gained_reach_open_pages(tmp_path: Path) -> None:
     store.allow("127.0.0.1", [Grant("*", frozenset({Right.SEE}))])
     access = AccessConfig(on=True, local=False)
     async with (
-        world(tmp_path, "w", ADDRESS, shared=False, access=access) as shown,
-        connect(shown.url.replace("http", "ws") + "/live", max_size=None) as page,
+        world(tmp_path, "w", ADDRESS, shared=False, access=access) as served,
+        connect(served.url.replace("http", "ws") + "/live", max_size=None) as page,
         asyncio.timeout(60),
     ):
 
@@ -122,8 +122,8 @@ async def test_rights_that_are_gained_reach_open_pages(tmp_path: Path) -> None:
 
         assert await rights() == ["see"]
         store.allow("127.0.0.1", [Grant("*", frozenset({Right.DRIVE}))])
-        assert shown.runtime.guard is not None
-        shown.runtime.guard.reload()  # it looks by itself once a second
+        assert served.runtime.guard is not None
+        served.runtime.guard.reload()  # it looks by itself once a second
         assert await rights() == ["see", "drive"]
     store.close()
 
@@ -153,20 +153,20 @@ async def test_signing_out_ends_open_pages_and_sound(tmp_path: Path) -> None:
     store = open_store(tmp_path / "w")
     store.add_person("mx", PASSWORD, [Grant("*", frozenset({Right.ADMIN}))])
     access = AccessConfig(on=True, local=False)
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=access) as shown, asyncio.timeout(60):
-        (_, _, left), (_, _, kept) = [await signed(shown, name="mx", password=PASSWORD) for _ in range(2)]
-        live = shown.url.replace("http", "ws") + "/live"
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=access) as served, asyncio.timeout(60):
+        (_, _, left), (_, _, kept) = [await signed(served, name="mx", password=PASSWORD) for _ in range(2)]
+        live = served.url.replace("http", "ws") + "/live"
         other = connect(live, max_size=None, additional_headers={"Cookie": kept})
         async with connect(live, max_size=None, additional_headers={"Cookie": left}) as page, other as stays:
-            listen = Request(f"{shown.url}/api/robots/a/sound.wav", headers={"Cookie": left})
+            listen = Request(f"{served.url}/api/robots/a/sound.wav", headers={"Cookie": left})
             with await asyncio.to_thread(urlopen, listen) as sound:
-                leave = Request(f"{shown.url}/api/sign_out", data=b"", headers={"Cookie": left})
+                leave = Request(f"{served.url}/api/sign_out", data=b"", headers={"Cookie": left})
                 (await asyncio.to_thread(urlopen, leave)).close()
                 with suppress(ConnectionClosed):
                     while await page.recv():
                         pass
                 assert page.close_code == 1008
-                await shown.clock.advance(1.0)
+                await served.clock.advance(1.0)
                 await asyncio.to_thread(sound.read)
             await stays.send(json.dumps({"type": "ping", "at": 1.0}))
             while "pong" not in str(await stays.recv()):

@@ -21,7 +21,7 @@ from roboglot.model.components.motion.driving import Driving
 from roboglot.model.geometry import Pose
 from roboglot.runtime import Runtime
 from roboglot.shards.classes import FleetClasses
-from tests.console.conftest import ADDRESS, OTHER_ADDRESS, Shown
+from tests.console.conftest import ADDRESS, OTHER_ADDRESS, ServedConsole
 from tests.console.test_studio_socket import SAVE, Page, page
 
 OPEN = AccessConfig()
@@ -31,7 +31,7 @@ DOING = {"phase": "running", "lit": "walk", "program": "mine", "stars": 3}
 @asynccontextmanager
 async def world(
     folder: Path, name: str, address: str, *, shared: bool = True, access: AccessConfig = OPEN
-) -> AsyncIterator[Shown]:
+) -> AsyncIterator[ServedConsole]:
     """Yield a world whose console shares the classroom of the fleet in ``folder``."""
     base = load_config(None, {"data": str(folder / name), "world": "empty", "lockstep": True})
     robots = (RobotConfig("a", "universal", address),)
@@ -41,12 +41,12 @@ async def world(
     assert runtime.console is not None
     await runtime.start()
     await runtime.console.ready()
-    yield Shown(runtime, runtime.fleet.robots["a"], runtime.clock, runtime.console.address)
+    yield ServedConsole(runtime, runtime.fleet.robots["a"], runtime.clock, runtime.console.address)
     await runtime.close()
 
 
 @pytest_asyncio.fixture
-async def fleet(tmp_path: Path) -> AsyncIterator[list[Shown]]:
+async def fleet(tmp_path: Path) -> AsyncIterator[list[ServedConsole]]:
     """Two worlds with one classroom, as ``roboglot fleet up --worlds 2`` has them."""
     classes = FleetClasses(tmp_path)
     await classes.open()
@@ -73,12 +73,12 @@ async def grid(teacher: Page, **wanted: object) -> dict[str, Any]:
 
 
 @asynccontextmanager
-async def passing(shown: Shown) -> AsyncIterator[None]:
+async def passing(served: ServedConsole) -> AsyncIterator[None]:
     """Let robot time pass."""
 
     async def advance() -> None:
         while True:
-            await shown.clock.advance(0.1)
+            await served.clock.advance(0.1)
             await asyncio.sleep(0)
 
     task = asyncio.create_task(advance())
@@ -88,7 +88,7 @@ async def passing(shown: Shown) -> AsyncIterator[None]:
         await task
 
 
-async def test_each_pupil_has_a_world(fleet: list[Shown]) -> None:
+async def test_each_pupil_has_a_world(fleet: list[ServedConsole]) -> None:
     first, second = fleet
     async with page(first) as teacher, page(first) as anna, page(first) as ben, page(second) as moved:
         code = await opened(teacher)
@@ -111,7 +111,7 @@ async def test_each_pupil_has_a_world(fleet: list[Shown]) -> None:
         assert "only the teacher" in (await ben.kind("refused"))["why"]
 
 
-async def test_all_are_stopped_without_their_pages_too(fleet: list[Shown]) -> None:
+async def test_all_are_stopped_without_their_pages_too(fleet: list[ServedConsole]) -> None:
     first, second = fleet
     async with page(first) as teacher, page(first) as anna:
         code = await opened(teacher)
@@ -124,7 +124,7 @@ async def test_all_are_stopped_without_their_pages_too(fleet: list[Shown]) -> No
             await ben.frame(type="task", operate="run", target_id=["t"], id="2", mode="single", condition="now")
             await ben.until(lambda m: m["type"] == "frame" and "start task" in m["text"])
         await grid(teacher, name="Ben", here=False)
-        driving = [shown.robot[Driving].move_by(Pose(3.0, 0.0, 0.0)) for shown in fleet]
+        driving = [served.robot[Driving].move_by(Pose(3.0, 0.0, 0.0)) for served in fleet]
         async with passing(first), passing(second):
             await asked(teacher, do="stop_all", id=5)
             async with asyncio.timeout(60):
@@ -158,13 +158,13 @@ async def test_a_world_that_ends_leaves_the_class(tmp_path: Path) -> None:
 
 
 async def test_handed_in_work_survives_a_restart(tmp_path: Path) -> None:
-    async with world(tmp_path, "w", ADDRESS, shared=False) as shown, page(shown) as teacher, page(shown) as anna:
+    async with world(tmp_path, "w", ADDRESS, shared=False) as served, page(served) as teacher, page(served) as anna:
         code = await opened(teacher)
         await asked(anna, do="join", code=code, name="Anna")
         await asked(anna, do="hand_in", doing=DOING, style='{"body": "x = 1"}')
         await anna.kind("handed")
     (tmp_path / "w" / "classes" / "ZZZZZZ").mkdir()  # from another page
-    async with world(tmp_path, "w", ADDRESS, shared=False) as shown, page(shown) as teacher, page(shown) as anna:
+    async with world(tmp_path, "w", ADDRESS, shared=False) as served, page(served) as teacher, page(served) as anna:
         await asked(teacher, do="open", code="ZZZZZZ")
         assert "there is no class" in (await teacher.kind("refused"))["why"]
         await asked(teacher, do="open", code=code)

@@ -15,10 +15,10 @@ from roboglot.console.live import Page
 from roboglot.console.server import those_due
 from roboglot.console.settings import BEAT_PAGES, OTHERS_BEATS
 from roboglot.model.components.system.lease import Lease
-from tests.console.conftest import Shown
+from tests.console.conftest import ServedConsole
 
 
-async def test_page_without_map_gets_poses_each_second(shown: Shown) -> None:
+async def test_page_without_map_gets_poses_each_second(served: ServedConsole) -> None:
     """A studio with its Python beside the blocks draws no robot: 25 of them would take a core for nothing."""
     counts = {"drawing": 0, "reading": 0}
     frames = {"drawing": 0, "reading": 0}
@@ -32,7 +32,7 @@ async def test_page_without_map_gets_poses_each_second(shown: Shown) -> None:
             if counts["drawing"] >= 2 * OTHERS_BEATS:
                 return
 
-    live = shown.url.replace("http", "ws") + "/live"
+    live = served.url.replace("http", "ws") + "/live"
     async with connect(live) as drawing, connect(live) as reading, asyncio.timeout(60):
         await drawing.send(json.dumps({"type": "watch", "robot": "a"}))
         await reading.send(json.dumps({"type": "watch", "robot": "a", "moving": False}))
@@ -45,9 +45,9 @@ async def test_page_without_map_gets_poses_each_second(shown: Shown) -> None:
             pass
 
 
-async def test_two_pages_contend_for_control(shown: Shown) -> None:
+async def test_two_pages_contend_for_control(served: ServedConsole) -> None:
     """The one who took control moves the robot, the others are refused by name; a page may take it from the other."""
-    live = shown.url.replace("http", "ws") + "/live"
+    live = served.url.replace("http", "ws") + "/live"
 
     async def done(page: ClientConnection, verb: str, **values: object) -> str:
         """Return why a page's wish is refused; empty: it is done."""
@@ -61,14 +61,14 @@ async def test_two_pages_contend_for_control(shown: Shown) -> None:
         for page, name in ((anna, "anna"), (ben, "ben")):
             await page.send(json.dumps({"type": "hello", "name": name}))
         assert await done(anna, "take_control") == ""
-        assert shown.robot[Lease].taken_by == "console anna"
+        assert served.robot[Lease].taken_by == "console anna"
         assert "taken by console anna" in await done(ben, "go_to", points=[[1, 0]])
-        assert shown.robot.actions.running() == []
+        assert served.robot.actions.running() == []
         assert await done(ben, "take_control") == ""
         assert "taken by console ben" in await done(anna, "go_to", points=[[1, 0]])
         assert await done(ben, "release_control") == ""
         assert await done(anna, "go_to", points=[[1, 0]]) == ""
-        assert len(shown.robot.actions.running()) == 1
+        assert len(served.robot.actions.running()) == 1
 
 
 @given(drawing=st.integers(0, 32), reading=st.integers(0, 32), number=st.integers(0, 10_000))

@@ -15,14 +15,14 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from roboglot.console.otlp import Pusher
 from roboglot.model.components.energy.battery import Battery
-from tests.console.conftest import ADDRESS, Shown
+from tests.console.conftest import ADDRESS, ServedConsole
 from tests.narrowing import known
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-async def scraped(shown: Shown) -> dict[tuple[str, ...], float]:
-    status, text = await shown.ask("/metrics")
+async def scraped(served: ServedConsole) -> dict[tuple[str, ...], float]:
+    status, text = await served.ask("/metrics")
     assert status == 200
     return {
         (sample.name, *sorted(sample.labels.values())): sample.value
@@ -41,19 +41,19 @@ async def say(*commands: str) -> list[str]:
     return answers
 
 
-async def test_nothing_is_counted_before_the_first_scrape(shown: Shown) -> None:
-    assert not shown.robot.tap.watched
-    await scraped(shown)
-    assert shown.robot.tap.watched
-    assert shown.runtime.console is not None
-    await shown.runtime.console.close()
-    assert not shown.robot.tap.watched
+async def test_nothing_is_counted_before_the_first_scrape(served: ServedConsole) -> None:
+    assert not served.robot.tap.watched
+    await scraped(served)
+    assert served.robot.tap.watched
+    assert served.runtime.console is not None
+    await served.runtime.console.close()
+    assert not served.robot.tap.watched
 
 
-async def test_requests_answers_and_refusals_are_counted_by_operation(shown: Shown) -> None:
-    await scraped(shown)
+async def test_requests_answers_and_refusals_are_counted_by_operation(served: ServedConsole) -> None:
+    await scraped(served)
     await say("command;", "robot battery ?;", "robot battery ?;", "chassis speed x 99;")
-    seen = await scraped(shown)
+    seen = await scraped(served)
     key = ("a", "robomaster", "robot battery ?")
     assert seen["roboglot_requests_total", *key] == 2
     assert seen["roboglot_reply_seconds_count", "a", "robomaster"] >= 4
@@ -61,32 +61,32 @@ async def test_requests_answers_and_refusals_are_counted_by_operation(shown: Sho
     assert list(refused.values()) == [1.0]
 
 
-async def test_unknown_commands_become_no_labels(shown: Shown) -> None:
-    await scraped(shown)
+async def test_unknown_commands_become_no_labels(served: ServedConsole) -> None:
+    await scraped(served)
     await say("command;", *(f"nonsense{number} now;" for number in range(20)))
-    text = " ".join(map(str, await scraped(shown)))
+    text = " ".join(map(str, await scraped(served)))
     assert "nonsense" not in text
 
 
-async def test_the_state_of_robots_and_time(shown: Shown) -> None:
-    first = await scraped(shown)
-    assert first["roboglot_battery_ratio", "a"] == shown.robot[Battery].state.percentage
+async def test_the_state_of_robots_and_time(served: ServedConsole) -> None:
+    first = await scraped(served)
+    assert first["roboglot_battery_ratio", "a"] == served.robot[Battery].state.percentage
     assert first["roboglot_actions_running", "a"] == 0
     assert first["roboglot_programs_running",] == 0
-    still = await scraped(shown)
+    still = await scraped(served)
     assert still["roboglot_real_time_factor",] == 0  # in lockstep no robot time passed
-    await shown.clock.advance(1.0)
-    assert (await scraped(shown))["roboglot_real_time_factor",] > 0
+    await served.clock.advance(1.0)
+    assert (await scraped(served))["roboglot_real_time_factor",] > 0
 
 
-async def test_metrics_are_only_read(shown: Shown) -> None:
-    assert (await shown.ask("/metrics", {}))[0] == 405
+async def test_metrics_are_only_read(served: ServedConsole) -> None:
+    assert (await served.ask("/metrics", {}))[0] == 405
 
 
-async def test_board_and_the_page_name_what_there_is(shown: Shown) -> None:
-    await scraped(shown)
+async def test_board_and_the_page_name_what_there_is(served: ServedConsole) -> None:
+    await scraped(served)
     await say("command;", "robot battery ?;")
-    names = {name for name, *_ in await scraped(shown)}
+    names = {name for name, *_ in await scraped(served)}
     reported = {name.removesuffix("_total") for name in names} | {name.removesuffix("_bucket") for name in names}
     reported |= {
         f"roboglot_{which}" for which in ("refusals", "pushes", "actions_ended", "link_up", "link_age_seconds")
@@ -98,12 +98,12 @@ async def test_board_and_the_page_name_what_there_is(shown: Shown) -> None:
             assert name.removesuffix("_total").removesuffix("_bucket") in reported, name
 
 
-async def test_a_collector_gets_the_same_values(shown: Shown) -> None:
-    await scraped(shown)
+async def test_a_collector_gets_the_same_values(served: ServedConsole) -> None:
+    await scraped(served)
     await say("command;", "robot battery ?;", "chassis speed x 99;")
-    assert shown.runtime.console is not None
-    metrics = await known(known(shown.runtime.console)._application).metrics()
-    seen = await scraped(shown)
+    assert served.runtime.console is not None
+    metrics = await known(known(served.runtime.console)._application).metrics()
+    seen = await scraped(served)
     taken: list[tuple[str, str, bytes]] = []
     with collector(taken) as address:
         pushing = asyncio.create_task(Pusher(metrics, address, 0.01).run())
@@ -124,13 +124,13 @@ async def test_a_collector_gets_the_same_values(shown: Shown) -> None:
     (latency,) = pushed["roboglot_reply_seconds"].histogram.data_points
     assert latency.count == sum(latency.bucket_counts) == seen["roboglot_reply_seconds_count", "a", "robomaster"]
     assert len(latency.bucket_counts) == len(latency.explicit_bounds) + 1
-    battery = shown.robot[Battery].state.percentage
+    battery = served.robot[Battery].state.percentage
     assert pushed["roboglot_battery_ratio"].gauge.data_points[0].as_double == pytest.approx(battery, abs=0.01)
-    known(known(known(shown.runtime.console)._application)._metrics).close()
+    known(known(known(served.runtime.console)._application)._metrics).close()
 
 
-async def test_a_collector_that_is_not_there_is_logged(shown: Shown, caplog: pytest.LogCaptureFixture) -> None:
-    metrics = await known(known(shown.runtime.console)._application).metrics()
+async def test_a_collector_that_is_not_there_is_logged(served: ServedConsole, caplog: pytest.LogCaptureFixture) -> None:
+    metrics = await known(known(served.runtime.console)._application).metrics()
     pushing = asyncio.create_task(Pusher(metrics, f"http://{ADDRESS}:9", 0.01).run())
     while "took no metrics" not in caplog.text:  # noqa: ASYNC110
         await asyncio.sleep(0.01)

@@ -17,7 +17,7 @@ from roboglot.model.errors import Busy, NotFound, Refused
 from roboglot.recording.entries import NANO, Entry
 from roboglot.recording.files import Files, Limits, Origin
 from roboglot.recording.redaction import Redaction
-from tests.console.conftest import Shown
+from tests.console.conftest import ServedConsole
 
 FACTS = {"version": "1", "world": "office", "robots": '{"a": "universal", "b": "cyberdog2"}'}
 
@@ -171,37 +171,37 @@ async def test_one_comparison_at_a_time(tmp_path: Path) -> None:
             await kept.send_comparison("a.mcap", "b.mcap", "", lambda _message: pytest.fail("sent"))
 
 
-async def test_recording_is_fetched_and_deleted(shown: Shown) -> None:
-    assert await shown.ask("/api/recordings") == (200, [])
-    _, begun = await shown.ask("/api/recording", {"do": "start"})
-    await shown.clock.advance(2.0)
+async def test_recording_is_fetched_and_deleted(served: ServedConsole) -> None:
+    assert await served.ask("/api/recordings") == (200, [])
+    _, begun = await served.ask("/api/recording", {"do": "start"})
+    await served.clock.advance(2.0)
     file = begun["file"]
-    (listed,) = (await shown.ask("/api/recordings"))[1]
+    (listed,) = (await served.ask("/api/recordings"))[1]
     assert (listed["file"], listed["running"]) == (file, True)
-    assert (await shown.ask("/api/recording", {"do": "delete", "file": file}))[0] == 409
-    await shown.ask("/api/recording", {"do": "stop"})
-    (listed,) = (await shown.ask("/api/recordings"))[1]
+    assert (await served.ask("/api/recording", {"do": "delete", "file": file}))[0] == 409
+    await served.ask("/api/recording", {"do": "stop"})
+    (listed,) = (await served.ask("/api/recordings"))[1]
     assert (listed["seconds"], listed["robots"]) == (2.0, ["a"])
-    path = shown.runtime.config.data / "recordings" / file
-    assert await shown.read(f"/api/recordings/{file}") == path.read_bytes()
-    assert (await shown.ask("/api/recordings/no.mcap"))[0] == 404
-    assert (await shown.ask("/api/recording", {"do": "delete", "file": file}))[0] == 200
+    path = served.runtime.config.data / "recordings" / file
+    assert await served.read(f"/api/recordings/{file}") == path.read_bytes()
+    assert (await served.ask("/api/recordings/no.mcap"))[0] == 404
+    assert (await served.ask("/api/recording", {"do": "delete", "file": file}))[0] == 200
     assert not path.exists()
-    assert (await shown.ask("/api/recording", {"do": "delete", "file": file}))[0] == 404
+    assert (await served.ask("/api/recording", {"do": "delete", "file": file}))[0] == 404
 
 
 @pytest.mark.slow  # starts a process; tests/recording/test_drives.py compares
-async def test_two_recordings_are_compared_on_a_page(shown: Shown) -> None:
+async def test_two_recordings_are_compared_on_a_page(served: ServedConsole) -> None:
     files = []
     for _ in range(2):
-        files.append((await shown.ask("/api/recording", {"do": "start"}))[1]["file"])
-        await shown.clock.advance(1.0)
-        await shown.ask("/api/recording", {"do": "stop"})
+        files.append((await served.ask("/api/recording", {"do": "start"}))[1]["file"])
+        await served.clock.advance(1.0)
+        await served.ask("/api/recording", {"do": "stop"})
     one, other = files
-    page = (await shown.read(f"/api/recordings/{one}/compared/{other}/a")).decode()
+    page = (await served.read(f"/api/recordings/{one}/compared/{other}/a")).decode()
     assert "ground truth: at most 0.00 m apart" in page
-    assert await shown.read(f"/api/recordings/{one}/compared/{other}/a") == page.encode()
-    status, words = await shown.ask(f"/api/recordings/{one}/compared/{other}/z")
+    assert await served.read(f"/api/recordings/{one}/compared/{other}/a") == page.encode()
+    status, words = await served.ask(f"/api/recordings/{one}/compared/{other}/z")
     assert (status, words["error"]) == (409, f"{one} has nothing of that robot and protocol")
 
 

@@ -20,7 +20,7 @@ from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.admission import Proof, ProofKind
 from roboglot.model.components.system.lease import Lease
 from roboglot.operations import Right
-from tests.console.conftest import ADDRESS, Shown
+from tests.console.conftest import ADDRESS, ServedConsole
 from tests.console.test_class_sign_in import PASSWORD, paged, signed
 from tests.console.test_classes import asked, grid, opened, world
 from tests.console.test_studio_socket import SAVE
@@ -102,34 +102,34 @@ def me(url: str, cookie: str) -> str:
             return "" if error.code == 401 else str(error)
 
 
-async def names(shown: Shown, *cookies: str) -> list[str]:
-    return [await asyncio.to_thread(me, shown.url, cookie) for cookie in cookies]
+async def names(served: ServedConsole, *cookies: str) -> list[str]:
+    return [await asyncio.to_thread(me, served.url, cookie) for cookie in cookies]
 
 
 async def test_a_class_goes_on_after_a_restart(tmp_path: Path) -> None:
     add_admins(tmp_path / "w", "mx", "gone", "changed")
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
-        _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
-        _, _, gone = await signed(shown, name="gone", password=PASSWORD)
-        _, _, changed = await signed(shown, name="changed", password=PASSWORD)
-        async with paged(shown, teacher) as page:
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as served:
+        _, _, teacher = await signed(served, name="mx", password=PASSWORD)
+        _, _, gone = await signed(served, name="gone", password=PASSWORD)
+        _, _, changed = await signed(served, name="changed", password=PASSWORD)
+        async with paged(served, teacher) as page:
             code = await opened(page)
-            _, _, anna = await signed(shown, name="Anna", code=code)
-            _, _, ben = await signed(shown, name="Ben", code=code)
-        assert await names(shown, teacher, gone, anna) == ["mx", "gone", f"Anna@{code}"]
-        request = Request(f"{shown.url}/api/sign_out", data=b"{}", headers={"Cookie": gone})
+            _, _, anna = await signed(served, name="Anna", code=code)
+            _, _, ben = await signed(served, name="Ben", code=code)
+        assert await names(served, teacher, gone, anna) == ["mx", "gone", f"Anna@{code}"]
+        request = Request(f"{served.url}/api/sign_out", data=b"{}", headers={"Cookie": gone})
         await asyncio.to_thread(lambda: urlopen(request, timeout=60).close())
     store = open_store(tmp_path / "w")
     store.rotate("changed", "another long secret")
     store.close()
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
-        port = shown.url.rpartition(":")[2]  # another one, and cookies have it in their names
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as served:
+        port = served.url.rpartition(":")[2]  # another one, and cookies have it in their names
         again = [f"roboglot-{port}={cookie.partition('=')[2]}" for cookie in (teacher, anna, ben, gone, changed)]
-        assert await names(shown, *again[3:]) == ["", ""]
+        assert await names(served, *again[3:]) == ["", ""]
         again = again[:3]
-        assert await names(shown, *again) == ["mx", f"Anna@{code}", f"Ben@{code}"]
-        assert (await signed(shown, name="Cem", code=code))[0] == 200  # though its teacher is not back yet
-        async with paged(shown, again[0]) as page, paged(shown, again[1]) as pupil:
+        assert await names(served, *again) == ["mx", f"Anna@{code}", f"Ben@{code}"]
+        assert (await signed(served, name="Cem", code=code))[0] == 200  # though its teacher is not back yet
+        async with paged(served, again[0]) as page, paged(served, again[1]) as pupil:
             await asked(pupil, do="join", code="ZZZZZZ", name="Ben", id=3)  # a pupil still, under the name of before
             assert (await pupil.kind("joined"))["name"] == "Anna"
             assert (await pupil.frame(**SAVE, id="1", body="print(1)\n"))["feedback"]["state"] == 0
@@ -137,9 +137,9 @@ async def test_a_class_goes_on_after_a_restart(tmp_path: Path) -> None:
             await grid(page, name="Anna", here=True)
             await asked(page, do="close")
             assert (await page.kind("ended"))["type"] == "ended"
-        assert (await signed(shown, name="Anna", code=code))[0] == 401
+        assert (await signed(served, name="Anna", code=code))[0] == 401
         async with asyncio.timeout(60):  # they are put out one by one
-            while await names(shown, *again) != ["mx", "", ""]:  # also who did not come back with a page
+            while await names(served, *again) != ["mx", "", ""]:  # also who did not come back with a page
                 pass
 
 
@@ -159,46 +159,46 @@ def add_admins(folder: Path, *names: str) -> None:
     store.close()
 
 
-async def opened_class(shown: Shown) -> tuple[str, str]:
+async def opened_class(served: ServedConsole) -> tuple[str, str]:
     """Open a class on the console's own page; return its teacher's cookie and its code."""
-    _, _, teacher = await signed(shown, name="mx", password=PASSWORD)
-    return teacher, str((await asyncio.to_thread(lesson, shown.url, teacher, do="open", name="7b"))["code"])
+    _, _, teacher = await signed(served, name="mx", password=PASSWORD)
+    return teacher, str((await asyncio.to_thread(lesson, served.url, teacher, do="open", name="7b"))["code"])
 
 
 async def test_consoles_class_takes_pupils_after_a_restart(tmp_path: Path) -> None:
     add_admins(tmp_path / "w", "mx")
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
-        teacher, code = await opened_class(shown)
-        _, anna, _ = await signed(shown, name="Anna", code=code)
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
-        teacher = f"roboglot-{shown.url.rpartition(':')[2]}={teacher.partition('=')[2]}"
-        assert (await signed(shown, name="Anna", code=code))[:2] == (200, anna)
-        assert (await signed(shown, name="Cem", code=code))[0] == 200
-        left = await asyncio.to_thread(lesson, shown.url, teacher)
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as served:
+        teacher, code = await opened_class(served)
+        _, anna, _ = await signed(served, name="Anna", code=code)
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as served:
+        teacher = f"roboglot-{served.url.rpartition(':')[2]}={teacher.partition('=')[2]}"
+        assert (await signed(served, name="Anna", code=code))[:2] == (200, anna)
+        assert (await signed(served, name="Cem", code=code))[0] == 200
+        left = await asyncio.to_thread(lesson, served.url, teacher)
         assert (left["code"], left["name"]) == (code, "7b")
         assert [pupil["name"] for pupil in left["pupils"]] == ["Anna", "Cem"]
-        assert await asyncio.to_thread(lesson, shown.url, teacher, do="close") == {}
-        assert (await signed(shown, name="Anna", code=code))[0] == 401
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
-        assert (await signed(shown, name="Cem", code=code))[0] == 401
+        assert await asyncio.to_thread(lesson, served.url, teacher, do="close") == {}
+        assert (await signed(served, name="Anna", code=code))[0] == 401
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as served:
+        assert (await signed(served, name="Cem", code=code))[0] == 401
 
 
 async def test_robots_locked_in_a_class_that_is_over(tmp_path: Path) -> None:
     """They stay locked over a restart, and their teacher can still unlock them."""
     add_admins(tmp_path / "w", "mx")
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
-        teacher, code = await opened_class(shown)
-        await signed(shown, name="Anna", code=code)
-        await asyncio.to_thread(lesson, shown.url, teacher, do="lock")
-        assert shown.robot[Lease].taken_by
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as served:
+        teacher, code = await opened_class(served)
+        await signed(served, name="Anna", code=code)
+        await asyncio.to_thread(lesson, served.url, teacher, do="lock")
+        assert served.robot[Lease].taken_by
     [file] = tmp_path.rglob("open_class.json")  # noqa: ASYNC240 - small
     file.write_text(json.dumps(json.loads(file.read_text()) | {"until": 1.0}))
-    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as shown:
-        teacher = f"roboglot-{shown.url.rpartition(':')[2]}={teacher.partition('=')[2]}"
-        assert shown.robot[Lease].taken_by
-        assert (await signed(shown, name="Cem", code=code))[0] == 401
-        assert await asyncio.to_thread(lesson, shown.url, teacher, do="close") == {}
-        assert not shown.robot[Lease].taken_by
+    async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as served:
+        teacher = f"roboglot-{served.url.rpartition(':')[2]}={teacher.partition('=')[2]}"
+        assert served.robot[Lease].taken_by
+        assert (await signed(served, name="Cem", code=code))[0] == 401
+        assert await asyncio.to_thread(lesson, served.url, teacher, do="close") == {}
+        assert not served.robot[Lease].taken_by
 
 
 def test_setting_the_clock_changes_no_time_left(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,18 +10,18 @@ import pytest
 
 from roboglot.console import http as console_http
 from roboglot.transport import http as connections
-from tests.console.conftest import Shown
+from tests.console.conftest import ServedConsole
 
 PATIENCE = 60.0  # s of the machine's time
 
 
-async def opened(shown: Shown) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    where = urlsplit(shown.url)
+async def opened(served: ServedConsole) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    where = urlsplit(served.url)
     return await asyncio.open_connection(where.hostname, where.port)
 
 
-async def test_head_without_end_is_not_kept(shown: Shown) -> None:
-    reader, writer = await opened(shown)
+async def test_head_without_end_is_not_kept(served: ServedConsole) -> None:
+    reader, writer = await opened(served)
     writer.write(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n")
     async with asyncio.timeout(PATIENCE):
         with contextlib.suppress(ConnectionError):
@@ -34,18 +34,18 @@ async def test_head_without_end_is_not_kept(shown: Shown) -> None:
 
 
 @pytest.mark.parametrize("head", [b"", b"GET /api/robots HTTP/1.1\r\nX: "])
-async def test_slow_head_is_not_waited_for(shown: Shown, monkeypatch: pytest.MonkeyPatch, head: bytes) -> None:
+async def test_slow_head_is_not_waited_for(served: ServedConsole, monkeypatch: pytest.MonkeyPatch, head: bytes) -> None:
     monkeypatch.setattr(connections, "REQUEST_SECONDS_MAX", 0.1)
-    reader, writer = await opened(shown)
+    reader, writer = await opened(served)
     writer.write(head)
     async with asyncio.timeout(PATIENCE):
         assert await reader.read() == b""
     writer.close()
 
 
-async def test_slow_body_is_refused(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_slow_body_is_refused(served: ServedConsole, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(console_http, "BODY_SECONDS_MAX", 0.1)
-    reader, writer = await opened(shown)
+    reader, writer = await opened(served)
     writer.write(b"POST /api/robots/a/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 100\r\n\r\n{")
     async with asyncio.timeout(PATIENCE):
         assert b" 408 " in await reader.readline()

@@ -24,7 +24,7 @@ from roboglot.model.components.mapping.localization import Localization
 from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.language import check
 from roboglot.wire.contracts import contract
-from tests.console.conftest import Shown
+from tests.console.conftest import ServedConsole
 
 ATTACKS = sorted((Path(__file__).parent.parent / "programs" / "attacks").rglob("*.py"))
 SAVE = {"type": "task", "operate": "save", "target_id": ["t"], "mode": "single", "condition": "now", "describe": "t"}
@@ -60,16 +60,16 @@ class Page:
 
 
 @asynccontextmanager
-async def page(shown: Shown) -> AsyncIterator[Page]:
-    async with connect(shown.url.replace("http", "ws") + "/studio", max_size=None) as socket:
+async def page(served: ServedConsole) -> AsyncIterator[Page]:
+    async with connect(served.url.replace("http", "ws") + "/studio", max_size=None) as socket:
         made = Page(socket)
         await made.say(type="open", robot="a")
         await made.kind("opened")
         yield made
 
 
-async def test_a_block_for_each_function_in_both_languages(shown: Shown) -> None:
-    status, found = await shown.ask("/api/blocks")
+async def test_a_block_for_each_function_in_both_languages(served: ServedConsole) -> None:
+    status, found = await served.ask("/api/blocks")
     assert status == 200
     assert {function["key"] for function in found["functions"]} == {row.key for row in contract("visual")}
     for function in table()["functions"]:
@@ -84,8 +84,8 @@ async def test_a_block_for_each_function_in_both_languages(shown: Shown) -> None
                 assert parameter["minimum"] <= parameter["default"] <= parameter["maximum"], (function, parameter)
 
 
-async def test_program_is_saved_run_halted_and_stepped(shown: Shown) -> None:
-    async with page(shown) as studio:
+async def test_program_is_saved_run_halted_and_stepped(served: ServedConsole) -> None:
+    async with page(served) as studio:
         body = "n = 1\ncyberdog.task.block('one')\nn = 2\ncyberdog.task.block('two')\nprint(n)\n"
         assert (await studio.frame(**SAVE, id="1", body=body))["feedback"]["state"] == 0
         stops = {"target_id": "t", "operate": "break", "first_block": True, "watched": True}
@@ -115,8 +115,8 @@ print(3)
 """
 
 
-async def test_steps_go_over_and_out_of_functions(shown: Shown) -> None:
-    async with page(shown) as studio:
+async def test_steps_go_over_and_out_of_functions(served: ServedConsole) -> None:
+    async with page(served) as studio:
         assert (await studio.frame(**SAVE, id="1", body=CALLING))["feedback"]["state"] == 0
         stops = {"target_id": "t", "operate": "break", "first_block": True}
         await studio.say(type="debug", id=5, text=json.dumps(stops))
@@ -134,8 +134,8 @@ async def test_steps_go_over_and_out_of_functions(shown: Shown) -> None:
         await studio.frame(type="task", operate="shutdown", target_id=["t"], id="3")
 
 
-async def test_page_lights_only_blocks_of_its_own_program(shown: Shown) -> None:
-    async with page(shown) as mine, page(shown) as theirs, page(shown) as every:
+async def test_page_lights_only_blocks_of_its_own_program(served: ServedConsole) -> None:
+    async with page(served) as mine, page(served) as theirs, page(served) as every:
         await mine.say(type="open", robot="a", program="t")
         await theirs.say(type="open", robot="a", program="other")
         await mine.kind("opened")
@@ -150,8 +150,8 @@ async def test_page_lights_only_blocks_of_its_own_program(shown: Shown) -> None:
         assert heard == [["frame", "log"], [], ["frame", "log"]]
 
 
-async def test_problems_are_reported_while_typing(shown: Shown) -> None:
-    async with page(shown) as studio:
+async def test_problems_are_reported_while_typing(served: ServedConsole) -> None:
+    async with page(served) as studio:
         await studio.say(type="check", id=1, body="cyberdog.motion.trun(90)\n")
         [problem] = (await studio.kind("checked"))["problems"]
         assert (problem["line"], "Did you mean 'turn'" in problem["en"], "turn" in problem["zh"]) == (1, True, True)
@@ -161,8 +161,8 @@ UNFIT = "print(1)\nfound = cyberdog.led.play(LedConstraint.target_head, LedConst
 UNFIT += "if found.state.code:\n    print('it failed')\n"
 
 
-async def test_program_is_tried_in_mission_and_world_copy(shown: Shown) -> None:
-    async with page(shown) as studio:
+async def test_program_is_tried_in_mission_and_world_copy(served: ServedConsole) -> None:
+    async with page(served) as studio:
         await studio.say(type="try", id=1, lesson="02_turn_around", body="cyberdog.motion.turn(180, 2)\n")
         assert (await studio.kind("tried"))["grade"]["stars"] == 3
         await studio.say(type="try", id=2, lesson="", body="print(1 / 0)\n")
@@ -178,18 +178,18 @@ async def test_program_is_tried_in_mission_and_world_copy(shown: Shown) -> None:
         assert "there is no mission" in (await studio.kind("refused"))["why"]
 
 
-async def test_trial_begins_where_the_map_has_it(shown: Shown) -> None:
-    async with page(shown) as studio:
+async def test_trial_begins_where_the_map_has_it(served: ServedConsole) -> None:
+    async with page(served) as studio:
         await studio.say(type="try", id=1, lesson="", body="x = 1\n")
         spot = await studio.until(lambda m: m.get("what") == "spot")
-        believed = shown.robot[Localization].pose
+        believed = served.robot[Localization].pose
         assert (spot["x"], spot["y"], spot["yaw"]) == pytest.approx((believed.x, believed.y, believed.yaw), abs=0.01)
-        assert shown.runtime.fleet.world.truth.pose_of("a").distance_to(believed) > 0.5
+        assert served.runtime.fleet.world.truth.pose_of("a").distance_to(believed) > 0.5
 
 
-async def test_a_page_tries_one_program_at_once(shown: Shown) -> None:
+async def test_a_page_tries_one_program_at_once(served: ServedConsole) -> None:
     wish = {"type": "try", "id": 1, "lesson": "", "body": "import time\ntime.sleep(1000)\n"}
-    async with page(shown) as studio:
+    async with page(served) as studio:
         for _ in range(2):
             await studio.say(**wish)
         assert "being tried already" in (await studio.kind("refused"))["why"]
@@ -201,8 +201,8 @@ async def test_a_page_tries_one_program_at_once(shown: Shown) -> None:
         assert "it was cancelled" in (await studio.kind("refused"))["why"]
 
 
-async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:
-    async with page(shown) as teacher, page(shown) as anna, page(shown) as other:
+async def test_a_class_is_joined_seen_and_handed_in(served: ServedConsole) -> None:
+    async with page(served) as teacher, page(served) as anna, page(served) as other:
         await teacher.say(type="class", do="open", name="7b")
         code = (await teacher.kind("grid"))["code"]
         await anna.say(type="class", do="join", code=code.lower(), name="Anna")
@@ -223,17 +223,17 @@ async def test_a_class_is_joined_seen_and_handed_in(shown: Shown) -> None:
         await teacher.say(type="class", do="look", id=10, name="Anna")
         await teacher.kind("looked")
         assert [m["pupils"][0]["here"] for m in teacher.heard if m["type"] == "grid" and m["pupils"]][-1]
-    async with page(shown) as teacher, page(shown) as anna:
+    async with page(served) as teacher, page(served) as anna:
         await teacher.say(type="class", do="open", code=code)
         await teacher.kind("grid")
         await anna.say(type="class", do="join", code=code, name="Anna")  # closes her first page
         assert (await anna.kind("joined"))["name"] == "Anna"
 
 
-async def test_malformed_messages_close_only_their_page(shown: Shown) -> None:
-    async with page(shown) as other:
+async def test_malformed_messages_close_only_their_page(served: ServedConsole) -> None:
+    async with page(served) as other:
         for text in ("{", "[]", '{"type": "run"}', "[" * 100_000, '{"type": "check", "id": "x"}', "\x00"):
-            async with connect(shown.url.replace("http", "ws") + "/studio") as socket:
+            async with connect(served.url.replace("http", "ws") + "/studio") as socket:
                 await socket.send(text)
                 try:
                     answer = await socket.recv()
@@ -244,9 +244,9 @@ async def test_malformed_messages_close_only_their_page(shown: Shown) -> None:
         assert (await other.kind("checked"))["problems"] == []
 
 
-async def test_hostile_programs_are_judged_through_the_page_alike(shown: Shown) -> None:
+async def test_hostile_programs_are_judged_through_the_page_alike(served: ServedConsole) -> None:
     wish = {"type": "task", "operate": "run", "target_id": ["t"], "mode": "single", "condition": "now"}
-    async with page(shown) as studio:
+    async with page(served) as studio:
         for _, paths in itertools.groupby(ATTACKS, key=lambda path: path.parent):
             for path in paths:
                 body = path.read_text("utf-8")
@@ -256,9 +256,9 @@ async def test_hostile_programs_are_judged_through_the_page_alike(shown: Shown) 
                 assert (await studio.frame(**wish, id="run"))["feedback"]["state"] != 0
 
 
-async def test_hostile_frames_are_refused_and_the_page_stays(shown: Shown) -> None:
+async def test_hostile_frames_are_refused_and_the_page_stays(served: ServedConsole) -> None:
     frames = ("{", "[" * 100_000, "NaN", '{"type": 7}', '{"type": "task", "target_id": [["t"]]}', "\x00")
-    async with page(shown) as studio:
+    async with page(served) as studio:
         for number, text in enumerate(frames):
             await studio.say(type="frame", text=text)
             await studio.say(type="check", id=number, body="x = 1\n")
@@ -272,15 +272,15 @@ async def flood(studio: Page) -> None:
     await studio.kind("never")
 
 
-async def test_a_flood_of_messages_closes_the_page(shown: Shown) -> None:
-    async with page(shown) as studio:
+async def test_a_flood_of_messages_closes_the_page(served: ServedConsole) -> None:
+    async with page(served) as studio:
         with pytest.raises(ConnectionClosed):
             await flood(studio)
 
 
-async def test_codes_cannot_be_tried_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_codes_cannot_be_tried_out(served: ServedConsole, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(channel, "MESSAGES_PER_SECOND_MAX", 10_000)  # under another limit
-    async with page(shown) as teacher, page(shown) as guest:
+    async with page(served) as teacher, page(served) as guest:
         await teacher.say(type="class", do="open", name="7b")
         code = (await teacher.kind("grid"))["code"]
         for number in range(2 * JOIN_BURST):  # right codes are free
@@ -290,7 +290,7 @@ async def test_codes_cannot_be_tried_out(shown: Shown, monkeypatch: pytest.Monke
             await guest.say(type="class", do="join", id=7, code=f"WRONG{number}", name="Eve")
             why = (await guest.kind("refused"))["why"]
         assert "too many wrong codes" in why
-    async with page(shown) as again:  # counted by address, not by page
+    async with page(served) as again:  # counted by address, not by page
         said = set()
         for number in range(JOIN_BURST // 2):
             await again.say(type="class", do="join", id=7, code=f"WRONG{number}", name="Eve")
@@ -298,9 +298,9 @@ async def test_codes_cannot_be_tried_out(shown: Shown, monkeypatch: pytest.Monke
         assert "too many wrong codes from your address" in said
 
 
-async def test_names_alone_do_not_fill_a_class(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_names_alone_do_not_fill_a_class(served: ServedConsole, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(channel, "MESSAGES_PER_SECOND_MAX", 10_000)  # under another limit
-    async with page(shown) as teacher, page(shown) as eve, page(shown) as anna:
+    async with page(served) as teacher, page(served) as eve, page(served) as anna:
         await teacher.say(type="class", do="open", name="7b")
         code = (await teacher.kind("grid"))["code"]
         await anna.say(type="class", do="join", code=code, name="Anna", style="{}")
@@ -324,10 +324,10 @@ TOO_MUCH: tuple[dict[str, object], ...] = (
 )
 
 
-async def test_requests_of_a_class_are_bounded(shown: Shown) -> None:
-    async with page(shown) as other:
+async def test_requests_of_a_class_are_bounded(served: ServedConsole) -> None:
+    async with page(served) as other:
         for wish in TOO_MUCH:
-            async with page(shown) as hostile:
+            async with page(served) as hostile:
                 await hostile.say(type="class", **wish)
                 try:
                     joined = await hostile.kind("joined")
@@ -338,9 +338,11 @@ async def test_requests_of_a_class_are_bounded(shown: Shown) -> None:
         assert (await other.kind("checked"))["problems"] == []
 
 
-async def test_pages_of_strangers_are_refused(shown: Shown) -> None:
+async def test_pages_of_strangers_are_refused(served: ServedConsole) -> None:
     with pytest.raises(Exception, match=r"\d|closed"):
-        async with connect(shown.url.replace("http", "ws") + "/studio", origin=Origin("http://evil.example")) as socket:
+        async with connect(
+            served.url.replace("http", "ws") + "/studio", origin=Origin("http://evil.example")
+        ) as socket:
             await socket.recv()
 
 
@@ -365,8 +367,8 @@ def test_starting_blocks_of_the_table_are_right_programs() -> None:
         assert check(f"x = {function['key']}\n", ability_set().names()) == [], function["key"]
 
 
-async def test_lists_go_to_the_page_that_asked(shown: Shown) -> None:
-    async with page(shown) as first, page(shown) as second:
+async def test_lists_go_to_the_page_that_asked(served: ServedConsole) -> None:
+    async with page(served) as first, page(served) as second:
         inquiry = {"type": "task", "operate": "inquiry", "target_id": []}
         assert "response" in await first.frame(**inquiry, id="of_first")
         assert "response" in await second.frame(**inquiry, id="of_second")
@@ -378,8 +380,8 @@ async def test_lists_go_to_the_page_that_asked(shown: Shown) -> None:
         assert "of_second" in lists[1][0]
 
 
-async def test_functions_that_answer_nothing_are_no_readings(shown: Shown) -> None:
-    async with page(shown) as studio:
+async def test_functions_that_answer_nothing_are_no_readings(served: ServedConsole) -> None:
+    async with page(served) as studio:
         body = "import time\ntime.sleep(0)\ntime.monotonic()\nprint('end')\n"
         await studio.frame(**SAVE, id="1", body=body)
         await studio.say(type="frame", text=json.dumps({**RUN, "id": "2"}))
@@ -387,14 +389,14 @@ async def test_functions_that_answer_nothing_are_no_readings(shown: Shown) -> No
         assert [m["function"] for m in studio.heard if m["type"] == "reading"] == ["time.monotonic"]
 
 
-async def test_later_pages_learn_what_was_refused(shown: Shown) -> None:
+async def test_later_pages_learn_what_was_refused(served: ServedConsole) -> None:
     found = []
     for body in "for n in (7.0, 7.0, 8.0):\n    cyberdog.motion.go_straight(n)\n", "print(1)\n":
-        async with page(shown) as studio:
+        async with page(served) as studio:
             await studio.frame(**SAVE, id="1", body=body)
             await studio.say(type="frame", text=json.dumps({**RUN, "id": "2"}))
             await studio.until(lambda m: m["type"] == "frame" and "stop task" in m["text"])
-        async with page(shown) as later:
+        async with page(served) as later:
             await later.say(type="fetch", id=5, program="t")
             found += [(c["line"], c["refused"].split()[2]) for c in (await later.kind("fetched"))["refused"]]
     assert found == [(2, "7"), (2, "8")]  # the second run leaves none

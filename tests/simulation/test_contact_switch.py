@@ -67,7 +67,7 @@ async def test_alone_no_contact_is_looked_for(simulate: Simulate) -> None:
     await simulation.clock.advance(2.0)
     assert options.disableflags
     radius = simulation.robot.description.radius
-    simulation.world.world_stage.add_obstacle(simulation.pose.compose(Pose(radius + 0.11)), (0.2, 0.2, 0.5))
+    simulation.world.stage.add_obstacle(simulation.pose.compose(Pose(radius + 0.11)), (0.2, 0.2, 0.5))
     await simulation.clock.advance(0.02)
     assert not options.disableflags
 
@@ -89,6 +89,6 @@ async def test_robot_at_rest_feels_obstacles(simulate: Simulate) -> None:
     await simulation.clock.advance(1.0)
     assert simulation.world._physics._contact_switch.off
     radius = simulation.robot.description.radius
-    simulation.world.world_stage.add_obstacle(simulation.pose.compose(Pose(radius + 0.095)), (0.2, 0.2, 0.5))
+    simulation.world.stage.add_obstacle(simulation.pose.compose(Pose(radius + 0.095)), (0.2, 0.2, 0.5))
     await simulation.clock.advance(0.04)
     assert simulation.world._physics.hulls["a"].touches

@@ -86,7 +86,7 @@ async def test_robot_glides_until_it_comes_near_something(simulate: Simulate, mo
     monkeypatch.setattr(mujoco, "mj_step", noting)
     simulation.robot[Base].set_velocity(Twist(0.3))
     ahead = simulation.pose.compose(Pose(1.2))
-    simulation.world.world_stage.add_obstacle(ahead, (0.2, 0.2, 0.5))
+    simulation.world.stage.add_obstacle(ahead, (0.2, 0.2, 0.5))
     await simulation.clock.advance(1.0)
     assert stepped == []
     await simulation.clock.advance(3.0)
@@ -99,7 +99,7 @@ async def test_contacts_of_standing_robots_are_not_searched(simulate: Simulate) 
     await settled(simulation)
     options = simulation.world._physics._model.opt
     assert options.disableflags & NO_CONTACTS
-    simulation.world.world_stage.add_obstacle(simulation.pose.compose(Pose(0.35)), (0.2, 0.2, 0.5))
+    simulation.world.stage.add_obstacle(simulation.pose.compose(Pose(0.35)), (0.2, 0.2, 0.5))
     await simulation.clock.advance(0.02)
     assert not options.disableflags & NO_CONTACTS
     await simulation.clock.advance(0.1)
@@ -182,7 +182,7 @@ async def test_rising_robot_meets_what_hangs_above(simulate: Simulate, *, compil
     simulation.world.start()
     simulation.robot[Legs].lie_down()
     await simulation.clock.advance(5.0)
-    simulation.world.world_stage.place("a", Pose(4.0, 5.0))
+    simulation.world.stage.place("a", Pose(4.0, 5.0))
     await simulation.clock.advance(1.0)
     hull = simulation.world._physics.hulls["a"]
     assert not hull.touches
@@ -196,7 +196,7 @@ async def test_robot_that_leans_glides(simulate: Simulate, monkeypatch: pytest.M
     simulation = simulate("empty", start=Pose(4.0, 5.0))
     await settled(simulation)
     base, hull = simulation.robot[Base], simulation.world._physics.hulls["a"]
-    simulation.world.world_stage.add_obstacle(simulation.pose.compose(Pose(0.6)), (0.2, 0.2, 0.5))
+    simulation.world.stage.add_obstacle(simulation.pose.compose(Pose(0.6)), (0.2, 0.2, 0.5))
     base.set_velocity(Twist(0.3))
     await simulation.clock.advance(3.0)
     assert hull.touches

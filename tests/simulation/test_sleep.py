@@ -42,11 +42,11 @@ async def test_stage_wake_the_physics(simulate: Simulate) -> None:
     simulation.world.start()
     assert await resting(simulation)
     there = simulation.pose
-    simulation.world.world_stage.push(simulation.robot.id, Vector3(50.0))
+    simulation.world.stage.push(simulation.robot.id, Vector3(50.0))
     await simulation.clock.advance(0.1)
     assert simulation.pose != there
     assert await resting(simulation)
-    simulation.world.world_stage.place(simulation.robot.id, Pose(1.0, 0.5, 0.2))
+    simulation.world.stage.place(simulation.robot.id, Pose(1.0, 0.5, 0.2))
     await simulation.clock.advance(0.02)
     assert simulation.pose.distance_to(Pose(1.0, 0.5)) < 1e-6
 

@@ -18,8 +18,8 @@ from roboglot.console.http import Message, Problem, Receive, Scope, Send, answer
 from roboglot.console.live import Page
 from roboglot.console.people.classes import Classes
 from roboglot.console.people.entry import CHALLENGE, address_of, admission_of, enter
+from roboglot.console.people.login import Login
 from roboglot.console.people.sessions import Sessions
-from roboglot.console.people.signing import Signing
 from roboglot.console.program_runs import end_all
 from roboglot.console.settings import JOIN_BURST, JOIN_TRIES, MESSAGE_MAX, REVOKED_SECONDS, VIEWERS_MAX
 from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
@@ -57,12 +57,12 @@ class Application:
         self._classroom = self._enter_classroom(classroom, page)
         self._listening: dict[asyncio.Task[None], str] = {}  # by task: the page's client
         self._login = login
-        self._classes = Classes(desk, self._classroom, self._stop, self._listening.values, self._put_out)
+        self._classes = Classes(desk, self._classroom, self._stop, self._listening.values, self._sign_out)
         for left in login.all():
             self._classes.restore(left)
         self._api = Api(desk, self._classes)
         self._codes = Limiter(JOIN_TRIES / 60.0, JOIN_BURST, time.monotonic)
-        self._signing = Signing(desk, self._login, self._classes)
+        self._login_page = Login(desk, self._login, self._classes)
         self._leaving = [
             leave
             for robot in desk.robots.values()
@@ -117,7 +117,7 @@ class Application:
         try:
             if why := self._refusal(scope, scope["method"]):
                 raise Problem(403, why)
-            if await self._signing.serve(scope, receive, send):
+            if await self._login_page.serve(scope, receive, send):
                 return
             if scope["path"] != "/metrics" and not scope["path"].startswith("/api/"):
                 await self._serve_file(scope, send)  # anyone may load the pages: they contain no data
@@ -238,7 +238,7 @@ class Application:
             page.close()
             sending.cancel()
 
-    async def _put_out(self, who: str) -> None:
+    async def _sign_out(self, who: str) -> None:
         await self._login.end_all_of(who)
         self._close_pages_of(who)
 

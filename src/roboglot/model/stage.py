@@ -1,6 +1,6 @@
 """Stage: control of a simulated world. Moves robots, things and people, makes sounds, injects faults.
 
-For consoles, test kits and agents; ``simulation.world.world_stage`` implements it. All places are in the world's
+For consoles, test kits and agents; ``simulation.world.stage`` implements it. All places are in the world's
 frame: m, rad; floor 0 is the lowest. Unknown names raise NotFound, and impossible requests raise ValueError in plain
 words.
 """

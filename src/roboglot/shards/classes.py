@@ -28,7 +28,7 @@ from roboglot.console.studio.class_link import (
     News,
     Opened,
     PageRequest,
-    Shows,
+    SignIn,
     Stop,
     Stopped,
     ToRoom,
@@ -127,7 +127,7 @@ class _Link:
         match message:
             case Opened() | Closed():
                 await self._change(message)
-            case Shows():
+            case SignIn():
                 self._begin(self._admit(message), "admit a pupil")
             case Stopped(id=id, why=why):
                 if (waiting := self._stops.get(id)) is not None and not waiting.done():
@@ -184,12 +184,12 @@ class _Link:
         self._pending.add(task)
         task.add_done_callback(self._pending.discard)
 
-    async def _admit(self, shows: Shows) -> None:
+    async def _admit(self, request: SignIn) -> None:
         try:
-            place = await self._room.admit(shows.code, shows.name, self._world)
-            answer = Admitted(shows.id, "", place.code, place.page, place.seconds)
+            place = await self._room.admit(request.code, request.name, self._world)
+            answer = Admitted(request.id, "", place.code, place.page, place.seconds)
         except RobotError as error:
-            answer = Admitted(shows.id, str(error))
+            answer = Admitted(request.id, str(error))
         self._writer.write(line(answer))
 
     def _end(self, code: str) -> None:

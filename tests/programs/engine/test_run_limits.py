@@ -26,7 +26,7 @@ from roboglot.programs.engine.events import (
 )
 from roboglot.programs.engine.messages import Message, OutputMessage
 from roboglot.programs.engine.run import OUTPUT_COST, SHORT_COST, Run
-from roboglot.programs.engine.share import BURST, LIGHT_BURST, SHARE_MAX, Share
+from roboglot.programs.engine.share import BURST, LIGHT_BURST, SHARE_MAX, ThreadShare
 from tests.programs.playing import BUSY, PRELUDE, last, play, process_state, started, until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -109,7 +109,7 @@ assert cyberdog.echo(x) == x
 
 
 async def test_greedy_programs_get_turns_one_by_one() -> None:
-    share, turns, loop = Share(), list[int](), asyncio.get_running_loop()
+    share, turns, loop = ThreadShare(), list[int](), asyncio.get_running_loop()
     accounts = [share.account() for _ in range(3)]
     for account in accounts:
         account.charge(0.01)
@@ -146,9 +146,9 @@ class Ledger:
         self.due = 0.0  # for the frames, whatever it takes to read those that are long
         self.first, self.more = Cost(), Cost()  # of the callbacks that read the first part of long calls, and more
         self._reading: Cost | None = None
-        charge, read, run, decode = Share.charge, Calls._read, asyncio.Handle._run, run_module.decode
+        charge, read, run, decode = ThreadShare.charge, Calls._read, asyncio.Handle._run, run_module.decode
 
-        def charged(share: Share, seconds: float, now: float) -> None:
+        def charged(share: ThreadShare, seconds: float, now: float) -> None:
             self.charges.append(seconds)
             charge(share, seconds, now)
 
@@ -168,7 +168,7 @@ class Ledger:
             self.due += OUTPUT_COST if isinstance(message, OutputMessage) else SHORT_COST
             return message
 
-        monkeypatch.setattr(Share, "charge", charged)
+        monkeypatch.setattr(ThreadShare, "charge", charged)
         monkeypatch.setattr(Calls, "_read", reading)
         monkeypatch.setattr(asyncio.Handle, "_run", measured)
         monkeypatch.setattr(run_module, "decode", decoded)

@@ -73,7 +73,7 @@ class OpenClass:
 
 
 class Classes:
-    """The class of a console. ``present``: people with an open page; ``put_out`` ends a person's sessions and pages.
+    """The class of a console. ``present``: people with an open page; ``sign_out`` ends a person's sessions and pages.
 
     ``stop`` ends all programs and motion of a robot.
     """
@@ -84,11 +84,11 @@ class Classes:
         room: classroom.Room,
         stop: Callable[[str], Awaitable[None]],
         present: Callable[[], Collection[str]],
-        put_out: Callable[[str], Awaitable[None]],
+        sign_out: Callable[[str], Awaitable[None]],
         now: Callable[[], float] | None = None,
     ) -> None:
         self._desk, self._room, self._stop = desk, room, stop
-        self._present, self._put_out, self._now = present, put_out, now or SteadyTime()
+        self._present, self._sign_out, self._now = present, sign_out, now or SteadyTime()
         self._file = OpenClassFile(desk.studio.classes) if desk.studio.classes is not None else None
         self._writing = asyncio.Lock()
         self._current = self._restored()
@@ -271,7 +271,7 @@ class Classes:
             with contextlib.suppress(RobotError):
                 await _release(self._desk.robots[seat.robot])
         await self._desk.robots[seat.robot].admission.shut_out(seat.identity)
-        await self._put_out(seat.identity)
+        await self._sign_out(seat.identity)
         await self._save(class_)  # last: a slow disk must not leave the pupil a right
 
     def check_teacher(self) -> None:

@@ -78,7 +78,7 @@ class Stopped(msgspec.Struct, tag=True, frozen=True):
     why: str = ""
 
 
-class Shows(msgspec.Struct, tag=True, frozen=True):
+class SignIn(msgspec.Struct, tag=True, frozen=True):
     """Message to the classroom: a pupil signs in with a class's code."""
 
     id: int
@@ -87,7 +87,7 @@ class Shows(msgspec.Struct, tag=True, frozen=True):
 
 
 class Admitted(msgspec.Struct, tag=True, frozen=True):
-    """Answer of the classroom to ``Shows``: a refusal, or a ``Place``."""
+    """Answer of the classroom to ``SignIn``: a refusal, or a ``Place``."""
 
     id: int
     why: str = ""
@@ -116,7 +116,7 @@ class Stop(msgspec.Struct, tag=True, frozen=True):
     robot: str
 
 
-ToRoom = Hello | PageRequest | At | Drawn | Left | Opened | Closed | Stopped | Shows
+ToRoom = Hello | PageRequest | At | Drawn | Left | Opened | Closed | Stopped | SignIn
 FromRoom = News | Stop | Admitted | Ended
 _decode = msgspec.json.Decoder(FromRoom).decode
 
@@ -162,7 +162,7 @@ class LinkedRoom:
             raise Refused("too many sign in at once")
         self._next += 1
         id = self._next
-        self.send(Shows(id, code, name))
+        self.send(SignIn(id, code, name))
         self._admitting[id] = asyncio.get_running_loop().create_future()
         try:
             async with asyncio.timeout(ADMIT_SECONDS):

@@ -10,7 +10,7 @@ NAME_MAX, WORDS_MAX, STYLE_MAX = 40, 300, 400_000  # characters
 Words = Annotated[str, msgspec.Meta(max_length=WORDS_MAX)]
 
 
-class Doing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class PupilState(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """State of a pupil's page."""
 
     phase: Words = "idle"
@@ -28,6 +28,6 @@ class Member(msgspec.Struct, tag="class", tag_field="type", forbid_unknown_field
     id: int = 0
     code: Annotated[str, msgspec.Meta(max_length=12)] = ""
     name: Annotated[str, msgspec.Meta(max_length=NAME_MAX)] = ""
-    doing: Doing = Doing()
+    doing: PupilState = PupilState()
     style: Annotated[str, msgspec.Meta(max_length=STYLE_MAX)] = ""
     carry: bool = False  # a page that comes from another world brings the program seen last

@@ -16,7 +16,7 @@ from typing import Protocol
 import msgspec
 
 from roboglot.console.studio.class_files import ClassFiles, PupilWork
-from roboglot.console.studio.class_requests import Doing, Member
+from roboglot.console.studio.class_requests import Member, PupilState
 from roboglot.hosting.steady_time import SteadyTime
 from roboglot.model.errors import NotFound, Refused
 from roboglot.values import dataclass
@@ -57,7 +57,7 @@ class Pupil:
     world: str = ""
     robot: str = ""
     seat: Seat | None = None
-    doing: Doing = field(default_factory=Doing)
+    doing: PupilState = field(default_factory=PupilState)
     work: PupilWork = field(default_factory=PupilWork)
 
 
@@ -108,7 +108,7 @@ class Class:
             seat.post({"type": "grid", "code": self.code, "name": self.name, "pupils": rows})
 
 
-class Seated(Protocol):
+class SeatProtocol(Protocol):
     """One page's place in a classroom."""
 
     async def take(self, request: Member, *, may_teach: bool) -> None:
@@ -127,7 +127,7 @@ class Seated(Protocol):
 class Room(Protocol):
     """A classroom, wherever it is."""
 
-    def seat(self, post: Tell) -> Seated:
+    def seat(self, post: Tell) -> SeatProtocol:
         """Return a place for a page."""
 
     async def open(self, code: str, name: str) -> None:
@@ -151,7 +151,7 @@ class Classroom:
             kept = self.classes[record.code] = Class(record.code, record.name, record.only)
             kept.until = record.until
             for work in record.works:
-                doing = Doing(stars=work.all_stars, program=work.program)
+                doing = PupilState(stars=work.all_stars, program=work.program)
                 kept.pupils[work.name] = Pupil(work.name, work.world, "", None, doing, work)
 
     def seat(self, post: Tell, world: str = "") -> Seat:

@@ -33,7 +33,7 @@ class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     zh: Annotated[str, msgspec.Meta(max_length=2000)]
 
 
-class Happening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class LessonEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Event during a lesson, as ``Act``."""
 
     at: float
@@ -43,7 +43,7 @@ class Happening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     to: tuple[float, float] = (0.0, 0.0)
 
 
-class Wrong(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class TypicalMistake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A typical mistake, and the kind of the check that finds it ("ends" also for an invalid program)."""
 
     program: str
@@ -64,13 +64,13 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     start: tuple[float, float, float] = (2.0, 5.0, 0.0)
     boxes: Annotated[list[tuple[float, float, float, float]], msgspec.Meta(max_length=50)] = []
     people: dict[str, tuple[float, float, float]] = {}
-    happens: Annotated[list[Happening], msgspec.Meta(max_length=50)] = []
+    happens: Annotated[list[LessonEvent], msgspec.Meta(max_length=50)] = []
     goals: list[tuple[float, float]] = []
     longest: Annotated[float, msgspec.Meta(gt=0, le=600)] = 60.0
     allowed: list[str] = []
     blocks: list[str] = []
     hints: Annotated[list[Words], msgspec.Meta(max_length=5)] = []
-    wrong: list[Wrong] = []
+    wrong: list[TypicalMistake] = []
 
     def __post_init__(self) -> None:
         functions = {operation.key for operation in ABILITIES}

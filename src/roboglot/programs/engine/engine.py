@@ -30,7 +30,7 @@ from roboglot.programs.engine.launcher import EngineError, EngineSilent, Launche
 from roboglot.programs.engine.memory_budget import MemoryBudget
 from roboglot.programs.engine.processor_group import ProcessorGroup
 from roboglot.programs.engine.run import Run
-from roboglot.programs.engine.share import Share
+from roboglot.programs.engine.share import ThreadShare
 from roboglot.programs.engine.shared_page import Page
 from roboglot.programs.engine.usage import usage_of
 from roboglot.programs.language import Problem, ProblemKind
@@ -83,7 +83,7 @@ class Engine:
         self._asked: set[asyncio.Task[object]] = set()
         self._background: asyncio.Task[None] | None = None
         self._group = ProcessorGroup()
-        self._share = Share()
+        self._share = ThreadShare()
         self.layers: list[str] = []
         """Layers of the jail on this machine, once open."""
 

@@ -15,7 +15,7 @@ OUTPUT_MAX = 4 * OUTPUT_EVENT_MAX
 """Characters of output kept for a slow reader before the worker has to wait."""
 
 
-class Inbox:
+class EventQueue:
     """A queue that never blocks its writer: the writer should pause while ``full``."""
 
     __slots__ = ("_events", "_loop", "_pieces", "_size", "_unread", "closed", "reader")

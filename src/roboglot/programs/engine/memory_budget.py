@@ -21,8 +21,8 @@ TOGETHER = 2 * 1024**3
 """Default budget in bytes; half of the machine's memory if that is less."""
 
 
-class Spender(Protocol):
-    """A run that may be ended."""
+class BudgetedRun(Protocol):
+    """A run that may be ended to free memory."""
 
     @property
     def pid(self) -> int:
@@ -38,7 +38,9 @@ class MemoryBudget:
     ``total``: bytes, 0 for the default. ``empty``: memory of an empty program, shared by all, bytes.
     """
 
-    def __init__(self, runs: Collection[Spender], total: int = 0, usage: Callable[[int], int] | None = None) -> None:
+    def __init__(
+        self, runs: Collection[BudgetedRun], total: int = 0, usage: Callable[[int], int] | None = None
+    ) -> None:
         self.total = total or min(TOGETHER, machine_memory() // 2)
         self.empty = 0
         self._runs = runs
@@ -63,7 +65,7 @@ class MemoryBudget:
             self._end_largest(sorted(zip(sizes, runs, strict=True), key=lambda pair: pair[0]))
             await self._pause()
 
-    def _end_largest(self, by_size: list[tuple[int, Spender]]) -> None:
+    def _end_largest(self, by_size: list[tuple[int, BudgetedRun]]) -> None:
         held = sum(size for size, _ in by_size)
         while held > self.total:
             size, run = by_size.pop()

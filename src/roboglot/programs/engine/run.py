@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from roboglot.programs.engine.calls import CallRate, Calls
-from roboglot.programs.engine.event_queue import Inbox
+from roboglot.programs.engine.event_queue import EventQueue
 from roboglot.programs.engine.events import Answer, Event, ExitReason, Failed, Finished, Limits
 from roboglot.programs.engine.launcher import Worker
 from roboglot.programs.engine.messages import (
@@ -30,7 +30,7 @@ from roboglot.programs.engine.messages import (
 )
 from roboglot.programs.engine.position import Position
 from roboglot.programs.engine.post_mortem import reason_of
-from roboglot.programs.engine.share import Share
+from roboglot.programs.engine.share import ThreadShare
 from roboglot.programs.engine.shared_page import Page
 from roboglot.programs.engine.stopwatch import Stopwatch
 from roboglot.programs.engine.worker_socket import Wire
@@ -59,10 +59,10 @@ class Run:
         history: Iterable[Answer] = (),
         *,
         watched: bool = False,
-        share: Share | None = None,
+        share: ThreadShare | None = None,
     ) -> None:
         self._limits = limits
-        self._inbox = Inbox()
+        self._inbox = EventQueue()
         self._worker: Worker | None = None
         self._ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._ending: Finished | Failed | None = None
@@ -71,7 +71,7 @@ class Run:
         self._clock = Stopwatch(limits.wall, self._over_time)
         self._printed = 0
         self._switch = asyncio.Lock()
-        self.account = (share or Share()).account()
+        self.account = (share or ThreadShare()).account()
         """The program's use of the server's thread; all work done for it is charged here."""
         self.wire = Wire(self, self.account)
         """The server's end of the worker's socket."""

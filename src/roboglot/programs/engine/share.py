@@ -1,4 +1,4 @@
-"""Limits the share of all programs in the server's thread: a program that takes more than its part has to wait.
+"""Limits the share of the server's thread that programs get: a program that takes more has to wait.
 
 The thread that serves all clients also reads the programs' frames and makes their calls. Times are in machine time.
 """
@@ -24,8 +24,8 @@ LIGHT = 0.05
 """Part of the server's thread below which a program never queues, even if others do."""
 
 
-class Share:
-    """Maker of one ``account`` for each program. Programs that have used much queue up and get turns one by one."""
+class ThreadShare:
+    """Makes an ``account`` for each program. Programs that have used much queue up and get turns one by one."""
 
     def __init__(self) -> None:
         self._queue: deque[Callable[[], None]] = deque()
@@ -66,7 +66,7 @@ class Account:
 
     __slots__ = ("_loop", "_share", "paid_until")
 
-    def __init__(self, share: Share) -> None:
+    def __init__(self, share: ThreadShare) -> None:
         self._share = share
         self._loop = asyncio.get_running_loop()
         self.paid_until = 0.0

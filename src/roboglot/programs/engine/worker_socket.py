@@ -7,7 +7,7 @@ from collections import deque
 from typing import Protocol, cast
 
 from roboglot.programs.engine.messages import ProtocolViolation
-from roboglot.programs.engine.share import Account, Share
+from roboglot.programs.engine.share import Account, ThreadShare
 from roboglot.programs.worker.frames import FrameReader, FrameTooLong
 
 FRAME_RATE_MAX = 10_000
@@ -41,7 +41,7 @@ class Wire(asyncio.Protocol):
 
     def __init__(self, listener: Listener, account: Account | None = None) -> None:
         self._listener = listener
-        self._account = account or Share().account()
+        self._account = account or ThreadShare().account()
         self._reader = FrameReader()
         self.frames: deque[bytes] = deque()
         """Bodies that have come and wait for their turn."""

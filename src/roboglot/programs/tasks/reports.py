@@ -30,7 +30,7 @@ class TaskReport:
 
 
 @dataclass(frozen=True, slots=True)
-class Whereabouts:
+class TaskPosition:
     """State of a task, its current line (in ``module``, or in its own text), and its open block.
 
     ``watched``: True if it can be stepped through. ``began``: its start, Unix s, from which its log entries count;
@@ -117,7 +117,7 @@ P = ParamSpec("P")
 LISTENERS_MAX = 64
 
 
-class Audience(Generic[P]):
+class Listeners(Generic[P]):
     """Listeners of one kind of news. They must be quick and must not raise."""
 
     def __init__(self) -> None:

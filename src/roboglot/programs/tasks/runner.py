@@ -20,7 +20,7 @@ from roboglot.programs.errors import CannotExecute, EngineTimeout, ProgramError,
 from roboglot.programs.functions import ability_set
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LogEntry, StoredProgram, Stores
-from roboglot.programs.tasks.reports import Audience, Insight, NewestRun, Pace, TaskReport, done
+from roboglot.programs.tasks.reports import Insight, Listeners, NewestRun, Pace, TaskReport, done
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, state_after
 from roboglot.programs.tasks.task_run import Outcome, RunListeners, TaskRun, in_units
 from roboglot.values import dataclass
@@ -48,8 +48,8 @@ class Background:
 
 
 @dataclass(frozen=True, slots=True)
-class RunTerms:
-    """Terms of every program: its limits, and the time zone that its ``time.localtime`` shows."""
+class RunSettings:
+    """Settings of every run: its limits, and the time zone that its ``time.localtime`` shows."""
 
     limits: Limits
     zone: tzinfo
@@ -71,23 +71,23 @@ class Runner:
         library: ModuleLibrary,
         lock: asyncio.Lock,
         *,
-        terms: RunTerms,
+        settings: RunSettings,
         ended: Callable[[StoredProgram, TaskState], None],
     ) -> None:
         self.runs: dict[str, TaskRun] = {}
         self.stops: dict[str, Stops] = {}
         self.newest: dict[str, NewestRun] = {}
-        self.reports = Audience[[TaskReport]]()
-        self.log_entries = Audience[[str, LogEntry]]()
+        self.reports = Listeners[[TaskReport]]()
+        self.log_entries = Listeners[[str, LogEntry]]()
         self.pace, self.log_pace = Pace(), Pace()
-        self.insights = Audience[[Insight]]()
+        self.insights = Listeners[[Insight]]()
         self._robot = robot
         self._engine = engine
         self._store = stores.tasks
         self._journals = stores.journals
         self._library = library
         self._lock = lock
-        self._terms = terms
+        self._settings = settings
         self._ended = ended
         self._supervisors = Background()
 
@@ -103,7 +103,7 @@ class Runner:
 
     async def start(self, task: StoredProgram, uses: Collection[str]) -> None:
         """Start a task in run_wait; its reports come after those of the caller. Raises ProgramError."""
-        here = datetime.fromtimestamp(self._robot.clock.epoch(), self._terms.zone).utcoffset()
+        here = datetime.fromtimestamp(self._robot.clock.epoch(), self._settings.zone).utcoffset()
         journal = Journal(self._journals, task.id)
         clock = self._robot.clock
         with clock.holding():
@@ -176,7 +176,7 @@ class Runner:
         run = await self._engine.start(
             header.body,
             replace(ability_set(), utc_offset=header.utc_offset),
-            self._terms.limits,
+            self._settings.limits,
             modules=header.modules,
             seed=header.seed,
             history=answers,

@@ -22,12 +22,12 @@ from roboglot.programs.language.places import Step
 from roboglot.programs.library.inspection import Inspector, refuse_wrong
 from roboglot.programs.library.library import ModuleLibrary
 from roboglot.programs.stores import LOG_MAX, ListedProgram, LogEntry, StoredProgram, Stores
-from roboglot.programs.tasks.late_stops import LateStops
+from roboglot.programs.tasks.deferred_stops import DeferredStops
 from roboglot.programs.tasks.owners import act_for_owner
 from roboglot.programs.tasks.recovery import settle
-from roboglot.programs.tasks.reports import RunFigures, TaskReport, Whereabouts, done
+from roboglot.programs.tasks.reports import RunFigures, TaskPosition, TaskReport, done
 from roboglot.programs.tasks.robot_modes import check_mode
-from roboglot.programs.tasks.runner import Background, Runner, RunTerms
+from roboglot.programs.tasks.runner import Background, Runner, RunSettings
 from roboglot.programs.tasks.states import DEBUG, TaskOperation, TaskState, next_state, state_after
 from roboglot.programs.tasks.task_run import TaskRun
 from roboglot.programs.tasks.timetable import Timetable
@@ -63,7 +63,7 @@ class ProgramService:
             stores,
             self.library,
             self._lock,
-            terms=RunTerms(limits or Limits(), zone),
+            settings=RunSettings(limits or Limits(), zone),
             ended=self._timetable.wait_again,
         )
         self.reports, self.log_entries, self.pace = self._runner.reports, self._runner.log_entries, self._runner.pace
@@ -71,7 +71,7 @@ class ProgramService:
         self.insights, self.log_pace = self._runner.insights, self._runner.log_pace
         self._runs = self._runner.runs
         self._fires = Background()
-        self._late = LateStops(robot, self._runs, self._fires, self.shutdown, self.suspend)
+        self._late = DeferredStops(robot, self._runs, self._fires, self.shutdown, self.suspend)
         self._turns = Turns(robot.clock, self._lock, stores.tasks, self._runner, settle(stores, robot.clock.epoch()))
 
     def start(self) -> None:
@@ -115,13 +115,13 @@ class ProgramService:
             entries = await self._store.log(id)
             return (entries + run.log.newest())[-LOG_MAX:] if run else entries
 
-    async def whereabouts(self, id: str) -> Whereabouts:
+    async def whereabouts(self, id: str) -> TaskPosition:
         """Return the current position of a task; line 0 and "" if it does not run."""
         if (run := self._runs.get(id)) is not None:
             place = (run.line, run.module, run.block, run.watched)
-            return Whereabouts(run.state, *place, began=run.started, variables=run.variables)
+            return TaskPosition(run.state, *place, began=run.started, variables=run.variables)
         task = await self._store.get(id)
-        return Whereabouts(TaskState(task.state) if task else TaskState.NULL)
+        return TaskPosition(TaskState(task.state) if task else TaskState.NULL)
 
     def running(self) -> list[RunFigures]:
         """Return the resources of all running or suspended tasks, by id."""

@@ -35,8 +35,8 @@ from roboglot.programs.tasks.control import ControlWatch
 from roboglot.programs.tasks.process_time import ProcessTime
 from roboglot.programs.tasks.replay import Replay
 from roboglot.programs.tasks.reports import (
-    Audience,
     Insight,
+    Listeners,
     LogListener,
     NewestRun,
     Pace,
@@ -73,7 +73,7 @@ class RunListeners:
     report: Report
     logged: LogListener
     at_breakpoint: Callable[[], Awaitable[None]]
-    insights: Audience[[Insight]]
+    insights: Listeners[[Insight]]
     pace: Pace
     log_pace: Pace
 

@@ -18,7 +18,7 @@ from roboglot.programs.worker.environment import build_builtins
 from roboglot.programs.worker.frames import ERROR_MAX
 from roboglot.programs.worker.link import EXIT_MEMORY, HALT, NOTHING, HostLink
 from roboglot.programs.worker.modules import build_modules
-from roboglot.programs.worker.position import Whereabouts
+from roboglot.programs.worker.position import PositionMemory
 from roboglot.programs.worker.prelude import Prelude
 from roboglot.programs.worker.roots import build_enums, build_roots
 from roboglot.programs.worker.variables import UNIT, Variables
@@ -31,7 +31,7 @@ _OWN_DEPTH = 16
 _REHEARSED, _REHEARSED_MAX = 32, 4096  # calls, and bytes of one
 
 
-def main(descriptor: int, whereabouts: Whereabouts) -> int:
+def main(descriptor: int, positions: PositionMemory) -> int:
     """Serve the one request on the socket; return the exit code. The jail is already closed."""
     link = HostLink(descriptor)
     reserve = bytearray(_RESERVE)  # released when memory runs out, so that the report can still be written
@@ -43,11 +43,11 @@ def main(descriptor: int, whereabouts: Whereabouts) -> int:
             used = uses(request["source"], functions)
             link.send({"t": "checked", "problems": [_plain(problem) for problem in problems], "uses": used})
         else:
-            link.send(_run(link, request, whereabouts))
+            link.send(_run(link, request, positions))
     except MemoryError as error:
         unit, number = _place(error)
         error.__traceback__ = None  # its frames hold the data that filled the memory
-        whereabouts.forget()
+        positions.forget()
         del reserve
         gc.collect()
         link.send(_failure("MemoryError", "the program used more memory than it may", unit, number))
@@ -55,9 +55,9 @@ def main(descriptor: int, whereabouts: Whereabouts) -> int:
     return EXIT_DONE
 
 
-def probe(whereabouts: Whereabouts) -> int:
+def probe(positions: PositionMemory) -> int:
     """Probe the lockdown in a throw-away child; return 0 if the filter works and lines can be reported."""
-    if not whereabouts.works():
+    if not positions.works():
         return EXIT_UNTOLD
     for attempt in (partial(os.open, "/", os.O_RDONLY), os.fork, os.getppid):
         try:
@@ -89,17 +89,17 @@ def _plain(problem: Problem) -> list[object]:
     return [problem.line, problem.column, str(problem.kind), problem.english, problem.chinese]
 
 
-def _run(link: HostLink, request: dict[str, Any], whereabouts: Whereabouts) -> dict[str, Any]:
+def _run(link: HostLink, request: dict[str, Any], positions: PositionMemory) -> dict[str, Any]:
     units: list[CodeType] = []
-    whereabouts.lay_out(Places(request["units"]))
+    positions.lay_out(Places(request["units"]))
     variables = Variables(link.send)
 
     def halt() -> None:
         variables.report()
         link.call(HALT)
 
-    cell = whereabouts.watched(halt) if request["watched"] else whereabouts.cell
-    marks = Marks(cell, whereabouts.mark)
+    cell = positions.watched(halt) if request["watched"] else positions.cell
+    marks = Marks(cell, positions.mark)
     for number, source in enumerate(request["units"]):
         built = compile_unit(source, f"{UNIT}{number}>", number, marks, policy=request["policy"])
         if isinstance(built, list):
@@ -108,7 +108,7 @@ def _run(link: HostLink, request: dict[str, Any], whereabouts: Whereabouts) -> d
             return _failure(kind, first.english, number, first.line)
         units.append(built)
     if request["watched"]:
-        whereabouts.settle()
+        positions.settle()
     scope = _globals(link, request, variables.before(link.call) if request["watched"] else link.call)
     variables.hide(scope)
     # Modules first, the program (unit 0) last; all share one namespace, as the vendor's programs expect.

@@ -19,7 +19,7 @@ _ITEMS = ctypes.sizeof(ctypes.c_ssize_t) * 2 + ctypes.sizeof(ctypes.c_void_p)
 """Offset of the address of a list's items, bytes: after reference count, type and size."""
 
 
-class Whereabouts:
+class PositionMemory:
     """The worker's end of the shared memory of ``Places.memory()`` bytes. Lives as long as the process."""
 
     def __init__(self, memory: mmap.mmap) -> None:

@@ -26,7 +26,7 @@ from typing import Any
 
 from roboglot.programs.worker import child, lockdown
 from roboglot.programs.worker.frames import CONTROL_MAX
-from roboglot.programs.worker.position import Whereabouts
+from roboglot.programs.worker.position import PositionMemory
 from roboglot.programs.worker.seccomp import SOCKET_FD, SeccompUnavailable
 
 _DESCRIPTORS = 2
@@ -121,10 +121,10 @@ class Zygote:
         try:
             signal.set_wakeup_fd(-1)
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            whereabouts = Whereabouts(mmap.mmap(memory, 0))
+            positions = PositionMemory(mmap.mmap(memory, 0))
             _keep_only(connection)
             lockdown.confine_program(self._libc, parent, used, quota, self._filter)
-            status = child.main(SOCKET_FD, whereabouts)
+            status = child.main(SOCKET_FD, positions)
         finally:
             os._exit(status)
 
@@ -159,7 +159,7 @@ class Zygote:
                 lockdown.confine_program(
                     self._libc, parent, used, lockdown.Quota(_PROBE_MEMORY, _PROBE_CPU), self._filter
                 )
-                status = child.probe(Whereabouts(mmap.mmap(-1, mmap.PAGESIZE)))
+                status = child.probe(PositionMemory(mmap.mmap(-1, mmap.PAGESIZE)))
             except OSError as error:
                 status = min(error.errno or child.EXIT_BROKEN, 255)
             finally:

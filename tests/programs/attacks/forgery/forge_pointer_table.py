@@ -1,6 +1,6 @@
 import ctypes, gc
 for thing in gc.get_objects():
-    if type(thing).__name__ == "Whereabouts":
+    if type(thing).__name__ == "PositionMemory":
         table = thing._table
         for i in range(len(table)):
             table[i] = table[0]

@@ -69,7 +69,7 @@ RESULT_MOTIONS: tuple[tuple[str, int, Motion], ...] = (
 )
 
 
-class Leash:
+class LeashWalk:
     """Walking on a leash, until the program ends."""
 
     def __init__(self, session: Session) -> None:
@@ -111,6 +111,6 @@ async def walk_the_dog(session: Session, front_leg_lift: float = 0.03, back_leg_
         if legs.posture is not Posture.STANDING:
             await session.complete(legs.stand(source=session.source))
         legs.walk(Gait.TROT_PASSIVE, FootLift(front_leg_lift, back_leg_lift))
-        session.part(Leash)
+        session.part(LeashWalk)
 
     return await result(session, LEASH, do(), wrong)

@@ -28,7 +28,7 @@ WORDS = tuple(
 )
 
 
-class Ear:
+class SpeechListener:
     """Speech of people, kept from the first use until the program ends."""
 
     def __init__(self, session: Session) -> None:
@@ -86,7 +86,7 @@ async def voiceprint_recognized(
         _check("duration", duration, 1, 30)
         _check("sensitivity", sensitivity, 0, SENSITIVITY_MAX)
         wanted = _named(session.robot, names)
-        ear, since, left = session.part(Ear), session.robot.clock.time() - sensitivity, duration
+        ear, since, left = session.part(SpeechListener), session.robot.clock.time() - sensitivity, duration
         while not _enough(heard.keys(), wanted, everyone) and left > 0:
             await session.sleep(LOOK_EVERY)
             left -= LOOK_EVERY
@@ -111,7 +111,7 @@ async def training_words_recognized(session: Session, timeout: int = 5) -> Recor
     """Wait until one of these words is said (5 to 300 s); without one in time, it is empty: no failure."""
     outcome, word = state(), Record("MsgTrainingWords")
     try:
-        left, since, ear = usable(timeout), session.robot.clock.time(), session.part(Ear)
+        left, since, ear = usable(timeout), session.robot.clock.time(), session.part(SpeechListener)
         while not word.fields and left > 0:
             await session.sleep(LOOK_EVERY)
             left -= LOOK_EVERY

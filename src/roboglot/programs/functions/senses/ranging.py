@@ -54,7 +54,7 @@ def _single(session: Session, name: str) -> Record:
     return Record("SingleTofPayload", fields)
 
 
-class RangesOn:
+class EnabledRangeSensors:
     """Keeps the range sensors on while a program that reads them runs."""
 
     def __init__(self, session: Session) -> None:
@@ -76,7 +76,7 @@ class RangesOn:
 @ABILITIES.on("cyberdog.ultrasonic.data", needs=(RangeSensors,))
 async def ultrasonic(session: Session) -> Record:
     """Current Range (attribute), m; inf without an echo; the defaults before the first measurement."""
-    reading = session.part(RangesOn).reading()
+    reading = session.part(EnabledRangeSensors).reading()
     if reading is None:
         return Record("Range")
     return Record(
@@ -95,7 +95,7 @@ async def ultrasonic(session: Session) -> Record:
 @ABILITIES.on("cyberdog.ultrasonic.get_data", needs=(RangeSensors,))
 async def next_ultrasonic(session: Session, timeout: int = 5) -> Record:
     """Return the next Range, or the last known one after ``timeout`` seconds."""
-    ranges = session.part(RangesOn)
+    ranges = session.part(EnabledRangeSensors)
 
     def stamp() -> float:
         reading = ranges.reading()

@@ -23,7 +23,7 @@ MINUTE = 60.0
 DEVICE_LIFETIME = 365 * 86_400.0  # s; a log-in renews it
 
 
-class Shown(msgspec.Struct, forbid_unknown_fields=True):
+class Credentials(msgspec.Struct, forbid_unknown_fields=True):
     """Credentials of a person: ``name`` and ``password``, or a ``token``, or a ``name`` and a class's ``code``."""
 
     name: Annotated[str, msgspec.Meta(max_length=64)] = ""
@@ -32,7 +32,7 @@ class Shown(msgspec.Struct, forbid_unknown_fields=True):
     code: Annotated[str, msgspec.Meta(max_length=12)] = ""
 
 
-class Signing:
+class Login:
     """Log-in and log-out of one console."""
 
     def __init__(self, desk: Desk, sessions: Sessions, classes: Classes) -> None:
@@ -51,34 +51,34 @@ class Signing:
             await self._sessions.end(cookie_of(scope))
             await answer_json(send, {"name": ""}, 200, [set_cookie(name, "", secure=secure)])
             return True
-        shown = await read_as(receive, Shown)
+        credentials = await read_as(receive, Credentials)
         device = read_cookie(scope["headers"], f"{name}-device")
-        token, answer = await self._sign_in(address_of(scope), shown, device)
+        token, answer = await self._sign_in(address_of(scope), credentials, device)
         if not token:  # the pupil belongs to another world
             await answer_json(send, answer)
             return True
         await self._sessions.end(cookie_of(scope))  # a session that others may know ends
         cookies = [set_cookie(name, token, secure=secure)]
-        if shown.password and (mark := self._device(answer, device)):
+        if credentials.password and (mark := self._device(answer, device)):
             cookies.append(
                 set_cookie(f"{name}-device", mark, secure=secure, path=SIGN_IN, lifetime=DEVICE_LIFETIME),
             )
         await answer_json(send, answer, 200, cookies)
         return True
 
-    def _device(self, answer: dict[str, object], shown: str) -> str:
+    def _device(self, answer: dict[str, object], mark: str) -> str:
         admission = admission_of(self._desk)
-        return admission.device(str(answer["name"]), shown) if admission is not None else ""
+        return admission.device(str(answer["name"]), mark) if admission is not None else ""
 
-    async def _sign_in(self, address: str, shown: Shown, device: str) -> tuple[str, dict[str, object]]:
-        if shown.code:
-            return await self._join(address, shown)
+    async def _sign_in(self, address: str, credentials: Credentials, device: str) -> tuple[str, dict[str, object]]:
+        if credentials.code:
+            return await self._join(address, credentials)
         admission = admission_of(self._desk)
         if admission is None:
             raise Problem(409, "no sign-in is needed here: access is not switched on")
-        if not (shown.token or (shown.name and shown.password)):
+        if not (credentials.token or (credentials.name and credentials.password)):
             raise Problem(400, "give a name and a password, or a token, or a name and a code")
-        proof = Proof(ProofKind.HTTP, _header(shown))
+        proof = Proof(ProofKind.HTTP, _header(credentials))
         try:
             who = await admission.admit(address, proof._replace(device=device))
         except LockedOut as locked:
@@ -87,11 +87,11 @@ class Signing:
             raise Problem(401, str(unknown)) from None
         return await self._sessions.open(proof, who), {"name": who}
 
-    async def _join(self, address: str, shown: Shown) -> tuple[str, dict[str, object]]:
+    async def _join(self, address: str, credentials: Credentials) -> tuple[str, dict[str, object]]:
         host = address.rpartition(":")[0]
         if not self._tries.take(host):
             raise Problem(429, "too many wrong codes from your address: wait a minute")
-        seat = await self._classes.join(shown.code, shown.name)
+        seat = await self._classes.join(credentials.code, credentials.name)
         self._tries.give_back(host)
         if isinstance(seat, Elsewhere):
             return "", {"elsewhere": seat.page, "code": seat.code, "name": seat.name}
@@ -100,8 +100,9 @@ class Signing:
         return token, answer | ({"studio": seat.code} if seat.studio else {})
 
 
-def _header(shown: Shown) -> str:
+def _header(credentials: Credentials) -> str:
     """Return the credentials as an Authorization header."""
-    if shown.token:
-        return f"Bearer {shown.token.strip()}"
-    return "Basic " + base64.b64encode(f"{shown.name}:{shown.password}".encode("utf-8", "surrogatepass")).decode()
+    if credentials.token:
+        return f"Bearer {credentials.token.strip()}"
+    pair = f"{credentials.name}:{credentials.password}".encode("utf-8", "surrogatepass")
+    return "Basic " + base64.b64encode(pair).decode()

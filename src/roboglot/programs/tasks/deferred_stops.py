@@ -1,6 +1,7 @@
-"""Wishes to end or suspend tasks that come while a module restarts, when the manual refuses them (0.2.2.3).
+"""Requests to end or suspend tasks while a module restarts, which the manual refuses (0.2.2.3).
 
-The robot stands until the module is up; afterwards no task may move it against such a wish, so it is carried out then.
+The robot stands until the module is up. No task may move it afterwards against such a request, so it is carried out
+then.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from roboglot.programs.tasks.task_run import TaskRun
 STOPS = (TaskOperation.SHUTDOWN, TaskOperation.SUSPEND)
 
 
-class LateStops:
-    """Remembers wishes by the task's id until the restart is over."""
+class DeferredStops:
+    """Remembers requests by the task's id until the restart is over."""
 
     def __init__(
         self,
@@ -30,10 +31,10 @@ class LateStops:
         shutdown: Callable[[Collection[str], str], Awaitable[object]],
         suspend: Callable[[str], Awaitable[None]],
     ) -> None:
-        """``shutdown`` and ``suspend`` carry out a wish in ``background``."""
+        """``shutdown`` and ``suspend`` carry out a request in ``background``."""
         self._robot, self._runs, self._background = robot, runs, background
         self._shutdown, self._suspend = shutdown, suspend
-        self._wishes: dict[str, TaskOperation] = {}
+        self._requests: dict[str, TaskOperation] = {}
         self._reasons: dict[str, str] = {}
         self._leave: Callable[[], None] | None = None
 
@@ -44,8 +45,8 @@ class LateStops:
         except NotAllowed as refusal:
             if not possible or operation not in STOPS or mode_of(self._robot) is not RobotMode.SET_UP:
                 raise
-            if self._wishes.get(id) is not TaskOperation.SHUTDOWN:
-                self._wishes[id] = operation
+            if self._requests.get(id) is not TaskOperation.SHUTDOWN:
+                self._requests[id] = operation
             if self._leave is None:
                 self._leave = self._robot.events.listen(ModuleRestarted, self._restarted)
             why = f"{refusal} It is carried out as soon as the module is up again."
@@ -53,20 +54,20 @@ class LateStops:
 
     def give_reason(self, ids: Collection[str], why: str) -> None:
         """Note the last line of the logs of tasks that are to end; empty: the usual one."""
-        self._reasons |= {id: why for id in ids if id in self._wishes and why}
+        self._reasons |= {id: why for id in ids if id in self._requests and why}
 
     def close(self) -> None:
-        """Forget all wishes."""
-        self._wishes, self._reasons = {}, {}
+        """Forget all requests."""
+        self._requests, self._reasons = {}, {}
         if self._leave is not None:
             self._leave()
             self._leave = None
 
     def _restarted(self, _: ModuleRestarted) -> None:
-        wishes, reasons = self._wishes, self._reasons
+        requests, reasons = self._requests, self._reasons
         self.close()
-        for id, wish in wishes.items():
-            if wish is TaskOperation.SUSPEND:
+        for id, request in requests.items():
+            if request is TaskOperation.SUSPEND:
                 self._background.add(_tried(self._suspend(id)), f"suspend {id}")
                 continue
             if (run := self._runs.get(id)) is not None:  # at once: the base may move again
@@ -75,7 +76,7 @@ class LateStops:
             self._background.add(_tried(self._shutdown([id], reasons.get(id, ""))), f"end {id}")
 
 
-async def _tried(wish: Awaitable[object]) -> None:
-    """Carry out a wish, unless its task has ended by itself."""
+async def _tried(request: Awaitable[object]) -> None:
+    """Carry out a request, unless its task has ended by itself."""
     with suppress(ProgramError):
-        await wish
+        await request
