@@ -25,7 +25,7 @@ from roboglot.protocols import DOORS, sections
 def test_defaults() -> None:
     config = load_config(None, {}, sections())
     assert config.robots == (RobotConfig("a", "universal", "127.0.0.1"),)
-    ports = {door.name: [*door.numbers(config).values()] for door in DOORS}
+    ports = {door.name: [*door.port_numbers(config).values()] for door in DOORS}
     assert ports == {
         "slamware": [1448],
         "robomaster": [40923, 40921, 40922, 40925],
@@ -80,7 +80,7 @@ def test_address_moves_first_robot_of_a_file(tmp_path: Path) -> None:
     [
         ("worldx = 'office'", r"^/.*\.toml: worldx is not a setting"),
         ("[[robots]]\naddress = '300.1.1.1'", "robot a: 300.1.1.1 is not an address"),
-        ("address = '127.0.0.5'", r"address is a setting of one robot: it stands below \[\[robots\]\]"),
+        ("address = '127.0.0.5'", r"address is a setting of one robot: it belongs below \[\[robots\]\]"),
         ("[slamware]\nprt = 1", r"slamware\.prt is not a setting"),
         ("[[robots]]\nnamex = 'a'", r"robots\.namex is not a setting"),
         ("[[robots]]\nstart = {x = 1, y = 1, yw = 2}", r"robots\.start\.yw is not a setting; did you mean 'yaw'"),

@@ -173,7 +173,7 @@ class RecordConfig:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """Everything ``roboglot up`` needs. ``speed`` is the clock's; ``lockstep`` stops it until it is advanced.
+    """Everything that ``roboglot up`` needs. ``speed`` of the clock; ``lockstep``: it stands until it is advanced.
 
     ``doors``: the doors' own sections by name; missing ones have their defaults.
     ``database``: URL of a PostgreSQL server for the robots' stored data, for a fleet on several machines; without it,
@@ -204,7 +204,7 @@ class Config:
             host_and_port(self.access.gateway, "access.gateway")
 
     @property
-    def opened(self) -> tuple[RobotConfig, ...]:
+    def exposed(self) -> tuple[RobotConfig, ...]:
         """The robots that other machines can reach."""
         return tuple(robot for robot in self.robots if not is_loopback(robot.address))
 
@@ -232,8 +232,8 @@ def refuse_unguarded(config: Config) -> None:
         raise ValueError(
             f"others could open the console on {config.console.address} and drive every robot. Use 127.0.0.1, {REMEDY}"
         )
-    if config.opened and not guarded:
-        listed = ", ".join(f"{robot.name} on {robot.address}" for robot in config.opened)
+    if config.exposed and not guarded:
+        listed = ", ".join(f"{robot.name} on {robot.address}" for robot in config.exposed)
         raise ValueError(
             f"others could reach robot {listed}, and its protocols require no password: everyone there could"
             f" drive it. Use an address of 127.0.0.0/8, {REMEDY}"
@@ -286,21 +286,21 @@ def config_of(
             values["access"]["tls"] = {"on": True} | values["access"]["tls"]
     for key, value in overrides.items():
         if key == "address" and value is not None:
-            values["robots"] = _moved(values.get("robots") or [{}], value)
+            values["robots"] = _with_first_at(values.get("robots") or [{}], value)
         elif value is not None:
             before = values.get(key, {})
             values[key] = before | value if isinstance(value, dict) and isinstance(before, dict) else value
-    given = {name: values.pop(name) for name in doors if name in values}
+    door_values = {name: values.pop(name) for name in doors if name in values}
     try:
         config = msgspec.convert(values, Config, dec_hook=lambda kind, value: kind(value))
     except msgspec.ValidationError as error:
         raise ValueError(f"{origin}: {why_invalid(error, wanted=Config)}") from None
-    sections = {name: _section(name, doors[name], section, origin) for name, section in given.items()}
+    sections = {name: _section(name, doors[name], section, origin) for name, section in door_values.items()}
     return dataclasses.replace(config, robots=with_addresses(config.robots), doors=sections)
 
 
-def _moved(robots: object, address: object) -> object:
-    """Return rows of robots with the first one at ``address``; other values are unchanged, and refused later."""
+def _with_first_at(robots: object, address: object) -> object:
+    """Return the tables of robots with the first one at ``address``; other values unchanged: they are refused later."""
     if isinstance(robots, list) and robots and isinstance(robots[0], dict):
         return [{**robots[0], "address": address}, *robots[1:]]
     return robots
@@ -343,7 +343,7 @@ def parse_robot(text: str) -> RobotConfig:
 
 
 def serial_of(seed: int, name: str) -> str:
-    """Return the serial number of a robot that is given none."""
+    """Return the serial number of a robot whose configuration has none."""
     return f"RG-{seed:04d}-{name}"
 
 
@@ -392,7 +392,7 @@ def _refuse_unknown(
     for key, value in values.items():
         if key not in fields:
             if not prefix and key in {field.name for field in dataclasses.fields(RobotConfig)}:
-                raise ValueError(f"{key} is a setting of one robot: it stands below [[robots]]")
+                raise ValueError(f"{key} is a setting of one robot: it belongs below [[robots]]")
             raise ValueError(f"{prefix + key} is not a setting{instead(key, fields)}")
         nested = {"robots": RobotConfig, "start": StartConfig}.get(key, fields[key])
         for entry in value if isinstance(value, list) else [value]:

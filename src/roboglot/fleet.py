@@ -1,4 +1,4 @@
-"""Builds robots from the configuration: body from simulation or driver, memory from storage, skills from autonomy.
+"""Builds robots from the configuration: bodies from simulation or drivers, memory from storage, skills from autonomy.
 
 Knows no door and no socket.
 """
@@ -58,13 +58,13 @@ from roboglot.values import dataclass
 if TYPE_CHECKING:
     from roboglot.recording.files import Origin
 
-UNKNOWN = Description(  # of a real robot until its first report; the footprint of a medium one
+UNKNOWN = Description(  # description of a real robot until its first report, with the footprint of a medium one
     maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3
 )
 SECRET = re.compile("token|password|secret", re.IGNORECASE)  # names of settings that are omitted from recordings
 URL_LOGIN = re.compile("(://)[^/@]*@")  # the credentials in a URL
 STEP = 0.1  # s per step while robots brake on a lockstep clock
-BREATH = 0.001  # real s for sockets between two steps
+STEP_PAUSE = 0.001  # real s between two steps, for sockets
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +77,10 @@ class Fleet:
     _drivers: Sequence[Driver] = ()
 
     async def start(self, *, wait: bool) -> None:
-        """Let the world run. ``wait``: only after every skill is ready (lockstep); otherwise skills follow soon after.
+        """Connect real robots, start the skills, and let the world run.
 
-        Real robots that cannot be reached are connected when they can.
+        ``wait``: the world runs only once every skill is ready (lockstep); otherwise skills become ready meanwhile.
+        Real robots that cannot be reached now are connected as soon as they can.
         """
         await asyncio.gather(*(self._connect(driver, wait=wait) for driver in self._drivers))
         for autonomy in self._autonomies:
@@ -97,18 +98,18 @@ class Fleet:
         for autonomy in self._autonomies:  # first, or deliveries would continue with the next order
             await autonomy.close()
         clock = next(iter(self.robots.values())).clock
-        await _settled(clock, *(robot.actions.cancel(reason="shutting down") for robot in self.robots.values()))
-        await _settled(clock, *(driver.close() for driver in self._drivers))
+        await _wait_for(clock, *(robot.actions.cancel(reason="shutting down") for robot in self.robots.values()))
+        await _wait_for(clock, *(driver.close() for driver in self._drivers))
         self.world.close()
 
 
-async def _settled(clock: Clock, *endings: Awaitable[object]) -> None:
-    """Wait for ``endings``, which may take robot time; a lockstep clock is advanced, as no other task does it now."""
-    together = asyncio.gather(*endings)
-    while isinstance(clock, LockstepClock) and not together.done():
+async def _wait_for(clock: Clock, *endings: Awaitable[object]) -> None:
+    """Wait for ``endings``, which may take robot time: advance a lockstep clock, which no other task does any more."""
+    all_ended = asyncio.gather(*endings)
+    while isinstance(clock, LockstepClock) and not all_ended.done():
         await clock.advance(STEP)
-        await asyncio.wait((together,), timeout=BREATH)
-    await together
+        await asyncio.wait((all_ended,), timeout=STEP_PAUSE)
+    await all_ended
 
 
 def clock_of(config: Config) -> Clock:
@@ -124,14 +125,14 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
     """Build all robots of the configuration in ``world`` (a name or path). Raises ValueError in plain words."""
     placements = [_placement(robot) for robot in robots if robot.is_simulated]
     simulated = World(load_world(world), placements, clock=clock, seed=seed)
-    in_order = isinstance(clock, LockstepClock)  # time waits for every answer
-    fairness = None if in_order else Fairness(perf_counter, thread_time)
+    lockstep = isinstance(clock, LockstepClock)  # time waits for every answer: no client slows down another
+    fairness = None if lockstep else Fairness(perf_counter, thread_time)
     built, drivers = dict[str, Robot](), Drivers(own=frozenset(robot.address for robot in robots))
     for config in robots:
         with concerning(config.name):
             if config.is_real:
                 robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
-                drivers.drive(robot, config.body)
+                drivers.add(robot, config.body)
             elif config.recording:
                 robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
                 robot.stand_in = _stand_in(config.recording, clock)
@@ -166,10 +167,10 @@ def _stand_in(place: str, clock: Clock) -> StandIn:
     return open_playback(place, clock)
 
 
-def origin_of(config: Config, version: str, *, remembers: bool = False) -> Origin:
+def origin_of(config: Config, version: str, *, has_data: bool = False) -> Origin:
     """Return the origin of a recording: settings, seed, versions, and the files that the settings name.
 
-    ``remembers``: the robots have stored maps, programs or settings from before.
+    ``has_data``: there are maps, programs or settings of the robots from earlier runs.
     """
     from roboglot.recording.files import Attachment, Origin
 
@@ -180,7 +181,7 @@ def origin_of(config: Config, version: str, *, remembers: bool = False) -> Origi
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "world": config.world,
         "seed": str(config.seed),
-        "data": "kept" if remembers else "new",
+        "data": "kept" if has_data else "new",
         "clock": "lockstep" if config.lockstep else f"x{config.speed:g}",
         "robots": json.dumps({robot.name: _without_secrets(robot.body) for robot in config.robots}),
     }

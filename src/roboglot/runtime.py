@@ -63,13 +63,13 @@ class Runtime:
     def __init__(
         self, config: Config, doors: tuple[DoorType, ...] = DOORS, *, class_home: ClassHome | None = None
     ) -> None:
-        """``class_home``: the classroom that this world shares with others."""
+        """``class_home``: a classroom that this world shares with others; None: a classroom of its own."""
         refuse_unguarded(config)
         self.config, self._class_home = config, class_home
         self._lock = lock_folder(config.data)
         self.clock = clock_of(config)
         file, names = config.data / "roboglot.db", [robot.name for robot in config.robots]
-        self._remembers = file.exists() or bool(config.database)
+        self._has_data = file.exists() or bool(config.database)
         self._database = open_database(file, config.database, names, in_place=config.lockstep)
         limits = dataclasses.asdict(config.programs)
         self._memory_together = limits.pop("memory_together")
@@ -80,7 +80,7 @@ class Runtime:
         )
         self._registry: Transactions | None = None
         self._registry_lease = self._join_registry()
-        self._shared: Transactions | None = None  # shared by all robots, on the server
+        self._access_database: Transactions | None = None  # on a server: the list of people and the audit
         self.guard = self._build_guard() if config.access.on else None
         self._gateway: Gateway | None = None
         self._tls = self._build_tls()
@@ -89,7 +89,7 @@ class Runtime:
         )
         self._recorder: Recorder | None = None
         self._record_server = RecordServer(config.data, lambda: self.recorder)
-        self._types = doors
+        self._door_types = doors
         self._programs: dict[str, Programs] = {}
         self._rehearsals = Rehearsals(memory_together=self._memory_together)
         self.doors = {robot.name: self._build_doors(robot, self.fleet.robots[robot.name]) for robot in config.robots}
@@ -114,18 +114,18 @@ class Runtime:
         return registry_lease
 
     def _build_guard(self) -> Guard:
-        """Return the guard of all doors; its list is stored with the robots' data. Raises OSError, ValueError."""
+        """Return the guard of all doors. Its list is a file, or in the robots' database. Raises OSError, ValueError."""
         from roboglot.access.guard import Guard
         from roboglot.access.store import FILE
 
         database = self.config.database
         if database and self._registry is not None and self.config.registry in ("", database):
-            self._shared = self._registry
+            self._access_database = self._registry
         elif database:
-            self._shared = open_registry(database)
+            self._access_database = open_registry(database)
         if database and (unused := self.config.data / FILE).exists():
             log.warning("the list of people in %s is not used, but the database's: see `roboglot access copy`", unused)
-        return Guard(self.config.data, self.config.access, self.fleet.robots, shared=self._shared)
+        return Guard(self.config.data, self.config.access, self.fleet.robots, shared=self._access_database)
 
     @property
     def recorder(self) -> Recorder:
@@ -134,7 +134,7 @@ class Runtime:
             from roboglot.recording.recorder import Recorder
 
             stage = self.fleet.world.stage
-            origin = origin_of(self.config, own_version(), remembers=self._remembers)
+            origin = origin_of(self.config, own_version(), has_data=self._has_data)
             inputs = self.fleet.world.inputs
             self._recorder = Recorder(self.config.record, self.fleet.robots, stage, self.clock, origin, inputs)
         return self._recorder
@@ -152,7 +152,7 @@ class Runtime:
         services: list[ProgramService] = []
 
         def programs(zone: tzinfo, filter_required: bool) -> ProgramService:
-            engine = self._engine_with(filter_required)
+            engine = self._shared_engine(filter_required)
             service = ProgramService(robot, engine, stores, limits=self._limits, zone=zone)
             services.append(service)
             return service
@@ -164,13 +164,13 @@ class Runtime:
         access = self.config.access
         people = Path(access.people) if access.on and access.people else None
         site = Site(robot, config.address, self.config.data, programs, clouds, self._tls, people=people)
-        doors = open_doors(site, self.config, self._types)
+        doors = open_doors(site, self.config, self._door_types)
         if services and site.frames is not None:
             self._programs[robot.id] = Programs(robot, site.frames, services[-1])
         return RobotDoors(robot, doors)
 
-    def _engine_with(self, filter_required: bool) -> Engine:
-        """Return the engine that all robots share, made for the first door that runs programs."""
+    def _shared_engine(self, filter_required: bool) -> Engine:
+        """Return the engine that all robots share; the first door that runs programs decides on its filter."""
         if self._engine is None:
             self._engine = Engine(filter_required=filter_required, memory_together=self._memory_together)
         return self._engine
@@ -183,10 +183,10 @@ class Runtime:
 
         config, (host, port) = self.config, host_and_port(self.config.access.gateway, "access.gateway")
 
-        def numbers(kind: PortKind) -> tuple[int, ...]:
-            return tuple(number for door in self._types for number in door.numbers(config, kind).values())
+        def ports(kind: PortKind) -> tuple[int, ...]:
+            return tuple(number for door in self._door_types for number in door.port_numbers(config, kind).values())
 
-        tcp, pushes, broadcasts, apps = map(numbers, (PortKind.TCP, PortKind.PUSH, PortKind.BROADCAST, PortKind.APP))
+        tcp, pushes, broadcasts, apps = map(ports, (PortKind.TCP, PortKind.PUSH, PortKind.BROADCAST, PortKind.APP))
         robots = {
             robot.name: (self.fleet.robots[robot.name], Ports(robot.address, tcp, pushes, broadcasts, apps))
             for robot in config.robots
@@ -221,7 +221,7 @@ class Runtime:
     def build_desk(self) -> Desk:
         """Return the desk of a console."""
 
-        def listed() -> dict[str, Sequence[Endpoint]]:
+        def endpoints() -> dict[str, Sequence[Endpoint]]:
             return {name: doors.endpoints for name, doors in self.doors.items()}
 
         bodies = {robot.name: robot.body for robot in self.config.robots}
@@ -230,10 +230,10 @@ class Runtime:
         folders = (FOLDER, data / "lessons")
         studio = Studio(self._programs, self._rehearsals, self._scene_of, folders, data / "classes", home)
 
-        def running() -> int:
+        def running_programs() -> int:
             return 0 if self._engine is None else self._engine.running
 
-        desk = Desk(world, self.fleet.robots, self.fleet.world.stage, listed, studio, running)
+        desk = Desk(world, self.fleet.robots, self.fleet.world.stage, endpoints, studio, running_programs)
         desk.recordings = Recordings(self.config.data, lambda: self.recorder)
         desk.sessions = data / "sessions.db" if self.guard is not None else None
         return desk
@@ -297,8 +297,8 @@ class Runtime:
             self.guard.close()
         if self._registry is not None:
             self._registry.close()
-        if self._shared is not None and self._shared is not self._registry:
-            self._shared.close()
+        if self._access_database is not None and self._access_database is not self._registry:
+            self._access_database.close()
         self._database.close()
         os.close(self._lock)
 

@@ -108,7 +108,7 @@ async def test_a_mirror_changes_nothing(
 ) -> None:
     robot[Light].shine("left", Colour(1, 2, 3))
     mirrored, drivers = Robot("mirrored", UNKNOWN, clock), Drivers(touches=False)
-    drivers.drive(mirrored, f"slamware://127.0.0.1:{door.port}")
+    drivers.add(mirrored, f"slamware://127.0.0.1:{door.port}")
     (driver,) = drivers.all
     await driver.start(wait=True)
     await forward(seconds=3)

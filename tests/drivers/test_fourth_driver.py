@@ -134,4 +134,4 @@ async def test_a_fourth_driver_is_a_value(cart: tuple[Cart, str], drive: Drive, 
 
 def test_options_that_driver_does_not_name_are_refused(cart: tuple[Cart, str], clock: LockstepClock) -> None:
     with pytest.raises(ValueError, match="unknown options: size"):
-        Drivers().drive(Robot("b", UNKNOWN, clock), f"{cart[1]}&size=3")
+        Drivers().add(Robot("b", UNKNOWN, clock), f"{cart[1]}&size=3")

@@ -52,7 +52,7 @@ def test_one_owner_for_each_connection() -> None:
 )
 def test_other_urls_are_refused_in_plain_words(url: str, words: str, clock: LockstepClock) -> None:
     with pytest.raises(ValueError, match=words):
-        Drivers().drive(Robot("b", UNKNOWN, clock), url)
+        Drivers().add(Robot("b", UNKNOWN, clock), url)
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def _obstacle(address: str, out: Path) -> str:
             out.unlink()
     except OSError as error:
         return f"{out} cannot be written: {error.strerror}; choose another file with --out"
-    for port in (port for door in DOORS for port in door.numbers(Config()).values()):
+    for port in (port for door in DOORS for port in door.port_numbers(Config()).values()):
         if holder := holder_of(address, port):
             return f"{address}:{port} is taken by {holder}; stop it, or choose another place with --address 127.0.0.2"
     return ""

@@ -81,7 +81,7 @@ def examine_ports(config: Config) -> Iterator[Finding]:
     """Check that the first robot's ports are free, or held by a running roboglot."""
     address = config.robots[0].address
     for door in DOORS:
-        for label, number in door.numbers(config).items():
+        for label, number in door.port_numbers(config).items():
             yield _port(f"{label} port", address, number)
 
 

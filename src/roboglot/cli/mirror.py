@@ -48,7 +48,7 @@ def command(
 async def _mirror(url: str, once: bool) -> int:
     robot, drivers = Robot("mirrored", UNKNOWN, RealClock()), Drivers(touches=False)
     try:
-        drivers.drive(robot, url)
+        drivers.add(robot, url)
     except ValueError as error:
         print(f"roboglot mirror: {error}", file=sys.stderr)
         return 1

@@ -20,7 +20,7 @@ def warn_if_open(config: Config) -> None:
     """Warn in red, on standard error, of open doors; not for robots on loopback or with access control."""
     if config.access.on:
         return
-    for robot in config.opened:
+    for robot in config.exposed:
         everywhere = robot.address in ("0.0.0.0", "::")
         where = "every network of this machine" if everywhere else f"the network of {robot.address}"
         danger = typer.style("INSECURE", fg="red", bold=True)

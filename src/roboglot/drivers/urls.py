@@ -28,7 +28,7 @@ class Drivers:
         """The drivers made so far."""
         return self._made
 
-    def drive(self, robot: Robot, url: str) -> None:
+    def add(self, robot: Robot, url: str) -> None:
         """Give the bare ``robot`` the components of the real one at ``url``. Raises ValueError for a bad URL.
 
         ``slamware://HOST[:PORT]``, ``robomaster://HOST[:PORT]``, ``robomaster://discover``, and

@@ -15,11 +15,11 @@ from roboglot.protocols.turns import Turns
 from roboglot.values import dataclass
 
 Send = Callable[[str], None]
-Room = Callable[[], Awaitable[None]]
+Drain = Callable[[], Awaitable[None]]
 
 
 class Carrier(Protocol):
-    """The connection of one client, as its session sees it."""
+    """The connection of one client, as its session uses it."""
 
     @property
     def name(self) -> str:
@@ -40,7 +40,7 @@ class Carrier(Protocol):
     def send(self, message: str | bytes) -> None:
         """Send one message, a text or bytes; disconnect a client that does not read."""
 
-    async def room(self) -> None:
+    async def drain(self) -> None:
         """Wait until the client has caught up."""
 
 
@@ -77,19 +77,19 @@ class TextSession:
     def __init__(
         self,
         connection: Carrier,
-        subscribe: Callable[[Send, Room], Callable[[], None]],
+        subscribe: Callable[[Send, Drain], Callable[[], None]],
         receive: Callable[[str, Send], Awaitable[None]],
     ) -> None:
         self._send, self._receive = connection.send, receive
-        self.close = subscribe(connection.send, connection.room)
+        self.close = subscribe(connection.send, connection.drain)
 
     async def receive(self, message: str | bytes) -> None:
         """Pass the message on."""
         await self._receive(str(message), self._send)
 
 
-def texts(
-    subscribe: Callable[[Send, Room], Callable[[], None]],
+def text_channel(
+    subscribe: Callable[[Send, Drain], Callable[[], None]],
     receive: Callable[[str, Send], Awaitable[None]],
     right: Right = Right.SEE,
 ) -> Channel:
@@ -97,7 +97,7 @@ def texts(
     return Channel(lambda connection: TextSession(connection, subscribe, receive), right)
 
 
-class _Noted:
+class _NotedSession:
     """Session whose end is noted as an input."""
 
     def __init__(self, inner: Session, note: Callable[[], None]) -> None:
@@ -116,12 +116,12 @@ def noted(channel: Channel, inputs: ExternalInputs, door: str, path: str) -> Cha
     def open_noted(carrier: Carrier) -> Session:
         session = channel.open(carrier)
         inputs.note_client(CAME, door, carrier.name, path=path)
-        return _Noted(session, lambda: inputs.note_client(GONE, door, carrier.name))
+        return _NotedSession(session, lambda: inputs.note_client(GONE, door, carrier.name))
 
     return replace(channel, open=open_noted)
 
 
-class _Taking:
+class _FairSession:
     """Session whose messages wait for their turns."""
 
     def __init__(self, inner: Session, turns: Turns, stops: Callable[[str | bytes], bool]) -> None:
@@ -146,6 +146,6 @@ def taking_turns(channel: Channel, robot: Robot, stops: Callable[[str | bytes], 
     """Return the channel with fairness between clients; ``stops`` returns whether a message stops the robot."""
 
     def open_fair(carrier: Carrier) -> Session:
-        return _Taking(channel.open(carrier), Turns(robot, carrier.name), stops)
+        return _FairSession(channel.open(carrier), Turns(robot, carrier.name), stops)
 
     return replace(channel, open=open_fair)

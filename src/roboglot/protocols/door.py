@@ -210,7 +210,7 @@ class DoorType:
         reached = any(port.kind in (PortKind.TCP, PortKind.ROUTER) for port in self.ports)
         return reached and bool(getattr(self.section(config), "enabled", True))
 
-    def numbers(self, config: Config, kind: PortKind = PortKind.TCP) -> dict[str, int]:
+    def port_numbers(self, config: Config, kind: PortKind = PortKind.TCP) -> dict[str, int]:
         """Return the ports of this kind by their labels."""
         section = self.section(config)
         return {port.label: getattr(section, port.setting) for port in self.ports if port.kind is kind}

@@ -149,9 +149,9 @@ class Connection(asyncio.Protocol):
         """Let programs continue: the transport's buffer has room."""
         self.writer.resume()
 
-    async def room(self) -> None:
+    async def drain(self) -> None:
         """Wait until the client has caught up."""
-        await self.writer.room()
+        await self.writer.drain()
 
     @property
     def name(self) -> str:

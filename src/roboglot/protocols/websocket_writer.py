@@ -57,7 +57,7 @@ class Writer:
         """False while the client lags behind."""
         return self._has_room.is_set()
 
-    async def room(self) -> None:
+    async def drain(self) -> None:
         """Wait until the client has caught up."""
         await self._has_room.wait()
 

@@ -305,7 +305,7 @@ async def test_returning_app_finds_answers_but_no_old_news(clock: LockstepClock)
     wire = Wire()
     queue = FrameQueue(wire.send, clock, 0)
     queue.answer("no one asked")
-    await queue.room_for_answers()
+    await queue.drain_answers()
     queue.answer("early")
     queue.publish("missed")
     queue.open()
@@ -327,7 +327,7 @@ async def test_programs_do_not_wait_for_an_unresponsive_app(clock: LockstepClock
     queue.open()
     for number in range(2 * ROOM):
         queue.publish(str(number))
-    waiting = asyncio.ensure_future(queue.room())
+    waiting = asyncio.ensure_future(queue.drain())
     await asyncio.sleep(0.01)
     assert not waiting.done()
     wire.outcome = Delivery.SILENT

@@ -54,7 +54,7 @@ def _listeners(config: Config) -> Iterator[Finding]:
         for door in DOORS
         if door.listens(config)
         for kind in (PortKind.TCP, PortKind.ROUTER)
-        for label, number in door.numbers(config, kind).items()
+        for label, number in door.port_numbers(config, kind).items()
     ]
     if config.console.enabled:
         places.append(("console", config.console.address, config.console.port))
@@ -67,7 +67,7 @@ def _listeners(config: Config) -> Iterator[Finding]:
 
 
 def _opened(config: Config) -> Iterator[Finding]:
-    access, outside = config.access, {robot.name: robot.address for robot in config.opened}
+    access, outside = config.access, {robot.name: robot.address for robot in config.exposed}
     listed = ", ".join(f"{name} on {address}" for name, address in outside.items())
     if config.insecure:
         yield Finding(

@@ -203,7 +203,7 @@ class Session:
                 self.post(self._light)
             self._light["text"] = text
 
-    async def room(self) -> None:
+    async def drain(self) -> None:
         """Return at once: programs wait for no page."""
 
     # -- in --

@@ -81,11 +81,11 @@ class FrameQueue:
         if self._there:
             self._put(_Rank.NEWS, text)
 
-    async def room(self) -> None:
+    async def drain(self) -> None:
         """Wait for the app to catch up; returns at once if it is lost or acknowledges nothing."""
         await self._has_room.wait()
 
-    async def room_for_answers(self) -> None:
+    async def drain_answers(self) -> None:
         """Wait until another request may be answered."""
         await self._has_room_for_answers.wait()
         self._wanted_until = self._clock.time() + KEPT_SECONDS

@@ -24,13 +24,13 @@ class Plain:
 
     longest = 0
 
-    def __init__(self, send: Callable[[str], None], room: Callable[[], Awaitable[None]] = _always_room) -> None:
+    def __init__(self, send: Callable[[str], None], drain: Callable[[], Awaitable[None]] = _always_room) -> None:
         self.answer = self.publish = send
-        self._room = room
+        self._drain = drain
 
-    async def room(self) -> None:
+    async def drain(self) -> None:
         """Wait until the front end has caught up."""
-        await self._room()
+        await self._drain()
 
 
 class FrontEnds:
@@ -74,10 +74,10 @@ class FrontEnds:
 
         self._each(give)
 
-    async def room(self) -> None:
+    async def drain(self) -> None:
         """Wait until every front end has caught up."""
         for front_end in tuple(self._all):
-            await front_end.room()
+            await front_end.drain()
 
     def _each(self, give: Callable[[FrontEnd], None]) -> None:
         """Give a frame once the network lets it pass; none overtakes those before it when the network gets faster."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from roboglot.programs.tasks.reports import TaskReport
 from roboglot.programs.tasks.service import ProgramService
 from roboglot.protocols.browsers import Browsers
-from roboglot.protocols.channels import Channel, Room, Send, noted, taking_turns, texts
+from roboglot.protocols.channels import Channel, Drain, Send, noted, taking_turns, text_channel
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.protocols.visual.dispatch import Dispatch
@@ -69,7 +69,7 @@ class VisualDoor:
         self._listening = [
             leave,
             self._service.reports.join(self._report),
-            self._service.pace.join(self._front_ends.room),
+            self._service.pace.join(self._front_ends.drain),
         ]
         if (stand_in := self._service.robot.stand_in) is not None:
             self._listening.append(stand_in.join(self.name, self._play))
@@ -120,11 +120,11 @@ class VisualDoor:
     def _channels(self) -> dict[str, Channel]:
         """Return the WebSocket's channels by path; all but ``/programs`` are our own."""
 
-        def follow_frames(send: Send, room: Room) -> Callable[[], None]:
-            return self._front_ends.add(Plain(send, room))
+        def follow_frames(send: Send, drain: Drain) -> Callable[[], None]:
+            return self._front_ends.add(Plain(send, drain))
 
         found = {
-            "/programs": texts(follow_frames, lambda text, _: self._dispatch.receive(text)),
+            "/programs": text_channel(follow_frames, lambda text, _: self._dispatch.receive(text)),
             **self._side_paths.channels(),
         }
         robot = self._service.robot

@@ -14,7 +14,7 @@ from roboglot.model.errors import NotFound
 from roboglot.programs.stores import LogEntry
 from roboglot.programs.tasks import debugging
 from roboglot.programs.tasks.service import ProgramService
-from roboglot.protocols.channels import Channel, Room, Send, texts
+from roboglot.protocols.channels import Channel, Drain, Send, text_channel
 from roboglot.protocols.visual.answers import DOOR
 from roboglot.wire.visual.requests import ID_MAX
 
@@ -42,14 +42,14 @@ class SidePaths:
     def channels(self) -> dict[str, Channel]:
         """Return the channels by path."""
 
-        def follow_nothing(_send: Send, _room: Room) -> Callable[[], None]:
+        def follow_nothing(_send: Send, _drain: Drain) -> Callable[[], None]:
             return lambda: None
 
         return {
-            LOG: texts(self._follow_log, self._noted(LOG, self._send_log)),
-            WHERE: texts(follow_nothing, self._noted(WHERE, self._send_position)),
-            RUNS: texts(follow_nothing, self._noted(RUNS, self._send_runs)),
-            DEBUG: texts(follow_nothing, self._noted(DEBUG, self._debug), Right.PROGRAM),
+            LOG: text_channel(self._follow_log, self._noted(LOG, self._send_log)),
+            WHERE: text_channel(follow_nothing, self._noted(WHERE, self._send_position)),
+            RUNS: text_channel(follow_nothing, self._noted(RUNS, self._send_runs)),
+            DEBUG: text_channel(follow_nothing, self._noted(DEBUG, self._debug), Right.PROGRAM),
         }
 
     def print(self, line: str) -> None:
@@ -89,10 +89,10 @@ class SidePaths:
 
         return receive
 
-    def _follow_log(self, send: Send, room: Room) -> Callable[[], None]:
+    def _follow_log(self, send: Send, drain: Drain) -> Callable[[], None]:
         """Send every line that a program writes; programs wait for a reader that is slower than they print."""
         self._readers.append(send)
-        leave_pace = self._service.log_pace.join(room)
+        leave_pace = self._service.log_pace.join(drain)
 
         def leave() -> None:
             if send in self._readers:

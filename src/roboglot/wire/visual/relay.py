@@ -19,7 +19,7 @@ class FrontEnd(Protocol):
     def publish(self, text: str) -> None:
         """Send a report of a task."""
 
-    async def room(self) -> None:
+    async def drain(self) -> None:
         """Wait until more can be sent; programs wait for this."""
 
 

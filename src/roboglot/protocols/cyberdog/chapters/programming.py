@@ -27,5 +27,5 @@ def queue_to(app: AppLink, clock: Clock) -> FrameQueue:
 async def receive_frame(call: Call) -> None:
     """Pass the frame on, JSON or not; answers are pushes 2001. Without a relay it is dropped."""
     if call.context.relay and call.context.frames:
-        await call.context.frames.room_for_answers()
+        await call.context.frames.drain_answers()
         await call.context.relay.receive(call.text)
