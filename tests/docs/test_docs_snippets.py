@@ -79,7 +79,7 @@ async def test_perception_snippet_runs(robot: Robot, clock: LockstepClock) -> No
 @pytest.mark.world("playground")
 async def test_people_do_as_asked(robot: Robot, world: World, clock: LockstepClock) -> None:
     names: dict[str, object] = {kind.__name__: kind for kind in (Gesture, Sport, Emotion)}
-    await run(snippet("worlds/perception.md", "hands.person"), clock, world=world, **names)
+    await run(snippet("worlds/perception.md", "stage.person"), clock, world=world, **names)
 
 
 @pytest.mark.world("office", body="hermes")

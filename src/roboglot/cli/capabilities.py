@@ -154,7 +154,7 @@ def _refusals(door: DoorType, drivers: list[RobotKind]) -> list[str]:
 
 
 def _partly(door: DoorType) -> list[str]:
-    """Return a line for each request some parameters of which need a further part."""
+    """Return a line for each request with parameters that need a further part."""
     names = {row.key: row.name for row in door.contracts[0].rows()}
     found = [f"- `{names.get(str(op.key), op.key)}`: {', '.join(_names(op.some))}" for op in door.table() if op.some]
     return ["", "Some values of parameters need a part of their own:", "", *found] if found else []

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from roboglot.values import dataclass
 
-POSITION_MAX = 10_000.0  # m from the origin of its map to a place that is asked for
+POSITION_MAX = 10_000.0  # m from the origin of a map to a requested place
 
 
 def bounded(value: float, most: float) -> float:

@@ -1,6 +1,6 @@
 """Confidential values of a session, known from its fields: text that quotes them later is redacted, too.
 
-A robot's refusal names the network that was asked for, and a log the person who was greeted; their words are the
+A robot's refusal names the requested network, and a log the person who was greeted; their words are the
 vendor's, so no field says where the name is.
 """
 

@@ -263,7 +263,7 @@ def _restored(row: Sequence[object]) -> tuple[object, ...]:
 
 
 def without_password(text: str, url: str) -> str:
-    """Return an error of a database without what may be the URL's password, of which a malformed URL shows parts."""
+    """Return a database's error without parts of the password in ``url``, which errors of a malformed URL quote."""
     shown = url.partition("://")[2].rpartition("@")[0].partition(":")[2]
     secrets = [shown, *re.findall(r"password=([^&\s]+)", url)]
     pieces = {

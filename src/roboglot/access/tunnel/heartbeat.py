@@ -30,7 +30,7 @@ class Heartbeat:
     def __init__(self, now: float) -> None:
         self.heard = self._heard_beside = self._looked = now
         self.quick_until = 0.0
-        """The other end has asked for quick beats until then."""
+        """Time until which the other end wants quick heartbeats."""
         self._said = now - PING_PERIOD
         self._patient_until = 0.0
         self._looks = 0  # in a row in which the other end was silent

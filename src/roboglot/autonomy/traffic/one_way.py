@@ -20,7 +20,7 @@ OPPOSITE = -0.3  # cosine below which two drive against each other
 LONG = 0.6  # m that they must, in it
 TIE = 1.5  # s between two arrivals up to which the rule decides
 SPARE = 1.0  # s that a robot must leave it before the other comes in
-GIVEN_UP = 4.0  # s after which one that stands in it counts no more
+GIVEN_UP = 4.0  # s after which a robot that stands in it is ignored
 
 Points = NDArray[np.float64]
 

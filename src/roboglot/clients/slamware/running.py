@@ -73,7 +73,7 @@ class RunningAction:
         except SlamwareRefused as refused:
             if refused.code != GONE:
                 raise
-            self.state = ActionState(State.DONE, Result.ABORTED, "the robot knows it no more")
+            self.state = ActionState(State.DONE, Result.ABORTED, "the robot no longer knows it")
             return self.state
         self.state = reply.state
         if reply.action_name and reply.state.status is not State.DONE:

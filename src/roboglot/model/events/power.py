@@ -42,7 +42,7 @@ class Rebooted(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModuleRestarting(Event):
-    """A module (a ``Module`` value) restarts, and the rest stays up; what is asked for from now on holds."""
+    """A module (a ``Module`` value) restarts, and the rest stays up; requests from now on outlast the restart."""
 
     module: str
 

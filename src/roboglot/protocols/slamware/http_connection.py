@@ -267,7 +267,7 @@ class HttpConnection(HttpToolsProtocol):
                 self._learn(self._whole)
             self._last = self._whole
 
-    def eof_received(self) -> bool:  # type: ignore[override] # uvicorn drops the answers of one that says no more
+    def eof_received(self) -> bool:  # type: ignore[override] # uvicorn drops pending answers to a client that sends no more
         """Close after the answers under way; return True until then."""
         if not self._receiving:
             self.shutdown()

@@ -15,8 +15,8 @@ class Vda5050Config:
     """The MQTT broker, host or HOST:PORT; empty: no fleet control. ``version``: "3.0" or "2.1".
 
     Topics begin with ``interface``/v3/``manufacturer``/serial number; the serial number is the robot's own, or that of
-    ``serials`` by the robot's name. ``map`` is the mapId that orders name. ``tls`` encrypts; ``ca``: the file of the
-    certificate that the broker's is checked with, the system's without.
+    ``serials`` by the robot's name. ``map``: the mapId in orders. ``tls`` encrypts; ``ca``: file of the certificates
+    that the broker's must be signed by; empty: those of the system.
     """
 
     broker: str = ""

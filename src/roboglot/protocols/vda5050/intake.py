@@ -112,7 +112,7 @@ class Intake(asyncio.Queue["aiomqtt.Message"]):
             while self._paused < 0:
                 self._paho.loop_read()
                 if self._paho._in_messages:
-                    raise ValueError("the broker sends messages with a QoS that was not asked for")
+                    raise ValueError("the broker sends messages with a QoS that was not requested")
                 pending = getattr(self._paho.socket(), "pending", None)
                 if pending is None or not pending():
                     break

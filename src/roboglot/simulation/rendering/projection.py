@@ -13,7 +13,7 @@ from roboglot.simulation.bodies.hull import Hull, rotation
 from roboglot.values import dataclass
 
 Floats = NDArray[np.float64]
-NEAREST = 0.05  # m before the lens from which on things appear
+NEAREST = 0.05  # m in front of the lens; nearer things are not drawn
 
 
 @dataclass(frozen=True, slots=True)

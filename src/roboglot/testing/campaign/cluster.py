@@ -60,7 +60,7 @@ def play_on(
     """Play ``trials`` on the cluster ``where``, ``workers`` at a time; 0: one per processor.
 
     ``paths``: files and folders that they need. Raises KeyboardInterrupt at SIGINT, once running trials are
-    cancelled; OSError if there is no such cluster, or not any more; TooLarge.
+    cancelled; OSError if there is no such cluster, or no longer; TooLarge.
     """
     waiting: dict[Reference, _Begun] = {}
     files: object = None

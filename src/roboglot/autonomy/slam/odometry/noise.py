@@ -135,7 +135,7 @@ class LearntBias:
 
     @property
     def kept(self) -> dict[str, float]:
-        """Values to store for the next start; not the doubt of ``turn``: gyros drift anew each time."""
+        """Values to store for the next start; not the doubt of ``turn``: gyros drift differently each time."""
         doubts = {f"{name}_doubt": max(math.sqrt(self._unknown[name]), SCALE_KEPT) for name in SCALES}
         return {"turn": self.turn, "scale_x": self.scale_x, "scale_y": self.scale_y} | doubts
 

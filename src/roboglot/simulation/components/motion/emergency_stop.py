@@ -21,12 +21,12 @@ class EmergencyStopSection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SimulatedEmergencyStop(EmergencyStop):
-    """Emergency stop that cuts the drive and holds all actuators; what applications asked for ends with a restart."""
+    """Emergency stop that cuts the drive and holds all actuators; requests of applications end with a restart."""
 
     def __init__(self, base: SimulatedBase, robot: Robot) -> None:
         self._base, self._robot = base, robot
         self._engaged = self._pressed = self._released = False
-        for kind in (Rebooting, ShuttingDown):  # when it begins: what is asked for meanwhile holds
+        for kind in (Rebooting, ShuttingDown):  # at its beginning: requests made meanwhile outlast it
             robot.events.listen(kind, lambda _: self._forget())
         robot.events.listen(ModuleRestarting, self._module_restarting)
 

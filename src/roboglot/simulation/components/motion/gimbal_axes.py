@@ -217,7 +217,7 @@ class GimbalAxes:
         return unaimed and self.mode is FollowMode.CHASSIS_LEAD and not self._limp
 
     def _follow_body(self, yaw: Axis, turn: float, seconds: float) -> None:
-        """Compensate a turn of the body (rad) and return to its front; so does the kernel from now on."""
+        """Compensate a turn of the body (rad) and return to its front; the kernel does the same from now on."""
         yaw.trail(-turn, FOLLOWING, self._top_speed, seconds)
         self._resting, self._row[USE] = not yaw.position and not yaw.rate, BATCHED
 

@@ -85,7 +85,7 @@ class Transmission:
         await asyncio.gather(*self._running, *(peer.close() for peer in peers), return_exceptions=True)
 
     def _offered(self, uid: str, offer: Description) -> None:
-        """Answer an offer; one under a known uid replaces the call: the app began anew."""
+        """Answer an offer; one under a known uid replaces the call: the app started over."""
         if (old := self._peers.get(uid)) and old.offered:
             self._forget(old)
             self._begin(old.close())

@@ -194,7 +194,7 @@ async def device_information(
     is_lowpower_control: bool = False,
     uid: str | int = "",
 ) -> dict[str, object]:
-    """Return what was asked for, and always "non-standing", as real robots do."""
+    """Return the requested values, and always "non-standing", as real robots do."""
     wanted = (
         is_version,
         is_sn,

@@ -1,8 +1,8 @@
 """Chapter "system": the configuration of the machine, kept over restarts.
 
-The vendor's tool exports it in a binary format that is not public; such a file is refused. What is understood is a
-JSON object of our own: ``max_moving_speed`` (m/s) and ``max_angular_speed`` (rad/s), as which the parameters of that
-name begin after every restart, and ``disabled_sensors``, the ids of those that are always off.
+The vendor's tool exports it in a binary format that is not public; such a file is refused. Accepted
+is a JSON object of our own: ``max_moving_speed`` (m/s) and ``max_angular_speed`` (rad/s), values of these parameters
+after every restart, and ``disabled_sensors``, the ids of sensors that are always off.
 """
 
 from __future__ import annotations
