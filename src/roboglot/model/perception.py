@@ -87,7 +87,7 @@ class Sport(StrEnum):
 
 
 class TagKind(StrEnum):
-    """Printed codes that say where one is (a number), or something else (a text)."""
+    """Kind of a printed code: an AprilTag carries a number, a QR code a text."""
 
     APRIL = "april"
     QR = "qr"
@@ -105,7 +105,7 @@ class PersonSeen:
 
 @dataclass(frozen=True, slots=True)
 class FaceSeen:
-    """``print`` is what a recogniser makes of the face: keep it with a member to know the face again.
+    """``print``: the recogniser's faceprint; stored with a member, it identifies the face later.
 
     ``name``: the member's with the same print; empty for a stranger. ``age`` in years.
     """
@@ -204,7 +204,7 @@ class TagSeen:
 
 @dataclass(frozen=True, slots=True)
 class ReflectorSeen:
-    """A strip that throws the lidar's light back; strips look all the same."""
+    """A strip that throws the lidar's light back; all strips look the same."""
 
     place: Point
     distance: float

@@ -21,7 +21,7 @@ from roboglot.values import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """Something with a name that stands somewhere in the world."""
+    """Name and pose of something in the world."""
 
     name: str
     pose: Pose
@@ -53,7 +53,7 @@ class HungTag:
 
 @dataclass(frozen=True, slots=True)
 class ActiveFault:
-    """A fault that acts now; ``robot`` is None for those of the building. ``number`` clears it."""
+    """An active fault; ``robot`` is None for faults of the building. ``number`` clears it."""
 
     number: int
     kind: str
@@ -72,7 +72,7 @@ class FaultKind:
 
 @dataclass(frozen=True, slots=True)
 class FloorPlan:
-    """A floor from above: ``walls`` and ``furniture`` as closed polygons in the world's frame, m."""
+    """Plan of a floor: ``walls`` and ``furniture`` as closed polygons in the world's frame, m."""
 
     number: int
     name: str
@@ -81,7 +81,7 @@ class FloorPlan:
 
 
 class StagePerson(ABC):
-    """A person who can be directed: orders are carried out one after the other; then the person stands."""
+    """A person who can be directed: carries out calls one after the other, then stands."""
 
     @property
     @abstractmethod
@@ -95,7 +95,7 @@ class StagePerson(ABC):
 
     @abstractmethod
     def walk_to(self, x: float, y: float, *, speed: float | None = None) -> None:
-        """Go there in a straight line, through whatever stands there (m, m/s)."""
+        """Walk to a place (m) in a straight line, through obstacles, at ``speed`` (m/s)."""
 
     @abstractmethod
     def look_at(self, x: float, y: float) -> None:
@@ -103,15 +103,15 @@ class StagePerson(ABC):
 
     @abstractmethod
     def gesture(self, gesture: Gesture, seconds: float = 3.0) -> None:
-        """Make a gesture for so long."""
+        """Make a gesture for ``seconds``."""
 
     @abstractmethod
     def say(self, text: str) -> None:
-        """Say it aloud."""
+        """Say a text aloud."""
 
     @abstractmethod
     def clap(self, count: int = 2) -> None:
-        """Clap hands."""
+        """Clap ``count`` times."""
 
     @abstractmethod
     def do_sport(self, sport: Sport, count: int = 10, period: float = 2.0) -> None:
@@ -123,19 +123,19 @@ class StagePerson(ABC):
 
     @abstractmethod
     def wait(self, seconds: float) -> None:
-        """Stand there before going on."""
+        """Stand for so long before the next call."""
 
     @abstractmethod
     def stand(self) -> None:
-        """Drop everything at once, the script of the world's file included."""
+        """Drop all calls and the script of the world's file, and stand."""
 
     @abstractmethod
     def resume(self) -> None:
-        """Go back to the script."""
+        """Return to the script of the world's file."""
 
     @abstractmethod
     def place(self, x: float, y: float, facing: float = 0.0) -> None:
-        """Be there at once, looking to ``facing`` degrees, and stand. Raises Refused in a robot."""
+        """Move to a place at once, look to ``facing`` degrees, and stand. Raises Refused if a robot is there."""
 
 
 class Stage(ABC):
@@ -144,7 +144,7 @@ class Stage(ABC):
     @property
     @abstractmethod
     def seed(self) -> int:
-        """Seed of all randomness in the world: noise, outages, where a kidnapped robot finds itself."""
+        """Seed of all random numbers of the world: noise, outages, places of kidnapped robots."""
 
     @abstractmethod
     def reseed(self, seed: int) -> None:
@@ -155,12 +155,12 @@ class Stage(ABC):
     @property
     @abstractmethod
     def robots(self) -> Sequence[Placed]:
-        """Every robot, where it really is."""
+        """All robots at their true poses."""
 
     @property
     @abstractmethod
     def people(self) -> Sequence[Placed]:
-        """Every person; the name is what ``person`` takes."""
+        """All people, by the names that ``person`` takes."""
 
     @property
     @abstractmethod
@@ -170,21 +170,21 @@ class Stage(ABC):
     @property
     @abstractmethod
     def obstacles(self) -> Sequence[Obstacle]:
-        """Boxes that were put into the world and stand there still."""
+        """Boxes that were added to the world."""
 
     @property
     @abstractmethod
     def tags(self) -> Sequence[HungTag]:
-        """Printed codes that were hung up in the world and hang there still."""
+        """Printed codes that were added to the world."""
 
     @property
     @abstractmethod
     def floors(self) -> Sequence[FloorPlan]:
-        """The building as it was described, the lowest floor first."""
+        """Floors of the building as described, the lowest first."""
 
     @abstractmethod
     def world_file(self) -> str:
-        """Return the world as it stands now, as a world file (TOML): boxes, people and things where they are."""
+        """Return the current world as a world file (TOML), with boxes, people and things where they are."""
 
     # -- robots --
 
@@ -204,26 +204,26 @@ class Stage(ABC):
 
     @abstractmethod
     def lift(self, name: str, height: float = 0.3) -> None:
-        """Take a robot up so many metres from where it is and hold it there until ``let_go``."""
+        """Lift a robot by ``height`` m, and hold it there until ``let_go``."""
 
     @abstractmethod
     def let_go(self, name: str) -> None:
-        """Open the hand: the robot falls."""
+        """Let go of a lifted robot, which falls."""
 
     @abstractmethod
     def push(self, name: str, impulse: Vector3) -> None:
-        """Give a robot a blow (N s, along its base_link's axes)."""
+        """Push a robot with an impulse (N s, base_link)."""
 
     @abstractmethod
     def pull(self, name: str, force: Point) -> None:
-        """Pull a robot's leash from now on (N, along the world's axes); no force lets it hang.
+        """Pull a robot's leash with a force (N, world) from now on; 0 lets it hang.
 
         A robot that walks on a leash gives way; any other stands against it.
         """
 
     @abstractmethod
     def roll_over(self, name: str, roll: float = math.pi) -> None:
-        """Lay a robot on its back or side (rad around its x), or with 0 back on its wheels."""
+        """Roll a robot over by ``roll`` (rad about its x); 0: back onto its wheels."""
 
     @abstractmethod
     def touch(self, name: str, kind: TouchKind = TouchKind.SINGLE) -> None:
@@ -231,7 +231,7 @@ class Stage(ABC):
 
     @abstractmethod
     def plug_in(self, name: str, wire: bool = True) -> None:
-        """Put the charger's plug into a robot, or pull it out. Raises ComponentMissing."""
+        """Plug a charger into a robot, or unplug it. Raises ComponentMissing."""
 
     @abstractmethod
     def touch_plate(self, name: str, place: PlatePlace) -> None:
@@ -239,7 +239,7 @@ class Stage(ABC):
 
     @abstractmethod
     def apply_voltage(self, name: str, adapter: int, port: int, voltage: float) -> None:
-        """Put so many volts on a sensor adapter's input. Raises NotFound, InvalidGoal beyond the full scale."""
+        """Set the voltage (V) of a sensor adapter's input. Raises NotFound, InvalidGoal beyond the full scale."""
 
     # -- people, things, sounds --
 
@@ -249,7 +249,7 @@ class Stage(ABC):
 
     @abstractmethod
     def add_person(self, pose: Pose, floor: int = 0, name: str = "") -> str:
-        """Put one more person there; return their name.
+        """Add a person; return their name.
 
         Raises ValueError for a taken name or too many people, Refused in a robot.
         """
@@ -260,19 +260,19 @@ class Stage(ABC):
 
     @abstractmethod
     def move_thing(self, name: str, position: Vector3) -> None:
-        """Put a small thing elsewhere, at rest."""
+        """Move a small thing to a position (m), at rest."""
 
     @abstractmethod
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
-        """Have a box (x, y, z extent in m) stand there from now on; return its number. Raises Refused in a robot."""
+        """Add a box (x, y, z extent in m); return its number. Raises Refused if a robot is there."""
 
     @abstractmethod
     def remove_obstacle(self, number: int) -> None:
-        """Take a box away again."""
+        """Remove a box that was added."""
 
     @abstractmethod
     def move_obstacle(self, number: int, pose: Pose, floor: int) -> None:
-        """Put a box elsewhere. Raises Refused in a robot."""
+        """Move a box that was added. Raises Refused if a robot is there."""
 
     @abstractmethod
     def add_tag(
@@ -285,44 +285,44 @@ class Stage(ABC):
         height: float = 0.4,
         size: float = 0.16,
     ) -> int:
-        """Hang an AprilTag (``text``: its number) or a QR code there, +x of ``pose`` out of it; return its number.
+        """Hang up an AprilTag (``text``: its number) or a QR code, +x of ``pose`` out of it; return its number here.
 
         Raises ValueError for what no such code can say, and for too many.
         """
 
     @abstractmethod
     def move_tag(self, number: int, pose: Pose, floor: int) -> None:
-        """Hang a code elsewhere."""
+        """Move a code that was added."""
 
     @abstractmethod
     def remove_tag(self, number: int) -> None:
-        """Take a code down."""
+        """Remove a code that was added."""
 
     @abstractmethod
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
-        """Have ``sound`` be heard from there, from now on. Raises ValueError when too much is to be heard already."""
+        """Play ``sound`` at a place, from now on. Raises ValueError if too many sounds are playing."""
 
     # -- faults --
 
     @property
     @abstractmethod
     def fault_kinds(self) -> Sequence[FaultKind]:
-        """Every kind of fault that ``inject_fault`` takes, by name."""
+        """All kinds of faults that ``inject_fault`` takes, by name."""
 
     @property
     @abstractmethod
     def faults(self) -> Sequence[ActiveFault]:
-        """Faults that act now, oldest first."""
+        """Active faults, oldest first."""
 
     @abstractmethod
     def inject_fault(
         self, kind: str, robot: str | None = None, *, duration: float | None = None, **options: object
     ) -> Sequence[ActiveFault]:
-        """Let a fault begin: on one robot, on all that have the part (None), or in the building.
+        """Inject a fault: into one robot, into all that have the part (None), or into the building.
 
         It ends after ``duration`` s of robot time, or with ``clear_fault``.
         """
 
     @abstractmethod
     def clear_fault(self, number: int | None = None) -> None:
-        """End one fault, or all. What cannot be undone (a robot that was carried off) stays. Raises NotFound."""
+        """End one fault, or all. Effects that cannot be undone (a robot that was carried off) stay. Raises NotFound."""

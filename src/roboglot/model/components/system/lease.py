@@ -151,7 +151,7 @@ class Lease(Component):
             await self._robot[Settings].put(KEPT, self._taken_by)
 
     def _admit(self, action: Action) -> None:
-        """Raise Busy for an action that may not be. To stop is always allowed, but what others do is not ours."""
+        """Raise Busy for an action that may not start. Stopping is allowed unless others move a real robot."""
         if not moves(action):
             return
         if (fenced := self._fence()) and not _stops(action.goal):
