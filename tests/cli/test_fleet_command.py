@@ -138,7 +138,7 @@ def test_unreadable_template_is_named(content: bytes | None, reason: str, tmp_pa
     if content is not None:
         template.write_bytes(content)
     with pytest.raises(ValueError, match=reason) as refused:
-        fleet._plan(tmp_path / "f", fleet._Asked(1, 1, template, ""), replan=False)
+        fleet._plan(tmp_path / "f", fleet._PlanOptions(1, 1, template, ""), replan=False)
     assert "Errno" not in str(refused.value)
 
 
@@ -167,14 +167,14 @@ def test_an_answer_shows_what_was_asked_for(name: str, shown: list[str], capsys:
 @pytest.mark.parametrize(
     ("asked", "replan", "reason"),
     [
-        (fleet._Asked(None, 2, None, ""), False, "options of a plan need --worlds"),
-        (fleet._Asked(None, None, None, ""), True, "options of a plan need --worlds"),
-        (fleet._Asked(2, None, None, ""), False, "has another plan"),
+        (fleet._PlanOptions(None, 2, None, ""), False, "options of a plan need --worlds"),
+        (fleet._PlanOptions(None, None, None, ""), True, "options of a plan need --worlds"),
+        (fleet._PlanOptions(2, None, None, ""), False, "has another plan"),
     ],
 )
-def test_a_stored_plan_is_not_denied(asked: fleet._Asked, replan: bool, reason: str, tmp_path: Path) -> None:
+def test_a_stored_plan_is_not_denied(asked: fleet._PlanOptions, replan: bool, reason: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"there is no fleet in .* yet: give --worlds"):
-        fleet._plan(tmp_path, fleet._Asked(None, 2, None, ""), replan=replan)
+        fleet._plan(tmp_path, fleet._PlanOptions(None, 2, None, ""), replan=replan)
     save(plan_fleet(1, 1, {}, tmp_path), tmp_path)
     with pytest.raises(ValueError, match=reason):
         fleet._plan(tmp_path, asked, replan=replan)

@@ -12,7 +12,7 @@ import httpx
 import numpy as np
 import pytest
 
-from roboglot.cli.map import Way, command, grid_in, write_ros_map
+from roboglot.cli.map import MapOperation, command, grid_in, write_ros_map
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import Annotations
 from roboglot.model.components.mapping.localization import Localization
@@ -139,7 +139,7 @@ def test_merged_floors_have_docks_of_their_own(tmp_path: Path, monkeypatch: pyte
     floor = FloorMap(FloorName(), GRID, Annotations(docks=(dock,)))
     (tmp_path / "one.stcm").write_bytes(encode_stcm(composite_of(floor)))
     monkeypatch.chdir(tmp_path)
-    command(Way.MERGE, Path("both.stcm"), floor=["1F=one.stcm", "2F=one.stcm"])
+    command(MapOperation.MERGE, Path("both.stcm"), floor=["1F=one.stcm", "2F=one.stcm"])
     below, above = (floor.annotations.docks[0].id for floor in floors_of(decode_stcm(Path("both.stcm").read_bytes())))
     assert below == dock.id
     assert above != below
@@ -161,5 +161,5 @@ def test_failed_merge_is_one_sentence(
     write_ros_map(GRID, tmp_path / "m.yaml")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit, match=words):
-        command(Way.MERGE, Path("out.stcm"), floor=floors)
+        command(MapOperation.MERGE, Path("out.stcm"), floor=floors)
     assert not (tmp_path / "out.stcm").exists()

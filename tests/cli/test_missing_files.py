@@ -12,7 +12,7 @@ import pytest
 import typer
 
 from roboglot.cli import connect, mcp
-from roboglot.cli.fleet import _Asked, _plan
+from roboglot.cli.fleet import _plan, _PlanOptions
 from roboglot.config import load_config
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.folder_lock import lock_folder
@@ -51,7 +51,7 @@ def test_missing_file_is_named(words: tuple[str, ...], tmp_path: Path) -> None:
 
 
 def template(path: Path) -> object:
-    return _plan(path.parent, _Asked(1, 1, path, ""), replan=True)
+    return _plan(path.parent, _PlanOptions(1, 1, path, ""), replan=True)
 
 
 TOML: list[Callable[[Path], object]] = [

@@ -43,8 +43,8 @@ def test_networks_are_expanded_within_bounds() -> None:
 
 
 def test_scan_prints_a_line_for_the_shell(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    async def find(hosts: list[str], seconds: float) -> AsyncIterator[scan.Found]:
-        yield scan.Found("cyberdog://10.0.0.9?certs=DIR", "CyberDog 2")
+    async def find(hosts: list[str], seconds: float) -> AsyncIterator[scan.FoundRobot]:
+        yield scan.FoundRobot("cyberdog://10.0.0.9?certs=DIR", "CyberDog 2")
 
     monkeypatch.setattr(scan, "find", find)
     scan.command(["10.0.0.9"], 0.0)
@@ -76,7 +76,7 @@ async def test_a_dog_is_recognised_by_its_certificate(
     finally:
         await door.close()
         await forward(seconds=1)
-    assert found == scan.Found(f"cyberdog://127.0.0.1:{door.port}?certs=DIR", "CyberDog 2 CN=cyberdog2.server")
+    assert found == scan.FoundRobot(f"cyberdog://127.0.0.1:{door.port}?certs=DIR", "CyberDog 2 CN=cyberdog2.server")
 
 
 async def test_robomasters_that_broadcast_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:

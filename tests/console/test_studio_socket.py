@@ -340,9 +340,7 @@ async def test_requests_of_a_class_are_bounded(served: ServedConsole) -> None:
 
 async def test_pages_of_strangers_are_refused(served: ServedConsole) -> None:
     with pytest.raises(Exception, match=r"\d|closed"):
-        async with connect(
-            served.url.replace("http", "ws") + "/studio", origin=Origin("http://evil.example")
-        ) as socket:
+        async with connect(f"ws{served.url[4:]}/studio", origin=Origin("http://evil.example")) as socket:
             await socket.recv()
 
 

@@ -93,7 +93,7 @@ def test_sample_is_accepted(language: str, code: str, tmp_path: Path) -> None:
 def test_an_agents_port_is_no_doors() -> None:
     """`up` has its doors open on the same address."""
     config = config_of({}, doors=sections(), origin="")
-    taken = {port for door in DOORS for port in door.numbers(config).values()}
+    taken = {port for door in DOORS for port in door.port_numbers(config).values()}
     assert 8765 in taken
     ports = re.findall(r"--http (\d+)", (ROOT / "docs/operation/mcp.md").read_text("utf-8"))
     assert ports

@@ -17,7 +17,7 @@ from roboglot.config import load_config
 from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections
 from roboglot.recording.comparing.behaviour import compare_behaviour
-from roboglot.recording.comparing.masks import How, Mask, Rule
+from roboglot.recording.comparing.masks import ComparisonMode, Mask, Rule
 from roboglot.recording.probing import questions
 from roboglot.runtime import Runtime
 from tests.recording.test_playback import ADDRESS, SECOND
@@ -90,8 +90,8 @@ def test_the_order_of_first_occurrence_counts() -> None:
 
 def test_masks_count_here_too() -> None:
     other = replies(lambda value: value.pop("y"))
-    assert complaints(other, Mask((Rule(How.IGNORED, field="$.y"),))) == []
-    assert complaints(session(offset=4.0), Mask((Rule(How.SHAPE, field="$.x"),))) == []
+    assert complaints(other, Mask((Rule(ComparisonMode.IGNORED, field="$.y"),))) == []
+    assert complaints(session(offset=4.0), Mask((Rule(ComparisonMode.SHAPE, field="$.x"),))) == []
 
 
 @pytest.mark.parametrize("door", ["slamware", "robomaster", "cyberdog", "visual"])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing import reports
 from roboglot.recording.comparing.comparison import Comparison, Row, compare
-from roboglot.recording.comparing.masks import STRICT, How, Mask, Rule
+from roboglot.recording.comparing.masks import STRICT, ComparisonMode, Mask, Rule
 from roboglot.recording.matching import normal, rewritten
 from roboglot.recording.reader import pair
 
@@ -113,11 +113,11 @@ def test_a_mask_says_what_counts() -> None:
     original = session()
     changed = [e._replace(payload=e.payload.replace(b'"x": ', b'"x": 9')) for e in original]
     assert compare(original, changed).differs
-    for how in (How.SHAPE, How.IGNORED):
+    for how in (ComparisonMode.SHAPE, ComparisonMode.IGNORED):
         assert not compare(original, changed, Mask((Rule(how, "GET *", "$.x"),))).differs
     gone = [e._replace(payload=e.payload.replace(b', "y": 1.5', b"")) for e in original]
-    assert compare(original, gone, Mask((Rule(How.SHAPE, "GET *", "$.y"),))).differs
-    assert not compare(original, gone, Mask((Rule(How.IGNORED, "GET *", "$.y"),))).differs
+    assert compare(original, gone, Mask((Rule(ComparisonMode.SHAPE, "GET *", "$.y"),))).differs
+    assert not compare(original, gone, Mask((Rule(ComparisonMode.IGNORED, "GET *", "$.y"),))).differs
 
 
 def test_reports_name_what_differs() -> None:

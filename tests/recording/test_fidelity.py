@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from roboglot.cli.recordings.fidelity import BODY, Asked, _facts, page, published
+from roboglot.cli.recordings.fidelity import BODY, SessionRequest, _facts, page, published
 from roboglot.testing.addresses import free_addresses
 
 PAGE = Path(__file__).parents[2] / "docs" / "fidelity.md"
@@ -23,8 +23,10 @@ def test_every_published_answer_says_something() -> None:
 
 def test_facts_that_do_not_hold_are_named() -> None:
     answers = [(b'{"a": {"b": 1}, "c": "x"}', "200")]
-    asked = Asked("GET /", status="404", pattern="no", fields={"$.a": "object", "$.a.b": "string", "$.d": "number"})
+    asked = SessionRequest(
+        "GET /", status="404", pattern="no", fields={"$.a": "object", "$.a.b": "string", "$.d": "number"}
+    )
     found = _facts(asked, answers)
     assert [good for good, _ in found] == [False, False, True, False, False]
     assert _facts(asked, []) == [(False, "no answer")]
-    assert _facts(Asked("x", silent=True), answers) == [(False, "1 answers")]
+    assert _facts(SessionRequest("x", silent=True), answers) == [(False, "1 answers")]

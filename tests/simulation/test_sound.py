@@ -17,7 +17,7 @@ from roboglot.model.sound import SAMPLE_RATE, claps, tone
 from roboglot.simulation.sound.sound import (
     SOURCES_MAX,
     SPEED,
-    Air,
+    SoundField,
     Source,
 )
 from roboglot.simulation.sound.voice import speaking_time
@@ -28,7 +28,7 @@ CORRIDOR = Point(12.0, 10.0)
 
 @pytest.fixture
 def air():
-    return Air(load_world("office"))
+    return SoundField(load_world("office"))
 
 
 def loudness(air, at, floor=0, start=0.2):

@@ -82,14 +82,14 @@ def up(
 
         set_up_logging(verbose=False)
         folder = _folder(data)
-        asked = _Asked(worlds, robots_each, template, first_address)
+        asked = _PlanOptions(worlds, robots_each, template, first_address)
         try:
             plan = _plan(folder, asked, replan=replan)
             if detached and on in ("", "local"):
                 raise ValueError("--detached is for a cluster: --on ray://HOST")
             if memory_max and on:
                 raise ValueError("--memory-max is for shards without --on: Ray places and limits its own")
-            where = _Where(on, detached, memory_max << 20, nursery)
+            where = _MachineOptions(on, detached, memory_max << 20, nursery)
             say = partial(print, file=sys.stdout, flush=True)  # also where a cluster has it print to standard error
             with _joined(plan, on):
                 asyncio.run(serve(lambda: _fleet_host(plan, folder, where), folder, say, began, lasting=detached))
@@ -238,7 +238,7 @@ def _folder(data: Path | None) -> Path:
     return (data or Path(os.environ.get("ROBOGLOT_DATA") or default_data_folder(os.environ)) / "fleet").absolute()
 
 
-class _Asked(NamedTuple):
+class _PlanOptions(NamedTuple):
     """Options of a plan; without options: the stored plan."""
 
     worlds: int | None
@@ -247,7 +247,7 @@ class _Asked(NamedTuple):
     first: str
 
 
-def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
+def _plan(folder: Path, asked: _PlanOptions, *, replan: bool) -> FleetPlan:
     """Return the stored plan, or a new one. Raises ValueError if the stored one has other options."""
     from roboglot.shards.plan import FIRST_ADDRESS, PLAN, load, plan_fleet
     from roboglot.text_files import parse_toml, text_of
@@ -274,7 +274,7 @@ def _plan(folder: Path, asked: _Asked, *, replan: bool) -> FleetPlan:
     return kept
 
 
-class _Where(NamedTuple):
+class _MachineOptions(NamedTuple):
     """Options of the shards' machines."""
 
     on: str
@@ -293,7 +293,7 @@ def _joined(plan: FleetPlan, on: str) -> AbstractContextManager[None]:
     return joined(on)
 
 
-def _fleet_host(plan: FleetPlan, folder: Path, where: _Where) -> FleetHost:
+def _fleet_host(plan: FleetPlan, folder: Path, where: _MachineOptions) -> FleetHost:
     if where.on:
         from roboglot.shards.cluster import ClusterFleet
 

@@ -29,7 +29,7 @@ STCM = "/api/core/slam/v1/maps/stcm"
 SAVED = "/api/multi-floor/map/v1/stcm"
 
 
-class Way(StrEnum):
+class MapOperation(StrEnum):
     """Direction: to or from a robot or file, from a log, several floors to one, or a world's floors to one."""
 
     IMPORT = "import"
@@ -41,7 +41,7 @@ class Way(StrEnum):
 
 def command(
     way: Annotated[
-        Way,
+        MapOperation,
         typer.Argument(
             help="import MAP, export to it, build from it (a log), merge floors into it, or survey a world."
         ),
@@ -68,18 +68,18 @@ def command(
     floors = floor or []
     try:
         match way:
-            case Way.BUILD:
+            case MapOperation.BUILD:
                 from roboglot.cli.maps.build import build  # it needs the kernels
 
                 build(ros_map, out, relations)
-            case Way.MERGE:
+            case MapOperation.MERGE:
                 ros_map.write_bytes(merged(floors, building, lambda address: _call(address, "GET", STCM)))
                 print(f"{', '.join(floors)} -> {ros_map}")
-            case Way.SURVEY:
+            case MapOperation.SURVEY:
                 _survey(world, ros_map)
-            case Way.IMPORT:
+            case MapOperation.IMPORT:
                 _import(ros_map, robot, file, pose)
-            case Way.EXPORT:
+            case MapOperation.EXPORT:
                 _export(robot, file, ros_map)
     except (ValueError, OSError) as error:  # BadMap, BadFile and the like carry plain messages
         sys.exit(f"roboglot map: {in_words(error)}")

@@ -32,7 +32,7 @@ CYBERDOG_PORT = 50052
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundRobot:
     """A robot: its URL, and its own description."""
 
     url: str
@@ -74,7 +74,7 @@ def expand(texts: Iterable[str]) -> Iterable[str]:
         yield from ([str(ip_address(text))] if "/" not in text else (str(host) for host in network.hosts()))
 
 
-async def _scan(hosts: list[str], seconds: float) -> list[Found]:
+async def _scan(hosts: list[str], seconds: float) -> list[FoundRobot]:
     """Print each robot as soon as it answers."""
     found = []
     async for robot in find(hosts, seconds):
@@ -84,11 +84,11 @@ async def _scan(hosts: list[str], seconds: float) -> list[Found]:
     return found
 
 
-async def find(hosts: list[str], seconds: float) -> AsyncIterator[Found]:
+async def find(hosts: list[str], seconds: float) -> AsyncIterator[FoundRobot]:
     """Yield robots as they answer."""
     turns = asyncio.Semaphore(AT_ONCE_MAX)
 
-    async def ask(probe: Callable[[str], Awaitable[Found | None]], host: str) -> list[Found]:
+    async def ask(probe: Callable[[str], Awaitable[FoundRobot | None]], host: str) -> list[FoundRobot]:
         async with turns:
             one = await probe(host)
             return [one] if one else []
@@ -99,16 +99,16 @@ async def find(hosts: list[str], seconds: float) -> AsyncIterator[Found]:
             yield one
 
 
-async def _robomasters(seconds: float) -> list[Found]:
+async def _robomasters(seconds: float) -> list[FoundRobot]:
     try:
         heard = await discover(seconds)
     except ClientError as error:
         print(f"cannot listen for RoboMasters: {error}", file=sys.stderr)
         return []
-    return [Found(f"robomaster://{address}", "DJI RoboMaster EP, free") for address in heard]
+    return [FoundRobot(f"robomaster://{address}", "DJI RoboMaster EP, free") for address in heard]
 
 
-async def slamware_at(host: str, port: int = 1448) -> Found | None:
+async def slamware_at(host: str, port: int = 1448) -> FoundRobot | None:
     """Probe for a Slamware robot by its name plate."""
     async with SlamwareClient(host, port, clock=RealClock(), timeout=PROBE_SECONDS) as client:
         try:
@@ -116,10 +116,12 @@ async def slamware_at(host: str, port: int = 1448) -> Found | None:
         except ClientError:
             return None
     where = f"slamware://{host}" + (f":{port}" if port != 1448 else "")
-    return Found(where, f"{plate.manufacturer_name} {plate.model_name} {plate.software_version}, {plate.device_id}")
+    return FoundRobot(
+        where, f"{plate.manufacturer_name} {plate.model_name} {plate.software_version}, {plate.device_id}"
+    )
 
 
-async def cyberdog_at(host: str, port: int = CYBERDOG_PORT) -> Found | None:
+async def cyberdog_at(host: str, port: int = CYBERDOG_PORT) -> FoundRobot | None:
     """Probe for a CyberDog by its certificate; a connection needs one of the same authority."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # read without verification
@@ -139,4 +141,4 @@ async def cyberdog_at(host: str, port: int = CYBERDOG_PORT) -> Found | None:
 
         words = f"CyberDog 2 {x509.load_der_x509_certificate(data).subject.rfc4514_string()}"
     where = f"cyberdog://{host}" + (f":{port}" if port != CYBERDOG_PORT else "")
-    return Found(f"{where}?certs=DIR", words)
+    return FoundRobot(f"{where}?certs=DIR", words)

@@ -19,7 +19,7 @@ from roboglot.model.inputs import external
 from roboglot.model.inputs.external import Input
 from roboglot.model.tap import DRIVER, Direction, Exchange
 from roboglot.recording.lines import FoxgloveLine, FrameLine, Line, TextLine
-from roboglot.recording.reader import Asked, Recording, pair
+from roboglot.recording.reader import AnsweredRequest, Recording, pair
 
 HEARD_SECONDS_MAX = 5.0  # real s to wait for a request to arrive, or for an answer that needs no robot time
 LOOK = 0.0005  # real s between two checks
@@ -49,7 +49,7 @@ class Inputs:
     def __init__(self, recording: Recording, clock: LockstepClock, where: Where, repeat: Repeat) -> None:
         self._clock, self._where, self._repeat = clock, where, repeat
         asked = [one for one in pair(recording.exchanges)[0] if is_of_client(one.request)]
-        due: list[tuple[int, Asked | Input]] = [*recording.inputs, *((one.number, one) for one in asked)]
+        due: list[tuple[int, AnsweredRequest | Input]] = [*recording.inputs, *((one.number, one) for one in asked)]
         self._due = sorted(due, key=lambda one: one[0])  # an input precedes the exchange with the same number
         replies = enumerate(recording.exchanges)
         self._replies = [(n, one) for n, one in replies if one.direction is Direction.REPLY and is_of_client(one)]
@@ -133,7 +133,7 @@ class Inputs:
     def _miss(self, what: str, stamp: float) -> None:
         self.unheard.append(f"{what} at {stamp:.3f}")
 
-    async def _send(self, asked: Asked, following: Sequence[tuple[int, Asked | Input]]) -> None:
+    async def _send(self, asked: AnsweredRequest, following: Sequence[tuple[int, AnsweredRequest | Input]]) -> None:
         """Send a request, and wait for the answers that were recorded before the ``following`` input."""
         request = asked.request
         end = following[0][0] if following else math.inf

@@ -16,18 +16,20 @@ _number = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])")
 
 
 @dataclass(frozen=True, slots=True)
-class Normal:
+class NormalizedRequest:
     """A request without its fresh values (ids, times), and these values in their order."""
 
     text: str
     fresh: tuple[bytes, ...]
 
 
-def normal(door: str, payload: bytes) -> Normal:
+def normal(door: str, payload: bytes) -> NormalizedRequest:
     """Return a request in recognisable form, with ``\\x00`` in place of fresh values."""
     pattern = _BY_DOOR.get(door, _any)
     fresh = tuple(match.group() for match in pattern.finditer(payload))
-    return Normal(pattern.sub(b"\0", payload).decode("utf-8", "backslashreplace").strip().rstrip(";").strip(), fresh)
+    return NormalizedRequest(
+        pattern.sub(b"\0", payload).decode("utf-8", "backslashreplace").strip().rstrip(";").strip(), fresh
+    )
 
 
 def rewritten(payload: bytes, recorded: tuple[bytes, ...], live: tuple[bytes, ...]) -> bytes:

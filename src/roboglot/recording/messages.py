@@ -27,7 +27,7 @@ _encode = msgspec.json.Encoder().encode
 _parsed = msgspec.json.Decoder()
 
 
-class Kept(msgspec.Struct, omit_defaults=True):
+class StoredExchange(msgspec.Struct, omit_defaults=True):
     """An exchange as written to the file; see ``model/tap.py`` for the fields."""
 
     stamp: float
@@ -67,7 +67,7 @@ def encode_exchange(exchange: Exchange) -> bytes:
     """Return the exchange as a message of the file."""
     text, body, rest = split(exchange.payload)
     return _encode(
-        Kept(
+        StoredExchange(
             exchange.stamp,
             exchange.robot,
             exchange.door,
@@ -88,7 +88,7 @@ def encode_exchange(exchange: Exchange) -> bytes:
 
 def decode_exchange(data: bytes) -> Exchange:
     """Return the exchange of a message. Raises msgspec.DecodeError, ValueError."""
-    kept = decode_json(data, Kept)
+    kept = decode_json(data, StoredExchange)
     body = b"" if kept.json is msgspec.UNSET else bytes(kept.json)
     payload = kept.text.encode() + body + (base64.b64decode(kept.base64) if kept.base64 else b"")
     return Exchange(

@@ -22,8 +22,8 @@ from roboglot.model.clock import Clock
 from roboglot.model.errors import NotFound
 from roboglot.model.stand_in import Recorded, StandIn, StandInReply
 from roboglot.model.tap import Exchange
-from roboglot.recording.matching import Normal, normal, rewritten, without_numbers
-from roboglot.recording.reader import Asked, BadRecording, Recording, pair, read_recording
+from roboglot.recording.matching import NormalizedRequest, normal, rewritten, without_numbers
+from roboglot.recording.reader import AnsweredRequest, BadRecording, Recording, pair, read_recording
 from roboglot.recording.redaction import FIELDS, Redaction
 from roboglot.recording.timeline import Timeline
 from roboglot.spelling import instead
@@ -44,7 +44,7 @@ class _Door:
     """Session of one door: the requests so far, and its progress."""
 
     timeline: Timeline
-    asked: list[tuple[Asked, Normal]] = field(default_factory=list)
+    asked: list[tuple[AnsweredRequest, NormalizedRequest]] = field(default_factory=list)
     by_text: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))  # indices into ``asked``
     by_form: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
     pushes: list[tuple[int, Exchange]] = field(default_factory=list)
@@ -122,7 +122,7 @@ class Playback(StandIn):
 
     # -- matching requests to recorded ones --
 
-    def _find(self, door: _Door, operation: str, live: Normal, *, reads: bool) -> int | None:
+    def _find(self, door: _Door, operation: str, live: NormalizedRequest, *, reads: bool) -> int | None:
         key = f"{operation}\n{live.text}"
         places = door.by_text.get(key) or self._near(door, key)
         if not places:
@@ -181,7 +181,7 @@ class Playback(StandIn):
             )
         ]
 
-    def _note_missing(self, door: str, operation: str, live: Normal) -> None:
+    def _note_missing(self, door: str, operation: str, live: NormalizedRequest) -> None:
         if len(self.missing) < MISSING_MAX:
             self.missing.append((door, operation or live.text[:80]))
             text = live.text[:200]
@@ -229,7 +229,7 @@ class Playback(StandIn):
         return _time.sub(move, payload)
 
 
-def _numbers(asked: tuple[Asked, Normal]) -> tuple[float, ...]:
+def _numbers(asked: tuple[AnsweredRequest, NormalizedRequest]) -> tuple[float, ...]:
     return without_numbers(f"{asked[0].request.operation}\n{asked[1].text}")[1]
 
 

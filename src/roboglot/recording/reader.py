@@ -93,7 +93,7 @@ class Recording:
 
 
 @dataclass(slots=True)
-class Asked:
+class AnsweredRequest:
     """A request with all its replies, and their indices in the recording."""
 
     number: int
@@ -106,16 +106,16 @@ class Asked:
         return [reply for _, reply in self.numbered if reply.status != SILENT]
 
 
-def pair(exchanges: Sequence[Exchange]) -> tuple[list[Asked], list[tuple[int, Exchange]]]:
+def pair(exchanges: Sequence[Exchange]) -> tuple[list[AnsweredRequest], list[tuple[int, Exchange]]]:
     """Return requests with their replies, and pushes; each with its index among all exchanges."""
-    asked: list[Asked] = []
+    asked: list[AnsweredRequest] = []
     pushes: list[tuple[int, Exchange]] = []
-    waiting: dict[tuple[str, str, str, str], list[Asked]] = {}
+    waiting: dict[tuple[str, str, str, str], list[AnsweredRequest]] = {}
     for number, exchange in enumerate(exchanges):
         key = exchange.robot, exchange.door, exchange.connection, exchange.operation
         match exchange.direction:
             case Direction.REQUEST:
-                found = Asked(number, exchange)
+                found = AnsweredRequest(number, exchange)
                 asked.append(found)
                 waiting.setdefault(key, []).append(found)
             case Direction.REPLY:
@@ -125,7 +125,7 @@ def pair(exchanges: Sequence[Exchange]) -> tuple[list[Asked], list[tuple[int, Ex
     return asked, pushes
 
 
-def _answer(open_ones: list[Asked], number: int, reply: Exchange) -> None:
+def _answer(open_ones: list[AnsweredRequest], number: int, reply: Exchange) -> None:
     """Add the reply to its request, found by the request's time."""
     if not open_ones:
         return

@@ -11,7 +11,7 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing.names import IDS_MAX, NOT_NAMED, Name, name_of, renamed
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.lines import Line, Target
-from roboglot.recording.reader import Asked, pair
+from roboglot.recording.reader import AnsweredRequest, pair
 from roboglot.recording.secrets import REDACTED
 
 
@@ -44,7 +44,7 @@ class Replay:
         if self._fast:
             await self._one_line(self._asked)
         else:
-            lines: dict[str, list[Asked]] = {}
+            lines: dict[str, list[AnsweredRequest]] = {}
             for asked in self._asked:
                 lines.setdefault(asked.request.connection, []).append(asked)
             async with asyncio.TaskGroup() as tasks:
@@ -54,7 +54,7 @@ class Replay:
             raise self._lost
         return sorted(self._found, key=lambda exchange: exchange.stamp)
 
-    async def _one_line(self, mine: Sequence[Asked]) -> None:
+    async def _one_line(self, mine: Sequence[AnsweredRequest]) -> None:
         if not mine:
             return
         first = self._asked[0].request.stamp
@@ -71,7 +71,7 @@ class Replay:
         finally:
             await line.close()
 
-    async def _ask(self, line: Line, asked: Asked) -> None:
+    async def _ask(self, line: Line, asked: AnsweredRequest) -> None:
         request = asked.request
         self._note(request.connection, Direction.REQUEST, request.operation, request.payload)
         began = self._clock.time()

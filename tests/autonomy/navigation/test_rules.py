@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from roboglot.autonomy.navigation import journey
+from roboglot.autonomy.navigation import drive_progress
 from roboglot.autonomy.navigation.pilot_tuning import PilotTuning
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.annotations import (
@@ -141,8 +141,8 @@ async def test_free_navigation_ignores_tracks(tour: Tour) -> None:
 async def test_waits_on_strict_tracks_reporting_after_three_minutes(
     tour: Tour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert journey.BLOCKED_SECONDS == 180.0  # docs/autonomy.md gives the default; shorter here
-    monkeypatch.setattr(journey, "BLOCKED_SECONDS", PilotTuning().patience + 15.0)
+    assert drive_progress.BLOCKED_SECONDS == 180.0  # docs/autonomy.md gives the default; shorter here
+    monkeypatch.setattr(drive_progress, "BLOCKED_SECONDS", PilotTuning().patience + 15.0)
     await draw(tour, track(1.5, 5.0, 8.5, 5.0))
     reported: list[RobotBlocked] = []
     tour.robot.events.listen(RobotBlocked, reported.append)
@@ -159,7 +159,7 @@ async def test_waits_on_strict_tracks_reporting_after_three_minutes(
     await tour.end_of(action)
     assert action.status is ActionStatus.SUCCEEDED, action.reason
     assert len(reported) == 1
-    assert math.isclose(reported[0].seconds, journey.BLOCKED_SECONDS, abs_tol=2.0)
+    assert math.isclose(reported[0].seconds, drive_progress.BLOCKED_SECONDS, abs_tol=2.0)
 
 
 async def test_in_maintenance_the_map_changes_only_there(tour: Tour) -> None:

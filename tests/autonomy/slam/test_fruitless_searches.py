@@ -64,7 +64,7 @@ async def searches(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> Searches:
     monkeypatch.setattr(whole_map_search, "places", made.places)
     await tour.go((2.0, 5.0))  # its dock would tell it the place
     tour.robot[Mapping].enable(False)
-    tour.world.hands.place("a", ELSEWHERE)
+    tour.world.stage.place("a", ELSEWHERE)
     estimator = known(of_kind(tour.robot[Localization], LidarLocalization).estimator)
     estimator.whereabouts.lose(LostReason.NO_FIT, tour.clock.time())
     return made
@@ -85,7 +85,7 @@ async def test_found_place_is_looked_for_soon(searches: Searches) -> None:
 
 async def test_carried_robot_searches_again_at_once(searches: Searches) -> None:
     await searches.during(STOOD)
-    searches.tour.world.hands.place("a", FURTHER)
+    searches.tour.world.stage.place("a", FURTHER)
     assert await searches.during(2.2) == 2
 
 

@@ -32,7 +32,7 @@ TaskFrame = dict[str, Any]
 Stops = tuple[list[int], bool]  # lines, and whether to stop before the first statement
 
 
-class What(StrEnum):
+class ProgramOperation(StrEnum):
     """Operation."""
 
     CHECK = "check"
@@ -50,14 +50,14 @@ class What(StrEnum):
 class Request:
     """Operation on a task (or module); ``saving``: its fields when saved."""
 
-    what: What
+    what: ProgramOperation
     task: str
     saving: dict[str, str]
     module: bool = False
     as_json: bool = False
 
 
-READING = (What.CHECK, What.RUN, What.SAVE)
+READING = (ProgramOperation.CHECK, ProgramOperation.RUN, ProgramOperation.SAVE)
 
 
 class Failure(Exception):
@@ -65,7 +65,7 @@ class Failure(Exception):
 
 
 def command(
-    what: Annotated[What, typer.Argument(help="The action; check needs no robot.")],
+    what: Annotated[ProgramOperation, typer.Argument(help="The action; check needs no robot.")],
     file: Annotated[
         Path | None, typer.Argument(help="The program's file, or a task's id where no file is read.")
     ] = None,
@@ -87,7 +87,7 @@ def command(
 ) -> None:
     """Check, run, save and list block programs, read their logs; suspend, recover, shut down and delete their tasks."""
     logging.basicConfig(level=logging.WARNING)
-    if file is None and what is not What.LIST:
+    if file is None and what is not ProgramOperation.LIST:
         sys.exit(f"roboglot program {what}: which file?")
     _refuse_misfits(what, interface=interface, modules=modules, as_json=as_json)
     source = ""
@@ -102,7 +102,7 @@ def command(
     saving = {"mode": "cycle" if cycle else "single", "condition": when, "body": source}
     if interface:
         saving = {"mode": "common", "condition": interface, "body": source, "describe": interface}
-    if what is What.CHECK:
+    if what is ProgramOperation.CHECK:
         sys.exit(asyncio.run(_check(file or Path(), source, as_json=as_json)))
     place = own_robot(body, world, speed) if own else contextlib.nullcontext(robot.removesuffix(FRAMES))
     try:
@@ -113,12 +113,12 @@ def command(
         sys.exit(f"roboglot program: {visible(in_words(error))}" if str(error) else 1)
 
 
-def _refuse_misfits(what: What, *, interface: str, modules: bool, as_json: bool) -> None:
-    if interface and what is not What.SAVE:
+def _refuse_misfits(what: ProgramOperation, *, interface: str, modules: bool, as_json: bool) -> None:
+    if interface and what is not ProgramOperation.SAVE:
         raise typer.BadParameter("--interface is for save")
-    if modules and what not in (What.LIST, What.DELETE):
+    if modules and what not in (ProgramOperation.LIST, ProgramOperation.DELETE):
         raise typer.BadParameter("--modules is for list and delete")
-    if as_json and what not in (What.LIST, What.LOG, What.CHECK):
+    if as_json and what not in (ProgramOperation.LIST, ProgramOperation.LOG, ProgramOperation.CHECK):
         raise typer.BadParameter("--json is for list, log and check")
 
 
@@ -152,19 +152,24 @@ async def _at(place: contextlib.AbstractAsyncContextManager[str], request: Reque
     async with place as address, _link(address, FRAMES) as frames, _link(address, LOG) as log:
         task, kind = request.task, "module" if request.module else "task"
         match request.what:
-            case What.LIST:
+            case ProgramOperation.LIST:
                 await _list(address, frames, kind, as_json=request.as_json)
-            case What.LOG:
+            case ProgramOperation.LOG:
                 await log.send(task)
                 if not await _print_log(log, task, as_json=request.as_json) and not await _known(frames, task):
                     raise Failure(f"there is no task {task}")
-            case What.SUSPEND | What.RECOVER | What.SHUTDOWN | What.DELETE:
+            case (
+                ProgramOperation.SUSPEND
+                | ProgramOperation.RECOVER
+                | ProgramOperation.SHUTDOWN
+                | ProgramOperation.DELETE
+            ):
                 await _ask(frames, request.what, task, type=kind)
                 print(f"{task}: {request.what} accepted")
-            case What.SAVE:
+            case ProgramOperation.SAVE:
                 await _ask(frames, "save", task, type=kind, **request.saving)
                 print(f"{task} is saved")
-            case What.RUN:
+            case ProgramOperation.RUN:
                 await _ask(frames, "save", task, **request.saving)
                 if stops is None:
                     await _run(frames, log, task, request.saving["condition"])

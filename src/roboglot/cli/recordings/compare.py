@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from roboglot.recording.comparing.masks import Mask
 
 
-class By(StrEnum):
+class Basis(StrEnum):
     """Basis of a comparison."""
 
     VALUES = "values"
@@ -31,7 +31,7 @@ def command(
     one: Annotated[str, typer.Argument(help="A recording, or a robot's URL.")],
     other: Annotated[str, typer.Argument(help="A recording or URL to compare it with.")],
     by: Annotated[
-        By | None,
+        Basis | None,
         typer.Option(
             help="values: every value, place and action; behaviour: fields, units, rates and times (always for URLs)."
         ),
@@ -69,21 +69,21 @@ def command(
 
 
 async def compared(
-    names: tuple[str, str], by: By | None, robot: str, door: str, mask: Mask, *, commands: bool
+    names: tuple[str, str], by: Basis | None, robot: str, door: str, mask: Mask, *, commands: bool
 ) -> Comparison:
     """Compare the recordings or robots of two names. Raises ClientError, ValueError, OSError."""
     from roboglot.recording.comparing.behaviour import compare_behaviour
     from roboglot.recording.comparing.comparison import answers_only, compare
 
     live = ["://" in name for name in names]
-    if not any(live) and by is not By.BEHAVIOUR:
+    if not any(live) and by is not Basis.BEHAVIOUR:
         from roboglot.recording.comparing.recordings import compare_recordings
 
         return compare_recordings(Path(names[0]), Path(names[1]), mask, robot, door)
     one, other = await _sessions(names, live, robot, door, commands=commands)
     if any(live):
         one, other = answers_only(one), answers_only(other)
-    comparison = compare(one, other, mask, order=False) if by is By.VALUES else compare_behaviour(one, other, mask)
+    comparison = compare(one, other, mask, order=False) if by is Basis.VALUES else compare_behaviour(one, other, mask)
     comparison.reason = "a robot at a URL only answers" if any(live) else "--by behaviour leaves single places out"
     return comparison
 

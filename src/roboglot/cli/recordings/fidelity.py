@@ -41,7 +41,7 @@ WIDTH = 110
 SHOWN_MAX = 60  # characters of a request or an answer
 
 
-class Asked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class SessionRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One request, and the known facts of its answer."""
 
     request: str
@@ -56,7 +56,7 @@ class Session(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     door: str
     source: str
-    asked: tuple[Asked, ...]
+    asked: tuple[SessionRequest, ...]
 
 
 class Verdict(msgspec.Struct, frozen=True):
@@ -130,7 +130,7 @@ def _request(door: str, text: str) -> tuple[str, bytes]:
     return text.rstrip(";"), text.encode()
 
 
-def _facts(asked: Asked, answers: Sequence[tuple[bytes, str]]) -> list[tuple[bool, str]]:
+def _facts(asked: SessionRequest, answers: Sequence[tuple[bytes, str]]) -> list[tuple[bool, str]]:
     """Return, for each known fact, whether it holds, and the received answer."""
     if asked.silent:
         return [(not answers, f"{len(answers)} answers")]

@@ -42,7 +42,7 @@ PEER = struct.Struct("3i")  # pid, uid, gid
 OPEN_MAX = 1 << 16
 
 
-class Wanted(TypedDict):
+class CommandRequest(TypedDict):
     """A command and everything that it inherits from its caller."""
 
     stamp: str
@@ -131,7 +131,7 @@ class WarmParent:
         if caller.fileno() not in self._callers:
             caller.close()
 
-    def _read(self, caller: socket.socket, descriptors: list[int]) -> Wanted:
+    def _read(self, caller: socket.socket, descriptors: list[int]) -> CommandRequest:
         """Read a caller's request and descriptors. Raises OSError, ValueError."""
         credentials = caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, PEER.size)
         pid, uid, _ = PEER.unpack(credentials)
@@ -146,12 +146,12 @@ class WarmParent:
             if not (more := caller.recv(min(1 << 16, length - len(text)))):
                 raise ValueError("the caller has gone")
             text += more
-        wanted: Wanted = ast.literal_eval(text.decode())
+        wanted: CommandRequest = ast.literal_eval(text.decode())
         if wanted["descriptors"][:3] != [0, 1, 2] or len(given) != len(wanted["descriptors"]):
             raise ValueError("files are missing")
         return wanted
 
-    def _fork(self, wanted: Wanted, descriptors: list[int], caller: socket.socket) -> int:
+    def _fork(self, wanted: CommandRequest, descriptors: list[int], caller: socket.socket) -> int:
         def prepare() -> None:
             caller.send(b"+")  # first: if we are killed now, its caller must not start again
             take_signals(wanted)
@@ -208,7 +208,7 @@ class WarmParent:
         os.close(self._lock)
 
 
-def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], None]) -> NoReturn:
+def become(wanted: CommandRequest, descriptors: list[int], run: Callable[[list[str]], None]) -> NoReturn:
     """Turn the fork into the command with everything inherited from its caller, and call ``run``."""
     try:
         _take(descriptors, wanted["descriptors"])
@@ -234,7 +234,7 @@ def become(wanted: Wanted, descriptors: list[int], run: Callable[[list[str]], No
         run_to_end(lambda: sys.exit(status))
 
 
-def take_signals(wanted: Wanted) -> None:
+def take_signals(wanted: CommandRequest) -> None:
     """Ignore the signals that the caller ignores, and let the others end this process."""
     for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}:
         with contextlib.suppress(OSError, ValueError):

@@ -31,7 +31,7 @@ _whole = re.compile(r"[0-9]{1,9}")
 REPORT = b"default-src 'none'; style-src 'unsafe-inline'"  # what the page of a comparison may load
 
 
-class Part(msgspec.Struct, frozen=True):
+class RecordingPart(msgspec.Struct, frozen=True):
     """One file of a recording; ``first`` and ``last``: times of its messages, Unix s, None if it has no end.
 
     ``begun``: when it was begun, by the clock of the machine that wrote it, Unix s; of older files without a date, when
@@ -47,14 +47,14 @@ class Part(msgspec.Struct, frozen=True):
     damage: str = ""
 
 
-class Kept(msgspec.Struct, frozen=True):
+class StoredRecording(msgspec.Struct, frozen=True):
     """One recording: its parts, robots by name, length (None: not known), and when it was begun, Unix s.
 
     ``play``: command that plays it back. ``running``: it is being written. ``damage``: why it is not read.
     """
 
     file: str
-    parts: Sequence[Part]
+    parts: Sequence[RecordingPart]
     robots: Sequence[str]
     world: str
     seconds: float | None
@@ -69,7 +69,7 @@ class Kept(msgspec.Struct, frozen=True):
 class _Outline:
     """A part, and what its head says."""
 
-    part: Part
+    part: RecordingPart
     robots: Sequence[str]
     world: str
 
@@ -83,7 +83,7 @@ class RecordingFolder:
         self._comparing = asyncio.Lock()
         self._compared: tuple[object, bytes] | None = None  # the last comparison: of these files, its page
 
-    def look(self, running: Path | None) -> list[Kept]:
+    def look(self, running: Path | None) -> list[StoredRecording]:
         """Return all recordings, the newest first; ``running``: the file that is being written."""
         found: dict[str, list[_Outline]] = {}
         known = {}
@@ -97,12 +97,12 @@ class RecordingFolder:
         kept = [self._kept(members, running) for members in found.values()]
         return sorted(kept, key=lambda one: -one.at)
 
-    def _kept(self, members: Sequence[_Outline], running: Path | None) -> Kept:
+    def _kept(self, members: Sequence[_Outline], running: Path | None) -> StoredRecording:
         members = sorted(members, key=lambda one: one.part.number)
         parts, head = [one.part for one in members], members[0]
         firsts, lasts = [p.first for p in parts if p.first is not None], [p.last for p in parts if p.last is not None]
         whole = len(lasts) == len(parts)
-        return Kept(
+        return StoredRecording(
             head.part.file,
             parts,
             head.robots,
@@ -215,7 +215,7 @@ def _piece(source: IO[bytes], size: int) -> bytes:
     return source.read(size).ljust(size, b"\0")
 
 
-def _base(part: Part) -> str:
+def _base(part: RecordingPart) -> str:
     """Return the name that all parts of a recording share."""
     stem = part.file.removesuffix(SUFFIX)
     numbered = _numbered.fullmatch(stem)
@@ -241,7 +241,7 @@ def _outline(path: Path, state: os.stat_result) -> _Outline:
     if summary is not None and (found := summary.statistics) is not None:
         first, last = found.message_start_time / 1e9, found.message_end_time / 1e9
     name = path.name.encode("utf-8", "replace").decode()
-    part = Part(name, state.st_size, number, _begun(facts, first) or state.st_mtime, first, last, why)
+    part = RecordingPart(name, state.st_size, number, _begun(facts, first) or state.st_mtime, first, last, why)
     return _Outline(part, robots, facts.get("world", ""))
 
 

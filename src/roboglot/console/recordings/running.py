@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
-from roboglot.console.recordings.kept import Kept, RecordingFolder
+from roboglot.console.recordings.kept import RecordingFolder, StoredRecording
 from roboglot.model.errors import Refused
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Recordings:
             "failure": status.failure,
         }
 
-    async def all(self) -> list[Kept]:
+    async def all(self) -> list[StoredRecording]:
         """Return the recordings in the data folder, the newest first."""
         return await asyncio.to_thread(self.kept.look, self._running)
 

@@ -14,7 +14,7 @@ from dataclasses import field
 
 from roboglot.model.tap import Exchange
 from roboglot.recording.comparing.comparison import MISSING, Comparison, Row, compare_order
-from roboglot.recording.comparing.masks import How, Mask, is_volatile
+from roboglot.recording.comparing.masks import ComparisonMode, Mask, is_volatile
 from roboglot.recording.comparing.trees import kind_of, leaves, tree
 from roboglot.recording.reader import pair
 from roboglot.values import dataclass
@@ -127,7 +127,7 @@ def _compare_profiles(row: Row, one: Profile, other: Profile, mask: Mask) -> Non
 
 def _compare_field(row: Row, path: str, ones: dict[str, Field], others: dict[str, Field], mask: Mask) -> None:
     rule = mask.how(row.operation, path)
-    if rule is How.IGNORED or _in_empty(path, ones) or _in_empty(path, others):
+    if rule is ComparisonMode.IGNORED or _in_empty(path, ones) or _in_empty(path, others):
         return
     one, other = ones.get(path), others.get(path)
     if one is None or other is None:
@@ -137,7 +137,7 @@ def _compare_field(row: Row, path: str, ones: dict[str, Field], others: dict[str
         row.check(False, path, there if one else MISSING, there if other else MISSING)
         return
     row.check(bool(one.kinds & other.kinds), f"{path} (type)", _words(one.kinds), _words(other.kinds))
-    if rule is not How.SHAPE and one.numbers and other.numbers:
+    if rule is not ComparisonMode.SHAPE and one.numbers and other.numbers:
         _compare_numbers(row, path, one, other)
 
 

@@ -9,11 +9,11 @@ from dataclasses import field
 from itertools import pairwise
 
 from roboglot.model.tap import Direction, Exchange
-from roboglot.recording.comparing.masks import How, Mask
+from roboglot.recording.comparing.masks import ComparisonMode, Mask
 from roboglot.recording.comparing.names import Names
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.matching import normal
-from roboglot.recording.reader import Asked, pair
+from roboglot.recording.reader import AnsweredRequest, pair
 from roboglot.values import dataclass
 
 SHOWN_MAX = 20  # differences kept per operation
@@ -150,12 +150,12 @@ def _start(exchanges: Sequence[Exchange]) -> float:
 
 def _compare_answers(
     rows: dict[tuple[str, str], Row],
-    ones: Sequence[Asked],
-    others: Sequence[Asked],
+    ones: Sequence[AnsweredRequest],
+    others: Sequence[AnsweredRequest],
     mask: Mask,
     names: Names | None,
 ) -> None:
-    left: dict[tuple[str, str, str], list[Asked]] = defaultdict(list)
+    left: dict[tuple[str, str, str], list[AnsweredRequest]] = defaultdict(list)
     for asked in others:
         _row(rows, asked.request).others += 1
         left[_key(asked)].append(asked)
@@ -172,12 +172,12 @@ def _compare_answers(
             _row(rows, asked.request).check(False, "request", MISSING, asked.request.payload)
 
 
-def _key(asked: Asked) -> tuple[str, str, str]:
+def _key(asked: AnsweredRequest) -> tuple[str, str, str]:
     request = asked.request
     return request.door, request.operation, normal(request.door, request.payload).text
 
 
-def _compare_replies(row: Row, one: Asked, other: Asked, mask: Mask, names: Names | None) -> None:
+def _compare_replies(row: Row, one: AnsweredRequest, other: AnsweredRequest, mask: Mask, names: Names | None) -> None:
     row.check(len(one.replies) == len(other.replies), "number of replies", len(one.replies), len(other.replies))
     for mine, theirs in zip(one.replies, other.replies, strict=False):
         row.check(mine.status == theirs.status, "status", mine.status, theirs.status)
@@ -189,7 +189,7 @@ def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask, names: Nam
     mine, theirs = dict(leaves(tree(one))), dict(leaves(tree(other)))
     for path in mine | theirs:
         a, b = mine.get(path, MISSING), theirs.get(path, MISSING)
-        if mask.how(row.operation, path) is How.IGNORED:  # there or not
+        if mask.how(row.operation, path) is ComparisonMode.IGNORED:  # there or not
             good = True
         elif path not in mine or path not in theirs:
             good = False

@@ -24,7 +24,7 @@ _volatile = re.compile(
 )
 
 
-class How(StrEnum):
+class ComparisonMode(StrEnum):
     """Way to compare two values."""
 
     EXACT = "exact"
@@ -39,7 +39,7 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ``tolerance`` is absolute, ``share`` a part of the larger value; the wider one counts.
     """
 
-    compare: How
+    compare: ComparisonMode
     operation: str = "*"
     field: str = "*"
     tolerance: Annotated[float, msgspec.Meta(ge=0)] = 0.0
@@ -67,9 +67,9 @@ class Mask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             return _agree(rule.compare, one, other, rule.tolerance, rule.share)
         if is_volatile(one) and is_volatile(other):
             return True
-        return _agree(How.NUMBER, one, other, self.tolerance, self.share)
+        return _agree(ComparisonMode.NUMBER, one, other, self.tolerance, self.share)
 
-    def how(self, operation: str, path: str) -> How | None:
+    def how(self, operation: str, path: str) -> ComparisonMode | None:
         """Return the comparison that a rule sets for the field; None if no rule matches."""
         rule = self._rule(operation, path)
         return None if rule is None else rule.compare
@@ -97,14 +97,14 @@ def read_mask(path: Path) -> Mask:
     return mask
 
 
-def _agree(how: How, one: Any, other: Any, tolerance: float, share: float) -> bool:
-    if how is How.IGNORED:
+def _agree(how: ComparisonMode, one: Any, other: Any, tolerance: float, share: float) -> bool:
+    if how is ComparisonMode.IGNORED:
         return True
     if kind_of(one) != kind_of(other):
         return False
-    if how is How.SHAPE:
+    if how is ComparisonMode.SHAPE:
         return True
-    if how is How.NUMBER and kind_of(one) == "number":
+    if how is ComparisonMode.NUMBER and kind_of(one) == "number":
         return math.isclose(one, other, rel_tol=share, abs_tol=tolerance)
     return bool(one == other)
 

@@ -69,7 +69,7 @@ UNKNOWN, INTERNAL = 2, 13  # statuses of gRPC
 RESETS = {7: 14, 8: 1, 11: 8, 12: 7}  # from HTTP/2's errors: unavailable, cancelled, exhausted, denied
 
 
-class OneWay:
+class DirectionReader:
     """One direction of a connection: ``feed`` it; ``heard`` gets each whole message of a call.
 
     ``ended`` gets the status with which the called side ended a call. Raises ValueError, IndexError or hpack's
@@ -83,7 +83,7 @@ class OneWay:
         self._decoder = Decoder()
         self._headers = bytearray()
         self._ends = False  # the call, with the headers that are not complete yet
-        self.peer: OneWay | None = None
+        self.peer: DirectionReader | None = None
 
     def remember(self, size: int) -> None:
         """Set the size of the header table (bytes) that the other side allows for this side's headers."""
@@ -178,10 +178,13 @@ class OneWay:
                 self.peer.remember(int.from_bytes(payload[at + 2 : at + SETTING]))
 
 
-def both(asked: Heard, answered: Heard, ended: Ended) -> tuple[OneWay, OneWay]:
+def both(asked: Heard, answered: Heard, ended: Ended) -> tuple[DirectionReader, DirectionReader]:
     """Return the two directions of a connection: the caller's, which begins with the preface, and the answerer's."""
     calls: dict[int, Call] = {}
-    asking, answering = OneWay("asks", calls, asked, ended, PREFACE), OneWay("answers", calls, answered, ended)
+    asking, answering = (
+        DirectionReader("asks", calls, asked, ended, PREFACE),
+        DirectionReader("answers", calls, answered, ended),
+    )
     asking.peer, answering.peer = answering, asking
     return asking, answering
 

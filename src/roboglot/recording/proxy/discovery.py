@@ -28,7 +28,9 @@ class Announcer:
             self._out, _ = await loop.create_datagram_endpoint(
                 asyncio.DatagramProtocol, local_addr=(self._address, 0), allow_broadcast=True
             )
-            self._in, _ = await loop.create_datagram_endpoint(lambda: _Ear(self.forward), sock=_listening())
+            self._in, _ = await loop.create_datagram_endpoint(
+                lambda: _DatagramListener(self.forward), sock=_listening()
+            )
         except OSError as error:
             log.warning("cannot pass the robot's broadcasts: UDP %d: %s", PORT, error.strerror)
 
@@ -61,7 +63,7 @@ def _listening() -> socket.socket:
     return ear
 
 
-class _Ear(asyncio.DatagramProtocol):
+class _DatagramListener(asyncio.DatagramProtocol):
     """Hands datagrams on with their sender's address."""
 
     def __init__(self, heard: Callable[[bytes, str], None]) -> None:

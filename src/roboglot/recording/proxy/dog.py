@@ -20,7 +20,7 @@ from roboglot.clients.cyberdog.link import Certificates
 from roboglot.model.tap import Direction
 from roboglot.recording.lines import Target, status_of
 from roboglot.recording.proxy.calls import Call, both
-from roboglot.recording.proxy.ends import Crossing, End, Place
+from roboglot.recording.proxy.ends import End, Place, TcpProxy
 from roboglot.recording.proxy.relay import ExchangeWriter
 from roboglot.recording.proxy.sniffers import Note, Sniffer
 from roboglot.transport.tls import server_context
@@ -62,7 +62,7 @@ class DogRelay:
         self._to_app = _context(proof, server=False)
         self._as_app = _context(own, server=True)
         self._to_robot = _context(own, server=False)
-        self._crossing = Crossing(writer.clock)
+        self._crossing = TcpProxy(writer.clock)
         self.watch = self._crossing.watch
         self._app_host = ""
         self._beats = Beats()

@@ -203,7 +203,7 @@ class End(asyncio.Protocol):
             self.other.transport.close()
 
 
-class Crossing:
+class TcpProxy:
     """Listens, and joins incoming connections with outgoing ones."""
 
     def __init__(self, clock: Clock) -> None:

@@ -16,7 +16,7 @@ from roboglot.recording.files import Files, Limits, Origin
 from roboglot.recording.lines import Target
 from roboglot.recording.proxy.discovery import PORT as DISCOVERY
 from roboglot.recording.proxy.discovery import Announcer
-from roboglot.recording.proxy.ends import Crossing, End, Place
+from roboglot.recording.proxy.ends import End, Place, TcpProxy
 from roboglot.recording.proxy.sniffers import SNIFFERS, Sniffer
 from roboglot.recording.redaction import FIELDS, Redaction, without_picture
 from roboglot.recording.thread import WriterThread
@@ -93,7 +93,7 @@ class Relay:
         if target.door not in SNIFFERS:
             raise ValueError(f"no recording between a client and a robot of {target.door} yet")
         self._target, self._address, self._writer = target, address, writer
-        self._crossing = Crossing(writer.clock)
+        self._crossing = TcpProxy(writer.clock)
         self.watch = self._crossing.watch
         self._hosts: set[str] = set()
         self._datagrams: asyncio.DatagramTransport | None = None

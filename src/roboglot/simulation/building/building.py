@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.blueprint import dock_solid
-from roboglot.simulation.building.floor_edges import Footing
+from roboglot.simulation.building.floor_edges import FloorEdges
 from roboglot.simulation.building.lift import LiftCar
 from roboglot.simulation.building.lift_passengers import Passengers
 from roboglot.simulation.building.mechanics import Mechanics
@@ -34,7 +34,7 @@ class Building:
         self.lift: LiftCar | None = None
         if world.lift is not None:
             self.lift = LiftCar(world, physics, Passengers(physics.hulls.values(), walkers, self._props))
-        self.footing = Footing(world, self.lift)
+        self.footing = FloorEdges(world, self.lift)
         if not physics.ground.uneven:
             for hull in physics.hulls.values():
                 hull.edges.learn(self.footing.room)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 STEP = 0.03  # m by which the car may be lower before that counts as a drop
 
 
-class Footing:
+class FloorEdges:
     """Ground under robots, by floors, holes and the lift's car."""
 
     def __init__(self, world: WorldDescription, lift: LiftCar | None) -> None:

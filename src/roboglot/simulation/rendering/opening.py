@@ -28,8 +28,8 @@ def stage_of(
 
     def open_stage() -> Scenery:
         with loading():
-            from roboglot.simulation.rendering.stage import Life, Stage
+            from roboglot.simulation.rendering.stage import MovingThings, Stage
 
-        return Stage(world, hulls, walkers, props, things, Life(*life))
+        return Stage(world, hulls, walkers, props, things, MovingThings(*life))
 
     return open_stage

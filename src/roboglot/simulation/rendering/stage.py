@@ -40,7 +40,7 @@ SLACK = 0.1  # rad around an eye's view: one that nods or leans sees slightly mo
 
 
 @dataclass(frozen=True, slots=True)
-class Life:
+class MovingThings:
     """Other visible things: robots' parts in their present state, beads in the air, the lift's car."""
 
     robots: Mapping[str, Robot]
@@ -58,7 +58,7 @@ class Stage:
         walkers: Sequence[Walker],
         props: Props,
         things: Iterable[Thing],
-        life: Life,
+        life: MovingThings,
     ) -> None:
         self._world, self._hulls, self._walkers, self._props = world, hulls, walkers, props
         self._things, self._life = things, life

@@ -54,7 +54,7 @@ class Heard:
     noise: float
 
 
-class Air:
+class SoundField:
     """All sounds under way."""
 
     def __init__(self, world: WorldDescription) -> None:

@@ -12,7 +12,7 @@ from roboglot.simulation.detectors.glance import Surroundings
 from roboglot.simulation.radio.gadgets import Gadgets
 from roboglot.simulation.radio.radio import Radio
 from roboglot.simulation.rendering.render_pool import RenderPool
-from roboglot.simulation.sound.sound import Air
+from roboglot.simulation.sound.sound import SoundField
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.randomness import RandomStreams
@@ -32,7 +32,7 @@ class Environment:
     things: Things
     radio: Radio
     gadgets: Gadgets
-    air: Air
+    air: SoundField
     sight: Sight
     rays: Rays
     surroundings: Surroundings

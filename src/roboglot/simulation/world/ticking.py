@@ -37,7 +37,7 @@ STAGES = [GIMBALS, TOUCHED, MEASURED, WATCHED, RECKONED]  # stages of parts, as 
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
+class UnfinishedTick:
     """Number of ticks begun; the stage at which the last one stopped (DONE: it is over), and that stage's number."""
 
     ticks: int
@@ -69,18 +69,18 @@ class Ticking:
         """True if ``run`` may do the gimbals of the next tick."""
         return self._run is not None and self._physics.moves_freely
 
-    def run(self, ticks: int, number: int, origin: float, *, followed: bool) -> Left:
+    def run(self, ticks: int, number: int, origin: float, *, followed: bool) -> UnfinishedTick:
         """Begin up to ``ticks`` ticks after tick ``number`` (0: one, without the kernel); ``end`` finishes the last.
 
         ``followed``: shared control of the first one has run; ``origin``: stamp of tick 0, s.
         """
         if not ticks:
-            return Left(1, DRIVE, 0)
+            return UnfinishedTick(1, DRIVE, 0)
         if self._gathered != self._robot_ticks.gathered:
             self._gather()
         course = self._physics.course() if self._arrays else None
         if course is None or self._run is None:
-            return Left(1, DRIVE, 0) if followed else Left(0, GIMBALS, 0)
+            return UnfinishedTick(1, DRIVE, 0) if followed else UnfinishedTick(0, GIMBALS, 0)
         if self._settings[0] != origin:
             self._settings = origin, *self._settings[1:]
         for refresh in self._refresh:
@@ -103,7 +103,7 @@ class Ticking:
         stage, moved = divmod(rest, STAGE_UNIT)
         if begun > (stage == PEOPLE):
             self._physics.moved(awake=bool(moved), known=known)
-        return Left(begun, stage, count)
+        return UnfinishedTick(begun, stage, count)
 
     def _gather(self) -> None:
         """Take the arrays of the robots' parts and of the physics; none if there are parts that the kernel lacks."""
@@ -128,7 +128,7 @@ class Ticking:
         self._settings = 0.0, *limits, *physical, *HABITS, *(number for stage in stages for number in stage.settings)
         self._steps = round(self._seconds / step)
 
-    def end(self, left: Left, stamp: float, after_substep: Callable[[float], None] | None = None) -> None:
+    def end(self, left: UnfinishedTick, stamp: float, after_substep: Callable[[float], None] | None = None) -> None:
         """Complete a tick (stamp, s); ``after_substep``: see ``Physics.step``."""
         stage, count, seconds, physics = left.stage, left.count, self._seconds, self._physics
         if stage == DONE:

@@ -41,7 +41,7 @@ from roboglot.simulation.radio.gadgets import Gadgets
 from roboglot.simulation.radio.radio import Radio
 from roboglot.simulation.rendering.opening import stage_of
 from roboglot.simulation.rendering.render_pool import RenderPool
-from roboglot.simulation.sound.sound import Air, Source, Speech
+from roboglot.simulation.sound.sound import SoundField, Source, Speech
 from roboglot.simulation.sound.voice import hummed
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
@@ -156,7 +156,7 @@ class World:
             things=things,
             radio=radio,
             gadgets=Gadgets(description, walkers, radio),
-            air=Air(description),
+            air=SoundField(description),
             sight=Sight(description, hulls, walkers, props, things),
             rays=physics.rays,
             surroundings=Surroundings(description, hulls, walkers, props, lines),

@@ -19,7 +19,7 @@ from roboglot.model.sound import Sound
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.sensing.hearing import own_voice
-from roboglot.simulation.sound.sound import Air, Source, Speech
+from roboglot.simulation.sound.sound import SoundField, Source, Speech
 from roboglot.simulation.sound.voice import speaking_time, spoken
 
 log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ class SpeakerSection(Struct, frozen=True, forbid_unknown_fields=True):
 class SimulatedSpeaker(Speaker):
     """Speaker; without a voice on this machine, a text takes its time but is silent."""
 
-    def __init__(self, section: SpeakerSection, hull: Hull, air: Air, robot: Robot) -> None:
+    def __init__(self, section: SpeakerSection, hull: Hull, air: SoundField, robot: Robot) -> None:
         self._loudness, self._hull, self._air, self._robot = section.loudness, hull, air, robot
         self._volume: float | None = None
         self._keeping: asyncio.Task[None] | None = None

@@ -6,7 +6,7 @@ from roboglot.model.errors import Refused
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.schedule import Duty
-from roboglot.simulation.building.floor_edges import Footing
+from roboglot.simulation.building.floor_edges import FloorEdges
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 FALLEN_BELOW = -0.1  # m under its floor
@@ -16,7 +16,7 @@ FALLEN = "fallen"
 class FallGuard:
     """Guard that watches the hull's height; a robot held by hand or on the lift's car has not fallen."""
 
-    def __init__(self, hull: Hull, base: SimulatedBase, footing: Footing) -> None:
+    def __init__(self, hull: Hull, base: SimulatedBase, footing: FloorEdges) -> None:
         self._hull, self._base, self._footing = hull, base, footing
         self.duty = hull.edges.call(Duty())
 

@@ -12,7 +12,7 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.bodies.quantities import NotNegative
 from roboglot.simulation.bodies.schedule import Duty
-from roboglot.simulation.building.floor_edges import Footing
+from roboglot.simulation.building.floor_edges import FloorEdges
 from roboglot.simulation.components.motion.base import SimulatedBase
 
 WHO = "the cliff sensor"
@@ -36,7 +36,7 @@ class SimulatedCliff(Cliff):
     zones = tuple(PLACES)
 
     def __init__(
-        self, section: CliffSection, hull: Hull, base: SimulatedBase, footing: Footing, events: EventStream
+        self, section: CliffSection, hull: Hull, base: SimulatedBase, footing: FloorEdges, events: EventStream
     ) -> None:
         self._hull, self._base, self._footing, self._events = hull, base, footing, events
         self._reach = hull.body.hull.radius + section.ahead

@@ -24,7 +24,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.components.sensing.microphone import MicrophoneSection
-from roboglot.simulation.sound.sound import Air, Heard
+from roboglot.simulation.sound.sound import Heard, SoundField
 
 log = logging.getLogger(__name__)
 QUEUE_MAX = 20
@@ -41,7 +41,7 @@ class HearingSection(Struct, frozen=True, forbid_unknown_fields=True):
 class SimulatedHearing(Hearing):
     """Hearing; ``noise``: of microphone and room, root mean square, as a share of full scale."""
 
-    def __init__(self, robot: Robot, hull: Hull, air: Air, noise: float) -> None:
+    def __init__(self, robot: Robot, hull: Hull, air: SoundField, noise: float) -> None:
         self._robot, self._hull, self._air, self._noise = robot, hull, air, noise * FULL_SCALE
         self._claps: Feed[ClapsHeard] = Feed(
             partial(self._begin, "claps", self._count), partial(self._end, "claps"), queue_max=QUEUE_MAX

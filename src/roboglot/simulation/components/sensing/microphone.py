@@ -14,7 +14,7 @@ from roboglot.model.feed import Feed, Viewer
 from roboglot.model.sound import SAMPLE_RATE, SoundBlock
 from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
-from roboglot.simulation.sound.sound import Air
+from roboglot.simulation.sound.sound import SoundField
 
 PERIOD = BLOCK / SAMPLE_RATE
 QUEUE_MAX = 25  # blocks: half a second
@@ -31,7 +31,7 @@ class SimulatedMicrophone(Microphone):
     """Omnidirectional microphone in the middle of the robot."""
 
     def __init__(
-        self, section: MicrophoneSection, hull: Hull, air: Air, clock: Clock, random: np.random.Generator
+        self, section: MicrophoneSection, hull: Hull, air: SoundField, clock: Clock, random: np.random.Generator
     ) -> None:
         self._noise, self._hull, self._air, self._clock, self._random = section.noise, hull, air, clock, random
         self._feed: Feed[SoundBlock] = Feed(self._begin, self._end, queue_max=QUEUE_MAX)
