@@ -1,7 +1,7 @@
 """Draws the studio at three widths and in both languages, for people to look at before a release.
 
-.venv/bin/python scripts/studio_pictures.py FOLDER. Needs playwright, Debian's chromium and a Chinese
-font (fonts-wqy-microhei).
+.venv/bin/python scripts/studio_pictures.py [folder]: without a folder only the pictures of docs/programs/studio.md are
+drawn. Needs playwright, Debian's chromium and a Chinese font (fonts-wqy-microhei).
 """
 
 from __future__ import annotations
@@ -14,11 +14,14 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from PIL import Image
 from playwright.async_api import async_playwright
 
 from roboglot.config import load_config
 from roboglot.runtime import Runtime
 
+PICTURES = Path(__file__).parent.parent / "docs/images"
+COLOURS = 64
 SIZES = ((1600, 900), (820, 1180), (360, 740))
 LOOKS = (("en", "light"), ("zh", "dark"))
 TABS = ("python", "output", "values", "robot", "missions")
@@ -34,8 +37,8 @@ async def until(page: Any, expression: str) -> None:
     raise TimeoutError(expression)
 
 
-async def shoot(browser: Any, url: str, folder: Path, size: tuple[int, int], look: tuple[str, str]) -> None:
-    """Every panel of one size in one look, while the program is held at a breakpoint."""
+async def paused(browser: Any, url: str, size: tuple[int, int], look: tuple[str, str]) -> Any:
+    """Return a page of one size in one look, whose program is held at a breakpoint."""
     (width, height), (language, theme) = size, look
     context = await browser.new_context(viewport={"width": width, "height": height}, has_touch=width < 900)
     choices = {"language": language, "theme": theme}
@@ -48,6 +51,19 @@ async def shoot(browser: Any, url: str, folder: Path, size: tuple[int, int], loo
     await page.evaluate("studio.runner.run()")
     await until(page, "studio.runner.phase.value === 'paused'")
     await asyncio.sleep(0.5)
+    return page
+
+
+async def end(page: Any) -> None:
+    """End the program and close the page."""
+    await page.evaluate("studio.runner.stop()")
+    await until(page, "studio.runner.phase.value === 'idle'")
+    await page.context.close()
+
+
+async def shoot(browser: Any, url: str, folder: Path, size: tuple[int, int], look: tuple[str, str]) -> None:
+    """Draw every panel of one size in one look."""
+    page, (width, _), (language, _) = await paused(browser, url, size, look), size, look
     for tab in TABS:
         if width < 900:
             if tab == TABS[0]:
@@ -56,12 +72,20 @@ async def shoot(browser: Any, url: str, folder: Path, size: tuple[int, int], loo
         await page.click(f"#tab-{tab}")
         await asyncio.sleep(0.8)
         await page.screenshot(path=folder / f"{tab}-{width}-{language}.png")
-    await page.evaluate("studio.runner.stop()")
-    await until(page, "studio.runner.phase.value === 'idle'")
-    await context.close()
+    await end(page)
 
 
-async def main(folder: Path) -> None:
+async def draw(browser: Any, url: str, name: str, language: str) -> None:
+    """Draw a picture for docs/programs/studio.md."""
+    page, path = await paused(browser, url, (1280, 720), (language, "light")), PICTURES / name
+    await page.click("#tab-python")
+    await asyncio.sleep(0.8)
+    await page.screenshot(path=path)
+    await end(page)
+    Image.open(path).convert("RGB").quantize(COLOURS).save(path, optimize=True)
+
+
+async def main(folder: Path | None) -> None:
     """Start a dog and look."""
     with tempfile.TemporaryDirectory() as data:
         config = load_config(
@@ -75,14 +99,20 @@ async def main(folder: Path) -> None:
             browser = await playwright.chromium.launch(
                 executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
             )
-            for size in SIZES:
-                for look in LOOKS:
-                    await shoot(browser, runtime.console.address, folder, size, look)
+            url = runtime.console.address
+            if folder:
+                for size in SIZES:
+                    for look in LOOKS:
+                        await shoot(browser, url, folder, size, look)
+            else:
+                await draw(browser, url, "studio.png", "en")
+                await draw(browser, url, "studio.zh.png", "zh")
             await browser.close()
         await runtime.close()
 
 
 if __name__ == "__main__":
-    chosen = Path(sys.argv[1])
-    chosen.mkdir(parents=True, exist_ok=True)
+    chosen = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    if chosen:
+        chosen.mkdir(parents=True, exist_ok=True)
     asyncio.run(main(chosen))
