@@ -43,6 +43,13 @@ class StoredPlaces(Places):
             self._places |= {place.id: place for place in places}
         self._publish()
 
+    async def modify(self, id: str, edit: Callable[[PointOfInterest], PointOfInterest]) -> None:
+        async with self.turn:
+            place = edit(self.get(id))
+            await self._database.run(self.writing([place]))
+            self._places[id] = place
+        self._publish()
+
     async def change(self, edit: Callable[[Sequence[PointOfInterest]], Sequence[PointOfInterest]]) -> None:
         async with self.turn:
             places = edit(self.all())

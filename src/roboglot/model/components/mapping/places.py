@@ -25,6 +25,10 @@ class Places(Component):
         """Add places, replacing those with the same id; all or none."""
 
     @abstractmethod
+    async def modify(self, id: str, edit: Callable[[PointOfInterest], PointOfInterest]) -> None:
+        """Replace a place by ``edit`` of it, after every change under way. Raises NotFound."""
+
+    @abstractmethod
     async def change(self, edit: Callable[[Sequence[PointOfInterest]], Sequence[PointOfInterest]]) -> None:
         """Replace all places by ``edit`` of them, after every change under way, at once and all or none."""
 

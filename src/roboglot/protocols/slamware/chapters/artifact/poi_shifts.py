@@ -12,6 +12,7 @@ from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.events import LoopClosed, MapReplaced
 from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
 
@@ -59,9 +60,14 @@ class PoiShifts:
     async def adjust(self) -> None:
         """Move places that were on the map at loop closures to their corrected poses."""
         shifts, self._shifts = self._shifts, {}
-        places = [place for place in self._robot[Places].all() if place.id in shifts]
-        stale = [place for place in places if place.pose == shifts[place.id].has]
-        await self._robot[Places].put(*(replace(place, pose=shifts[place.id].should) for place in stale))
+        if not shifts:
+            return
+
+        def moved(place: PointOfInterest) -> PointOfInterest:
+            shift = shifts.get(place.id)
+            return replace(place, pose=shift.should) if shift and place.pose == shift.has else place
+
+        await self._robot[Places].change(lambda places: [moved(place) for place in places])
 
     def _closed(self, event: LoopClosed) -> None:
         if not event.moved or Places not in self._robot:

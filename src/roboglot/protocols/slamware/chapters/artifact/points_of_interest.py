@@ -49,10 +49,12 @@ def get_poi_by_id(context: Context, poi_id: Identifier) -> PoseEntry:
 @TABLE.on(f"PUT {API}/{{poi_id}}", right=Right.EDIT, needs=(Places,))
 async def modify_poi(context: Context, poi_id: Identifier, body: PoseChange) -> bool:
     """Change a point's pose, metadata or both; 404 if there is none."""
-    place = context.robot[Places].get(poi_id)
-    metadata = place.metadata if body.metadata is None else metadata_text(body.metadata)
-    pose = pose_of(body.pose) if body.pose else place.pose
-    await context.robot[Places].put(PointOfInterest(poi_id, pose, metadata))
+
+    def edit(old: PointOfInterest) -> PointOfInterest:
+        metadata = old.metadata if body.metadata is None else metadata_text(body.metadata)
+        return PointOfInterest(poi_id, pose_of(body.pose) if body.pose else old.pose, metadata)
+
+    await context.robot[Places].modify(poi_id, edit)
     return True
 
 
