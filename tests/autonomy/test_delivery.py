@@ -75,7 +75,7 @@ async def test_orders_and_rules_survive_crash_and_go_on(tmp_path: Path) -> None:
     template = RoundTemplate("k", "supply", (Operation("room", "load", 5),))
     async with running(file) as (robot, clock):
         await robot[Places].put(ROOM)
-        await robot[Delivery].set_policy(policy)
+        await robot[Delivery].change_policy(lambda _: policy)
         await robot[Industry].put_template(template)
         call = await robot[Industry].call(CallKind.BY_TEMPLATE, "room", template="k")
         requests = [OrderRequest(OrderKind.RETURN, "room"), OrderRequest(OrderKind.GUIDE, "r")]

@@ -39,7 +39,7 @@ class Screen:
     async def wait_for_pickups(self, *, seconds: float) -> None:
         """Have the robot wait so long instead of the usual 300 s."""
         delivery = self._robot[Delivery]
-        await delivery.set_policy(replace(delivery.policy, pickup_seconds=seconds))
+        await delivery.change_policy(lambda policy: replace(policy, pickup_seconds=seconds))
 
     @property
     def pose(self) -> Pose:

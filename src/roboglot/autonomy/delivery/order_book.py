@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypedDict, Unpack
 
@@ -50,6 +51,7 @@ class OrderBook:
         self._ledger, self._settings = robot[Ledger], robot[Settings]
         self._orders = {id: _revived(document) for id, document in self._ledger.all(KIND)}
         self.policy = msgspec.convert(self._settings.get(POLICY, {}), Policy)
+        self._turn = asyncio.Lock()  # of changes: each begins with what the one before left
 
     @property
     def orders(self) -> Sequence[Order]:
@@ -85,24 +87,29 @@ class OrderBook:
             )
             for request in requests
         ]
-        await self._write(*orders)
+        async with self._turn:
+            await self._write(*orders)
         return orders
 
     async def change(self, id: str, **changes: Unpack[OrderChanges]) -> Order:
         """Change an order; return it once it is safe on disk."""
-        order = replace(self._orders[id], changed_at=self._robot.clock.epoch(), **changes)
-        await self._write(order)
+        async with self._turn:
+            order = replace(self._orders[id], changed_at=self._robot.clock.epoch(), **changes)
+            await self._write(order)
         return order
 
     async def end_all(self, **changes: Unpack[OrderChanges]) -> None:
         """End all open orders in one transaction; ``changes``: their new status."""
         now = self._robot.clock.epoch()
-        await self._write(*(replace(order, changed_at=now, **changes) for order in self.open))
+        async with self._turn:
+            await self._write(*(replace(order, changed_at=now, **changes) for order in self.open))
 
-    async def set_policy(self, policy: Policy) -> None:
-        """Set the policy; return once it is safe on disk."""
-        await self._settings.put(POLICY, msgspec.to_builtins(policy))
-        self.policy = policy
+    async def change_policy(self, edit: Callable[[Policy], Policy]) -> None:
+        """Replace the policy by ``edit`` of it; return once it is safe on disk."""
+        async with self._turn:
+            policy = edit(self.policy)
+            await self._settings.put(POLICY, msgspec.to_builtins(policy))
+            self.policy = policy
 
     @property
     def held(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from roboglot.autonomy.delivery.courier import Courier
 from roboglot.autonomy.delivery.drive import DeliveryDrive
@@ -60,8 +60,8 @@ class QueueDelivery(Delivery):
     def policy(self) -> Policy:
         return self._book.policy
 
-    async def set_policy(self, policy: Policy) -> None:
-        await self._book.set_policy(policy)
+    async def change_policy(self, edit: Callable[[Policy], Policy]) -> None:
+        await self._book.change_policy(edit)
         self._driver.report(DeliveryNews.SETTINGS_CHANGED)
         if self._courier.delivers:
             self._courier.wake()

@@ -108,7 +108,8 @@ async def test_stored_flags_act_as_they_are_shown(screen: Screen, robot: Robot) 
     """An earlier version took unlisted flags."""
     await put(screen, "admin/move_options", {"flags": ["with_yaw"], "yaw": 1.57})
     policy = robot[Delivery].policy
-    await robot[Delivery].set_policy(replace(policy, words={**policy.words, "flags": ["with_yaw", "fast", None]}))
+    words = {**policy.words, "flags": ["with_yaw", "fast", None]}
+    await robot[Delivery].change_policy(lambda policy: replace(policy, words=words))
     options = await get(screen, "admin/move_options")
     assert (options["flags"], options["yaw"], robot[Delivery].policy.yaw) == (["with_yaw"], 1.57, 1.57)
     await put(screen, "admin/move_options", {"speed_ratio": 0.5})

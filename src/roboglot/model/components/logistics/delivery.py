@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from enum import StrEnum
 
@@ -211,8 +211,8 @@ class Delivery(Component):
         """Current rules."""
 
     @abstractmethod
-    async def set_policy(self, policy: Policy) -> None:
-        """Set the rules; return once they are on disk."""
+    async def change_policy(self, edit: Callable[[Policy], Policy]) -> None:
+        """Replace the rules by ``edit`` of them, after every change under way; return once they are on disk."""
 
     @abstractmethod
     async def accept(self, *requests: OrderRequest) -> Sequence[Order]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import get_args
 
@@ -47,8 +48,8 @@ RATIO_MIN = 0.1
 DONE = OperationReply(result=True)
 
 
-async def _set(context: Context, policy: Policy) -> OperationReply:
-    await context.robot[Delivery].set_policy(policy)
+async def _set(context: Context, edit: Callable[[Policy], Policy]) -> OperationReply:
+    await context.robot[Delivery].change_policy(edit)
     return DONE
 
 
@@ -77,7 +78,7 @@ def get_work_mode(context: Context) -> WorkModeEntry:
 @TABLE.on(f"PUT {API}/admin/mode", right=Right.EDIT, needs=(Delivery,))
 async def set_work_mode(context: Context, body: WorkModeEntry) -> OperationReply:
     """Set the tasks that may be created at the robot: DISPATCH none, RECYCLE collecting dishes, MANUAL any."""
-    return await _set(context, replace(context.robot[Delivery].policy, work_mode=WorkMode(body.work_mode.lower())))
+    return await _set(context, lambda policy: replace(policy, work_mode=WorkMode(body.work_mode.lower())))
 
 
 @TABLE.on(f"GET {API}/admin/language", right=Right.SEE, needs=(Settings,))
@@ -107,7 +108,7 @@ async def set_working_time(context: Context, body: WorkingTime) -> OperationRepl
     """Set the working hours (UTC), outside of which the robot rests on its dock and tasks wait."""
     hours = tuple((_seconds(entry.start_time), _seconds(entry.end_time)) for entry in body.hours)
     rest_days = tuple(sorted(set(body.restdays)))
-    return await _set(context, replace(context.robot[Delivery].policy, hours=hours, rest_days=rest_days))
+    return await _set(context, lambda policy: replace(policy, hours=hours, rest_days=rest_days))
 
 
 def _seconds(clock: str) -> int:
@@ -128,14 +129,18 @@ def get_move_options(context: Context) -> MoveOptions:
 @TABLE.on(f"PUT {API}/admin/move_options", right=Right.EDIT, needs=(Delivery,))
 async def set_move_options(context: Context, body: dict[str, object] | None = None) -> OperationReply:
     """Change the given settings, or reset all by an empty body; applies from the next drive."""
-    policy = context.robot[Delivery].policy
+    return await _set(context, lambda policy: _with_move_options(policy, body))
+
+
+def _with_move_options(policy: Policy, body: dict[str, object] | None) -> Policy:
+    """Return the policy with the given settings, or with none. Raises InvalidGoal."""
     words = {**_stored(policy), **body} if body else {}
     words = {name: value for name, value in words.items() if name in MoveOptions.__struct_fields__}
     try:
         how = _effective(msgspec.convert(words, MoveOptions))
     except msgspec.ValidationError as error:
         raise InvalidGoal(why_invalid(error, wanted=MoveOptions)) from None
-    new = replace(
+    return replace(
         policy,
         words=words,
         tracks=TRACKS[how.mode],
@@ -143,7 +148,6 @@ async def set_move_options(context: Context, body: dict[str, object] | None = No
         retries=how.fail_retry_count or 0 if how.has("fail_retry_count") else 0,
         speed_ratio=min(max(how.speed_ratio, RATIO_MIN), 1.0) if how.speed_ratio else 1.0,
     )
-    return await _set(context, new)
 
 
 def _stored(policy: Policy) -> dict[str, object]:
@@ -180,10 +184,13 @@ def get_line_speed(context: Context) -> LineSpeed:
 @TABLE.on(f"PUT {API}/admin/line_speed", right=Right.EDIT, needs=(Delivery,))
 async def set_line_speed(context: Context, body: LineSpeed) -> None:
     """Set the speeds from the next drive on, at most the robot's top speed."""
-    policy = context.robot[Delivery].policy
-    there = policy.delivery_speed if body.delivery_speed is None else body.delivery_speed
-    back = policy.return_speed if body.return_speed is None else body.return_speed
-    await _set(context, replace(policy, delivery_speed=there, return_speed=back))
+
+    def edit(policy: Policy) -> Policy:
+        there = policy.delivery_speed if body.delivery_speed is None else body.delivery_speed
+        back = policy.return_speed if body.return_speed is None else body.return_speed
+        return replace(policy, delivery_speed=there, return_speed=back)
+
+    await _set(context, edit)
 
 
 @TABLE.on(f"GET {API}/configurations", right=Right.SEE, needs=(Settings,))
@@ -213,7 +220,7 @@ def get_delivery_settings(context: Context) -> WrappedSettings:
 @TABLE.on(f"PUT {API}/settings/timeout", right=Right.EDIT, needs=(Delivery,))
 async def set_timeout_settings(context: Context, body: TimeoutChange) -> None:
     """Set the time that the robot waits for a guest to take the food, s."""
-    await _set(context, replace(context.robot[Delivery].policy, food_seconds=float(body.food_pickup_timeout)))
+    await _set(context, lambda policy: replace(policy, food_seconds=float(body.food_pickup_timeout)))
 
 
 @TABLE.on(f"GET {API}/voice_resources", right=Right.SEE, needs=(Settings,))
