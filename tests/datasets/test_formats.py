@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import math
 import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,33 @@ def test_each_format_gives_the_same_drive(tmp_path: Path, write) -> None:
 
 def test_rawlogs_of_the_first_years_are_read(tmp_path: Path) -> None:
     check(read_drive_log(rawlog(tmp_path / "drive.rawlog", old=True)), 0.1)
+
+
+@pytest.mark.parametrize("piece", [100, 997, 4096])
+def test_rawlogs_are_read_piece_by_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, piece: int) -> None:
+    monkeypatch.setattr("roboglot.datasets.rawlog.PIECE", piece)
+    monkeypatch.setattr("roboglot.datasets.rawlog.OBJECT_MAX", 2000)
+    check(read_drive_log(rawlog(tmp_path / "drive.rawlog")), 0.1)
+
+
+def test_packed_zeros_take_no_memory(tmp_path: Path) -> None:
+    file = tmp_path / "drive.rawlog"
+    file.write_bytes(gzip.compress(bytes(16 << 20)) * 4)
+    tracemalloc.start()
+    with pytest.raises(BadDriveLog, match="no readable"):
+        read_drive_log(file)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 40 << 20
+
+
+@pytest.mark.parametrize(("limit", "value"), [("READINGS_MAX", 500), ("SCANS_MAX", 3), ("FILE_BYTES_MAX", 900)])
+def test_rawlogs_that_unpack_too_long_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, value: int
+) -> None:
+    monkeypatch.setattr(f"roboglot.datasets.rawlog.{limit}", value)
+    with pytest.raises(BadDriveLog, match=f"more than .*{value}"):
+        read_drive_log(rawlog(tmp_path / "drive.rawlog"))
 
 
 def test_tables_may_hold_a_reference(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """MRPT ``.rawlog`` files: laser scans with odometry of actions or observations, in every version of the classes.
 
 Objects are found by their headers, so classes that are of no use for maps (images, satellites, gas) need no reader.
+Files are read, and unpacked, piece by piece: only the scans stay in memory.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Sequence
+from io import BufferedIOBase
 from pathlib import Path
 
 import numpy as np
@@ -24,13 +26,17 @@ from roboglot.model.sensing import LaserScan
 from roboglot.values import dataclass
 
 SCAN, ODOMETRY, MOVEMENT, POSE = "CObservation2DRangeScan", "CObservationOdometry", "CActionRobotMovement2D", "CPose2D"
-NAME_BEGINS = rb"(?:[\x80-\xff](?:mrpt::\w+::)?|[\x05-\x40]\0\0\0)"  # the length takes one byte, or four in old files
-HEADER = re.compile(NAME_BEGINS + b"(" + b"|".join(name.encode() for name in (SCAN, ODOMETRY, MOVEMENT)) + b")")
-POSE_HEADER = re.compile(NAME_BEGINS + POSE.encode())
+NAMES = re.compile(b"|".join(name.encode() for name in (SCAN, ODOMETRY, MOVEMENT)))
+BEGIN_MAX = 48  # bytes of a header before the name: the length in one byte, or in four in old files; the namespace
+BEGIN = rb"(?:[\x80-\xff](?:mrpt::\w{1,39}::)?|[\x05-\x40]\0\0\0)"
+NAME_BEGIN, POSE_HEADER = re.compile(BEGIN + rb"\Z"), re.compile(BEGIN + POSE.encode())
 POSE_WITHIN = 200  # bytes after a movement's header within which its mean pose begins
 EPOCH = 11_644_473_600  # s from 1601, the epoch of MRPT, to 1970
 LABEL_MAX = 1000  # characters
 RANGE_MIN = 0.03  # m
+PIECE = 8 << 20  # bytes that are read at a time
+OBJECT_MAX = 64 << 10  # bytes of a scan, from the first of its header, of which RAYS_MAX take 40 KB
+READINGS_MAX = 200_000_000  # of all scans
 
 
 class _Reader:
@@ -81,7 +87,7 @@ class _Scan:
 def read_rawlog(path: Path) -> DriveLog:
     """Read the file at ``path``. Raises BadDriveLog."""
     unread = Counter[str]()
-    scans, stamped = _objects(_unpacked(path), path.name, unread)
+    scans, stamped = _objects(path, unread)
     if not scans:
         raise BadDriveLog(f"{path.name}: no readable {SCAN}")
     label, _ = Counter(scan.label for scan in scans).most_common(1)[0]
@@ -91,41 +97,64 @@ def read_rawlog(path: Path) -> DriveLog:
     return DriveLog(path.stem, recorded, dict(unread))
 
 
-def _objects(data: bytes, name: str, unread: Counter[str]) -> tuple[list[_Scan], list[tuple[float, Pose]]]:
+def _objects(path: Path, unread: Counter[str]) -> tuple[list[_Scan], list[tuple[float, Pose]]]:
     """Return the scans, and the odometry with its stamps; what cannot be read is counted in ``unread``.
 
     Raises BadDriveLog.
     """
     scans: list[_Scan] = []
     stamped: list[tuple[float, Pose]] = []
-    pose, moved = ORIGIN, False
-    for found in HEADER.finditer(data):
-        kind = found[1].decode()
+    pose, moved, readings = ORIGIN, False, 0
+    for data, name, begin in _headers(path):
+        kind = name[0].decode()
         try:
             if kind == SCAN:
-                scans.append(_scan(data, found.start(), pose if moved else None))
+                scans.append(_scan(data, begin, pose if moved else None))
+                readings += len(scans[-1].scan.ranges)
             elif kind == ODOMETRY:
-                stamped.append(_odometry(data, found.start()))
+                stamped.append(_odometry(data, begin))
             else:
-                pose, moved = pose.compose(_movement(data, found.end())), True
+                pose, moved = pose.compose(_movement(data, name.end())), True
         except (ValueError, struct.error) as error:
             unread[f"{kind}: {error}"] += 1
-        if len(scans) > SCANS_MAX:
-            raise BadDriveLog(f"{name}: more than {SCANS_MAX} scans")
+        if len(scans) > SCANS_MAX or readings > READINGS_MAX:
+            raise BadDriveLog(f"{path.name}: more than {SCANS_MAX} scans or {READINGS_MAX} readings")
     return scans, stamped
 
 
-def _unpacked(path: Path) -> bytes:
-    with path.open("rb") as file:
-        packed = file.read(2) == b"\x1f\x8b"
+def _headers(path: Path) -> Iterator[tuple[bytes, re.Match[bytes], int]]:
+    """Yield the name of each object, with the piece of the file in which the whole object lies, and its begin there.
+
+    Raises BadDriveLog.
+    """
+    data, size = b"", 0
     try:
-        with gzip.open(path) if packed else path.open("rb") as file:
-            data = file.read(FILE_BYTES_MAX + 1)
+        with _opened(path) as file:
+            while piece := file.read(PIECE):
+                if (size := size + len(piece)) > FILE_BYTES_MAX:
+                    raise BadDriveLog(f"{path.name}: more than {FILE_BYTES_MAX} bytes unpacked")
+                data += piece
+                data = data[(yield from _headers_in(data, len(data) - OBJECT_MAX)) :]
     except (OSError, EOFError, zlib.error) as error:
         raise BadDriveLog(f"{path.name}: {error}") from None
-    if len(data) > FILE_BYTES_MAX:
-        raise BadDriveLog(f"{path.name}: more than {FILE_BYTES_MAX} bytes unpacked")
-    return data
+    yield from _headers_in(data, len(data))
+
+
+def _headers_in(data: bytes, until: int) -> Generator[tuple[bytes, re.Match[bytes], int], None, int]:
+    """Yield the headers with names before ``until``; return where to search on."""
+    after = 0
+    for name in NAMES.finditer(data, 0, max(until, 0)):
+        first = max(after, name.start() - BEGIN_MAX)
+        if begins := NAME_BEGIN.search(data, first, name.start()):
+            yield data, name, begins.start()
+            after = name.end()
+    return max(after, until - BEGIN_MAX)
+
+
+def _opened(path: Path) -> BufferedIOBase:
+    with path.open("rb") as file:
+        packed = file.read(2) == b"\x1f\x8b"
+    return gzip.open(path) if packed else path.open("rb")
 
 
 def _joined(scans: Sequence[_Scan], stamped: Sequence[tuple[float, Pose]]) -> list[RecordedScan]:
