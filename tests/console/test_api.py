@@ -91,6 +91,8 @@ async def test_one_robot_is_driven_mapped_and_refused(served: ServedConsole) -> 
         ("/api/world/inject_fault", {"kind": "low_batery"}, 400, "low_battery"),
         ("/api/world/inject_fault", {"kind": "low_battery", "options": {"charge": "much"}}, 400, "low_battery"),
         ("/api/world/move_thing", {"thing": "x", "x": 0, "y": 0}, 400, "no thing"),
+        ("/api/world/add_box", {"x": 3, "y": 2, "floor": 7}, 400, "floor 7 of this world has no place (3, 2, 0)"),
+        ("/api/robots/a/stop", {"": 0}, 400, "is unknown"),
     ):
         status, answer = await served.ask(path, values)
         assert (status, words in answer["error"]) == (expected, True), answer

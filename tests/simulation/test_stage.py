@@ -1,5 +1,6 @@
 """The documentation's example of hands runs as it stands there; the same seed gives the same blows and shots."""
 
+import math
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.errors import Collided, NotFound, Refused
 from roboglot.model.events import ArmorHit
 from roboglot.model.geometry import Pose, Twist, Vector3
+from roboglot.model.sound import claps
 from roboglot.simulation.world.description import Box
 from roboglot.simulation.world.world_files import load_world
 from tests.narrowing import known
@@ -168,6 +170,24 @@ async def test_nothing_is_put_into_a_robot(simulate):
     sim.world.start()
     await sim.clock.advance(1.0)
     assert sim.world.truth.height_of("a") == pytest.approx(0.0, abs=0.01)
+
+
+def test_nothing_is_put_outside_of_the_world(simulate):
+    hands = simulate("empty").world.hands
+    box, tag = hands.add_obstacle(Pose(8.0, 8.0)), hands.add_tag("1", Pose(8.0, 8.0))
+    for pose, floor in ((Pose(8.0, 8.0), 1), (Pose(8.0, 8.0), -1), (Pose(-9000.0, 8.0), 0), (Pose(8.0, math.nan), 0)):
+        for put in (
+            lambda pose, floor: hands.add_obstacle(pose, floor=floor),
+            lambda pose, floor: hands.move_obstacle(box, pose, floor),
+            lambda pose, floor: hands.add_tag("2", pose, floor),
+            lambda pose, floor: hands.move_tag(tag, pose, floor),
+            lambda pose, floor: hands.add_person(pose, floor),
+            lambda pose, floor: hands.place("a", pose, floor),
+            lambda pose, floor: hands.make_sound(claps(), pose.point, floor),
+        ):
+            with pytest.raises(ValueError, match="has no place"):
+                put(pose, floor)
+    assert (len(hands.obstacles), len(hands.tags), len(hands.people)) == (1, 1, 0)
 
 
 async def test_robot_goes_back_only_to_a_free_start(simulate):

@@ -174,6 +174,7 @@ class WorldStage(Stage):
         self._environment.things[name].put(np.array((position.x, position.y, position.z)))
 
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
+        self._check_inside(pose, floor)
         self._check_clear(Solid(SolidKind.FURNITURE, pose, size), floor)
         return self._physics.add_obstacle(pose, size, floor)
 
@@ -217,6 +218,7 @@ class WorldStage(Stage):
         self._physics.props.take_down(number)
 
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
+        self._check_inside(Pose(at.x, at.y), floor)
         self._environment.air.emit(Source(sound, at, floor, self._clock.time(), loudness))
 
     @property
