@@ -13,7 +13,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from enum import StrEnum
 from functools import cached_property
 from types import CoroutineType
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 import msgspec
 
@@ -22,6 +22,7 @@ from roboglot.values import dataclass
 
 K = TypeVar("K", bound=Hashable)
 Handler = TypeVar("Handler", bound=Callable[..., object])
+Rename = Literal["camel"]
 _ZEROS = re.compile(r"(?<=^-)0+(?=\d)|^0+(?=\d)")  # of the first number, which JSON would not allow
 
 
@@ -46,8 +47,8 @@ class BadParameters(ValueError):
 class Schema:
     """Schema of a handler, from its signature; read at the first use, as most operations are never called."""
 
-    def __init__(self, handler: Callable[..., object], *, exact: bool = False) -> None:
-        self._handler, self._exact = handler, exact
+    def __init__(self, handler: Callable[..., object], *, exact: bool = False, rename: Rename | None = None) -> None:
+        self._handler, self._exact, self._rename = handler, exact, rename
 
     @cached_property
     def signature(self) -> inspect.Signature:
@@ -57,13 +58,13 @@ class Schema:
     @cached_property
     def parameters(self) -> type[msgspec.Struct]:
         """Struct of the parameters after the first."""
-        return _parameters_of(self._handler.__qualname__, self.signature, self._exact)
+        return _parameters_of(self._handler.__qualname__, self.signature, self._exact, self._rename)
 
     def without_zeros(self, values: Mapping[str, object]) -> Mapping[str, object]:
         """Return ``values`` without the zeros before a number ("000", "-07"), which JSON does not allow."""
         found = msgspec.inspect.type_info(self.parameters)
         fields = found.fields if isinstance(found, msgspec.inspect.StructType) else ()
-        numbers = {field.name for field in fields if _is_number(field.type)}
+        numbers = {field.encode_name for field in fields if _is_number(field.type)}
         return {
             name: _ZEROS.sub("", value) if isinstance(value, str) and name in numbers else value
             for name, value in values.items()
@@ -137,11 +138,13 @@ class Operation(Generic[K]):
 class OperationTable(Generic[K]):
     """All operations of one protocol; a name declared twice fails at import.
 
-    ``exact``: unknown parameters are refused, not ignored.
+    ``exact``: unknown parameters are refused, not ignored. ``rename``: the form of the parameters' names on the wire.
     """
 
-    def __init__(self, name: str, right: Right | None = None, *, exact: bool = False) -> None:
-        self.name, self._exact = name, exact
+    def __init__(
+        self, name: str, right: Right | None = None, *, exact: bool = False, rename: Rename | None = None
+    ) -> None:
+        self.name, self._exact, self._rename = name, exact, rename
         self._right = right  # for all operations that declare none
         self._operations: dict[K, Operation[K]] = {}
 
@@ -157,7 +160,7 @@ class OperationTable(Generic[K]):
 
         def register(handler: Handler) -> Handler:
             _refuse_untyped(handler)
-            schema = Schema(handler, exact=self._exact)
+            schema = Schema(handler, exact=self._exact, rename=self._rename)
             for key in keys:
                 if key in self._operations:
                     raise ValueError(f"{self.name}: {key!r} is declared twice")
@@ -208,11 +211,11 @@ def _refuse_untyped(handler: Callable[..., object]) -> None:
             raise TypeError(f"{handler.__qualname__}: parameter {name} has no type")
 
 
-def _parameters_of(name: str, signature: inspect.Signature, exact: bool) -> type[msgspec.Struct]:
+def _parameters_of(name: str, signature: inspect.Signature, exact: bool, rename: Rename | None) -> type[msgspec.Struct]:
     """Return a struct type with a handler's parameters after the first."""
     _, *parameters = signature.parameters.values()
     fields: list[tuple[str, object] | tuple[str, object, object]] = []
     for parameter in parameters:
         field = (parameter.name, parameter.annotation)
         fields.append(field if parameter.default is parameter.empty else (*field, parameter.default))
-    return msgspec.defstruct(name, fields, kw_only=True, forbid_unknown_fields=exact)
+    return msgspec.defstruct(name, fields, kw_only=True, forbid_unknown_fields=exact, rename=rename)

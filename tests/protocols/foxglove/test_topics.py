@@ -148,6 +148,9 @@ async def test_wrong_messages_are_answered_in_words(scene: Scene) -> None:
         '{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 9999}]}',
         '{"op": "subscribe", "subscriptions": [{"id": -1, "channelId": 1}]}',
         '{"op": "unsubscribe", "subscriptionIds": [77]}',
+        '{"op": "serviceCallRequest"}',
+        '{"op": "serviceCallRequest", "service": "x", "call": []}',
+        '{"op": "unsubscribe", "subscriptionIds": [null]}',
         '{"op": "subscribeConnectionGraph"}',
         b"\x03" + bytes(17),
     )
@@ -155,6 +158,7 @@ async def test_wrong_messages_are_answered_in_words(scene: Scene) -> None:
         await viewer.socket.send(message)
     await viewer.until(lambda: len(viewer.complaints) == len(wrong))
     assert [row["level"] for row in viewer.said["status"]] == [2] * len(wrong)
+    assert "unsubscribe: subscriptionIds[0] must be a whole number, not null" in viewer.complaints
     await viewer.socket.send(b"\x02" + (7).to_bytes(4, "little") + (8).to_bytes(4, "little") + bytes(4))
     await viewer.until(lambda: "serviceCallFailure" in viewer.said)
     assert (viewer.said["serviceCallFailure"][0]["serviceId"], viewer.said["serviceCallFailure"][0]["callId"]) == (7, 8)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Right
@@ -16,7 +15,6 @@ from roboglot.wire.contracts import contract
 from roboglot.wire.foxglove.messages import Level, Malformed, Request, read_request
 
 log = logging.getLogger(__name__)
-_HUMP = re.compile(r"(?<=[a-z])[A-Z]")
 
 
 async def answer(context: Context, message: str | bytes) -> None:
@@ -48,7 +46,7 @@ async def _do(context: Context, request: Request) -> tuple[Level, str]:
     try:
         context.robot.admission.check(DOOR, request.key, operation.right or Right.ADMIN)
         context.robot.starts.check(operation.right)
-        await operation.call(context, {_snake(name): value for name, value in request.values.items()})
+        await operation.call(context, request.values)
     except BadParameters as bad:
         return Level.ERROR, str(bad)
     except RobotError as error:
@@ -57,7 +55,3 @@ async def _do(context: Context, request: Request) -> tuple[Level, str]:
         log.exception("robot %s: %s crashed", context.robot.id, request.key)
         return Level.ERROR, f"the robot could not do it: {error}"
     return Level.INFO, ""
-
-
-def _snake(name: str) -> str:
-    return _HUMP.sub(lambda match: f"_{match[0].lower()}", name)

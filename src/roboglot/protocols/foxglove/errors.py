@@ -20,7 +20,7 @@ def refusal(request: Request, why: str, level: Level = Level.ERROR) -> str | byt
     """Return the reply to a refused request."""
     values = request.values
     match request.key:
-        case "serviceCallRequest":
+        case "serviceCallRequest" if _is_number(values.get("service")) and _is_number(values.get("call")):
             return message("serviceCallFailure", serviceId=values["service"], callId=values["call"], message=why)
         case "fetchAsset" if _is_number(values.get("requestId")):
             return asset_failure(values["requestId"], why)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboglot.operations import OperationTable
 
-TABLE: OperationTable[str] = OperationTable("foxglove")
+TABLE: OperationTable[str] = OperationTable("foxglove", rename="camel")
 SENT = frozenset({"serverInfo", "status", "advertise", "messageData", "time", "parameterValues", "playbackState"})
 REFUSALS = frozenset({"serviceCallFailure"})  # the door sends these; there is no other service
 
