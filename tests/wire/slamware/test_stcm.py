@@ -83,13 +83,14 @@ def test_grids() -> None:
     assert (again.cells == cells).all()
     assert stcm_layers.read_grid(Layer((("usage", "sweep"), ("type", stcm_layers.GRID)))) is None
     assert stcm_layers.read_grid(Layer((*layer.pairs, ("compression", "rle")), layer.payload)) is None
-    for broken in (
-        Layer(layer.pairs, layer.payload[:-1]),
-        Layer((*layer.pairs, ("origin_x", "nan")), layer.payload),
-        Layer((*layer.pairs, ("resolution_x", "0")), layer.payload),
-        Layer((*layer.pairs, ("dimension_width", "two")), layer.payload),
+    for broken, words in (
+        (Layer(layer.pairs, layer.payload[:-1]), "3 x 2 cells do not make 5"),
+        (Layer((*layer.pairs, ("origin_x", "nan")), layer.payload), "no map has its corner"),
+        (Layer((*layer.pairs, ("origin_x", "")), layer.payload), "the grid's origin_x is missing or no number"),
+        (Layer((*layer.pairs, ("resolution_x", "0")), layer.payload), "cells of 0.0 x"),
+        (Layer((*layer.pairs, ("dimension_width", "two")), layer.payload), "dimension_width is missing or no whole"),
     ):
-        with pytest.raises(BadMap):
+        with pytest.raises(BadMap, match=words):
             stcm_layers.read_grid(broken)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
@@ -28,6 +29,7 @@ JSON = "vnd.roboglot.map-layer/json"
 EXPLORE, WALLS, TRACKS = "explore", "virtual_walls", "virtual_tracks"
 PLACES, DOCKS, AREAS, LANDMARKS = "point_of_interest", "home_dock_pose", "rectangle_area", "landmark"
 T = TypeVar("T")
+N = TypeVar("N", int, float)
 ENTRIES_MAX = 20_000  # per layer
 PAIRS_MAX = 400_000  # of all entries of a file
 _ENDS, _POSE = struct.Struct("<4f"), struct.Struct("<3f")
@@ -114,16 +116,21 @@ def read_grid(layer: Layer) -> ExploreMap | None:
     if not is_grid(layer):
         return None
     values = layer.metadata
-    try:
-        width, height = int(values["dimension_width"]), int(values["dimension_height"])
-        x, y, resolution, other = (float(values[k]) for k in ("origin_x", "origin_y", "resolution_x", "resolution_y"))
-    except (KeyError, ValueError) as error:
-        raise BadMap(f"the grid's {error} is missing or no number") from None
+    width, height = (_number(values, key, int) for key in ("dimension_width", "dimension_height"))
+    keys = ("origin_x", "origin_y", "resolution_x", "resolution_y")
+    x, y, resolution, other = (_number(values, key, float) for key in keys)
     if not (min(width, height) >= 0 and width * height == len(layer.payload) <= CELLS_MAX):
         raise BadMap(f"{width} x {height} cells do not make {len(layer.payload)}")
     if not (math.hypot(x, y) <= COORDINATE_MAX and 0 < resolution < math.inf and resolution == other):
         raise BadMap(f"no map has its corner at ({x}, {y}) and cells of {resolution} x {other} m")
     return ExploreMap(x, y, resolution, np.frombuffer(layer.payload, np.int8).reshape(height, width))
+
+
+def _number(values: Mapping[str, str], key: str, kind: Callable[[str], N]) -> N:
+    try:
+        return kind(values[key])
+    except (KeyError, ValueError):
+        raise BadMap(f"the grid's {key} is missing or no {'whole ' if kind is int else ''}number") from None
 
 
 def line_layer(usage: str, lines: list[LineEntry]) -> Layer:
