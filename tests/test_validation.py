@@ -159,6 +159,13 @@ def test_a_deep_nest_is_named() -> None:
     assert why_invalid(raised.value) == "JSON is nested too deeply"
 
 
+@pytest.mark.parametrize(("sent", "words"), [(b'"\xff"', "the text is not UTF-8"), (b'{"x"', "JSON is incomplete")])
+def test_broken_json_is_named_in_plain_words(sent: bytes, words: str) -> None:
+    with pytest.raises(ValueError) as raised:  # noqa: PT011 - of two libraries
+        msgspec.json.decode(sent)
+    assert why_invalid(raised.value) == words
+
+
 @pytest.mark.parametrize("word", ["nan", "NaN", "inf", "-Infinity", "-nan", r"\u006ean", r"\u002dinf", r"n\u0061n"])
 def test_a_number_in_an_answer_is_finite(word: str) -> None:
     with pytest.raises(msgspec.ValidationError):

@@ -27,7 +27,7 @@ PYTHON = {**KINDS, "bool": "True or False", "object": "a dictionary", "null": "N
 _PLACE = re.compile(r"(?s)(.*?)(?: - at `(key` in `)?\$\.?([^`]*)`)?")
 _FORMS = {  # the library's messages; the first group of a missing or unknown field belongs to the path
     r"Object missing required field `(.+)`": "{place} is missing",
-    r"Object contains unknown field `(.+)`": "{place} is unknown",
+    r"Object contains unknown field `(.*)`": "{place} is unknown",
     r"Expected `(.+)`, got `(.+)`": "{place} must be {}, not {}",
     r"Expected `str`": "{place} must be text",  # a field's name
     r"Expected `array` of length (\d+), got (\d+)": "{place} must have {} entries, not {}",
@@ -139,8 +139,10 @@ def _fields_of(kind: object) -> set[str]:
 def _plain(error: Exception, whole: str, field: str, kinds: Mapping[str, str]) -> str:
     if isinstance(error, RecursionError):
         return "JSON is nested too deeply"
+    if isinstance(error, UnicodeError):
+        return "the text is not UTF-8"
     if not isinstance(error, msgspec.ValidationError):
-        return str(error)
+        return "JSON is incomplete" if str(error) == "Input data was truncated" else str(error)
     found = _PLACE.fullmatch(str(error))
     message, key, path = found.groups() if found else (str(error), None, None)
     path = ".".join(filter(None, (field, path))).replace(".[", "[")

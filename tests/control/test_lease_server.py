@@ -100,7 +100,7 @@ async def test_control_is_given_to_doors_that_exist_only(desk: Path, robot: Robo
 
 async def test_only_owners_get_in_invalid_requests_are_reported(desk: Path) -> None:
     assert stat.S_IMODE((desk / NAME).stat().st_mode) == 0o600
-    for line in (b"what?\n", b'{"do":"dance"}\n', b'{"does":1}\n', b"\xff\n"):
+    for line in (b"what?\n", b'{"do":"dance"}\n', b'{"does":1}\n', b"\xff\n", b'{"robot": "\xff"}\n'):
         assert (await say(desk, line))["error"]
     assert await say(desk, b"x" * (LINE_MAX * 4) + b"\n") is None
     waiting = [await asyncio.open_unix_connection(desk / NAME) for _ in range(CALLERS_MAX)]

@@ -33,6 +33,7 @@ from roboglot.model.client_context import client, identity
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.protocols.turns import Turns
 from roboglot.transport.limiter import Limiter
+from roboglot.validation import why_invalid
 
 if TYPE_CHECKING:
     from roboglot.console.metrics import Metrics
@@ -230,8 +231,9 @@ class Application:
                 raise
             await send({"type": "websocket.close", "code": POLICY, "reason": "your rights have changed"})
         except (ValueError, MsgspecError, RecursionError) as error:
-            log.info("closed a page of %s: %s", client(), error)
-            await send({"type": "websocket.close", "code": BAD_DATA, "reason": str(error)[:100]})
+            why = why_invalid(error, "the message")
+            log.info("closed a page of %s: %s", client(), why)
+            await send({"type": "websocket.close", "code": BAD_DATA, "reason": why[:100]})
         finally:
             del self._listening[listening]
             pages.discard(page)

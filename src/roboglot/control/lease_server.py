@@ -20,7 +20,7 @@ from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.model.stage import Stage
 from roboglot.spelling import instead
-from roboglot.validation import why_invalid
+from roboglot.validation import decode_json, why_invalid
 
 NAME = "lease.sock"  # in the data folder
 LEASE = "lease"  # the kind of recorded inputs from this socket
@@ -69,7 +69,7 @@ class LeaseServer(LocalServer):
     async def _answer(self, line: bytes) -> bytes:
         error = ""
         try:
-            request = msgspec.json.decode(line, type=Request)
+            request = decode_json(line, Request)
             if request.do != "look":
                 await self._grant(request)
         except msgspec.DecodeError as refused:

@@ -10,7 +10,7 @@ import msgspec
 
 from roboglot.hosting.local_socket import LocalServer
 from roboglot.model.errors import RobotError
-from roboglot.validation import why_invalid
+from roboglot.validation import decode_json, why_invalid
 
 if TYPE_CHECKING:
     from roboglot.recording.recorder import Recorder
@@ -48,7 +48,7 @@ class RecordServer(LocalServer):
 
     async def _receive(self, line: bytes) -> bytes:
         try:
-            answer = await self._grant(msgspec.json.decode(line, type=Request))
+            answer = await self._grant(decode_json(line, Request))
         except (msgspec.DecodeError, RobotError, OSError) as refused:
             answer = Answer(error=why_invalid(refused, "the request", wanted=Request) or type(refused).__name__)
         return msgspec.json.encode(answer)

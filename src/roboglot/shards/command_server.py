@@ -14,7 +14,7 @@ from roboglot.shards.fleet_host import FleetHost
 from roboglot.shards.moving import NotForgotten, move_robot
 from roboglot.shards.requests import SOCKET, Answer, Request, RobotRow, Row
 from roboglot.shards.states import FleetEnds, Shard, State
-from roboglot.validation import why_invalid
+from roboglot.validation import decode_json, why_invalid
 
 REFUSALS = LookupError, ValueError, FleetEnds
 FAILURES = OSError, sqlite3.Error, NotForgotten
@@ -39,7 +39,7 @@ class CommandServer(LocalServer):
     async def _answer(self, line: bytes) -> bytes:
         error = ""
         try:
-            request = msgspec.json.decode(line, type=Request)
+            request = decode_json(line, Request)
             if request.do != "look":
                 async with self._turn:
                     error = await self._carry_out(request)

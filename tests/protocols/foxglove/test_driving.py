@@ -126,8 +126,10 @@ async def test_invalid_messages_are_refused(scene: Scene) -> None:
     await viewer.advertise("/a/goal_pose", "geometry_msgs/PoseStamped", 4)
     await viewer.publish(stamped(1, 1, frame="moon"), number=4)
     await viewer.publish({"pose": {"orientation": {"w": 0}}}, number=4)
+    await viewer.publish(b'{"header": {"frame_id": "\xff"}}', number=4)
     await viewer.settled()
-    assert len(viewer.complaints) == 9, viewer.complaints
+    assert len(viewer.complaints) == 10, viewer.complaints
+    assert viewer.complaints[-1] == "messageData: /a/goal_pose: the text is not UTF-8"
     assert not scene.robot.actions.running()
 
 

@@ -16,6 +16,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
+from roboglot.validation import decode_json
 from roboglot.values import dataclass
 from roboglot.wire.foxglove.messages import PUBLISHED_SIZE, ClientOpcode
 
@@ -96,8 +97,8 @@ def stops(message: str | bytes) -> bool:
     if isinstance(message, str) or not message or message[0] != ClientOpcode.MESSAGE_DATA:
         return False
     try:
-        request = msgspec.json.decode(message[PUBLISHED_SIZE:], type=RosTwist)
-    except (msgspec.DecodeError, RecursionError):
+        request = decode_json(message[PUBLISHED_SIZE:], RosTwist)
+    except msgspec.DecodeError:
         return False
     return twist(request) == Twist()
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from roboglot.validation import decode_json, why_invalid
 from roboglot.values import dataclass
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
@@ -93,10 +94,10 @@ def read_request(message: str | bytes) -> Request:
 
 def _read_text(text: str) -> Request:
     try:
-        value = msgspec.json.decode(text)
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise Malformed(f"no JSON: {error}") from None
-    if not isinstance(value, dict) or not isinstance(value.get("op"), str):
+        value = decode_json(text, dict[str, Any])
+    except msgspec.DecodeError as error:
+        raise Malformed(f"a message is a JSON object: {why_invalid(error)}") from None
+    if not isinstance(value.get("op"), str):
         raise Malformed("a message is a JSON object with op")
     return Request(value.pop("op"), value)
 

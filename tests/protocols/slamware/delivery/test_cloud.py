@@ -166,9 +166,11 @@ async def test_impossible_and_unknown_tasks_are_refused(
     nowhere = give(cloud, "b", type="RETURN", location={"poi_name": "nowhere"})
     nonsense = give(cloud, "c", type="FLY")
     (cloud / "tasks" / "d.json").write_bytes(b"\xff" * 100_000)
+    (cloud / "tasks" / "d2.json").write_bytes(b'{"type": "RETURN", "location": {"poi_name": "\xff"}}')
     await forward(seconds=8)
     events = await screen.events()
     assert "DISINFECT_TASK_FAILED" in events
+    assert "UTF-8" in (cloud / "tasks" / "d2.why").read_text()
     assert (nowhere(), nonsense()) == (".refused", ".refused")
     assert "nowhere" in (cloud / "tasks" / "b.why").read_text()
     assert (cloud / "tasks" / "d.refused").exists()

@@ -12,7 +12,7 @@ from roboglot.protocols import ros_commands
 from roboglot.protocols.foxglove.context import Context, Published
 from roboglot.protocols.foxglove.table import TABLE
 from roboglot.protocols.foxglove.vocabulary import PoseStamped, PoseWithCovarianceStamped, RosTwist, pose, twist
-from roboglot.validation import why_invalid
+from roboglot.validation import decode_json, why_invalid
 
 PUBLISHED_MAX = 100
 MESSAGE_MAX = 65536  # bytes
@@ -49,7 +49,7 @@ async def publish(context: Context, *, channel: int, data: bytes) -> None:
         raise InvalidGoal(f"a message has at most {MESSAGE_MAX} bytes")
     try:
         TOPICS[_name(context, published.topic)](context, data)
-    except (msgspec.DecodeError, RecursionError) as error:  # includes ValidationError
+    except msgspec.DecodeError as error:  # includes ValidationError
         raise InvalidGoal(f"{published.topic}: {why_invalid(error)}") from None
 
 
@@ -60,19 +60,19 @@ def _name(context: Context, topic: str) -> str:
 
 def _drive(context: Context, data: bytes) -> None:
     """Drive (geometry_msgs/Twist) until the next velocity, or for the dead-man time."""
-    request = twist(msgspec.json.decode(data, type=RosTwist))
+    request = twist(decode_json(data, RosTwist))
     ros_commands.drive(context.robot, request, context.config.dead_man, context.source)
 
 
 def _go(context: Context, data: bytes) -> None:
     """Navigate to a goal (geometry_msgs/PoseStamped); a status reports a failure."""
-    goal = msgspec.json.decode(data, type=PoseStamped)
+    goal = decode_json(data, PoseStamped)
     context.follow(ros_commands.go(context.robot, goal.header.frame_id, pose(goal.pose), context.source))
 
 
 def _place(context: Context, data: bytes) -> None:
     """Set the robot's pose (geometry_msgs/PoseWithCovarianceStamped)."""
-    there = msgspec.json.decode(data, type=PoseWithCovarianceStamped)
+    there = decode_json(data, PoseWithCovarianceStamped)
     ros_commands.place(context.robot, there.header.frame_id, pose(there.pose.pose))
 
 

@@ -18,7 +18,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, RobotError
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.delivery.vocabulary import KINDS, boxes_of
-from roboglot.validation import why_invalid
+from roboglot.validation import decode_json, why_invalid
 from roboglot.wire.slamware.chapters.cloud import CloudTask
 from roboglot.wire.slamware.chapters.delivery import VoicePackage
 
@@ -61,7 +61,7 @@ class CloudFolder:
         """Return the cloud's voice packages. Raises InvalidGoal for a malformed file."""
         data = self._read("voice.json", VOICE_MAX)
         try:
-            return msgspec.json.decode(data, type=list[VoicePackage]) if data else []
+            return decode_json(data, list[VoicePackage]) if data else []
         except msgspec.DecodeError as error:
             raise InvalidGoal(f"voice.json: {why_invalid(error, 'the list', wanted=list[VoicePackage])}") from None
 
@@ -105,12 +105,12 @@ class CloudFolder:
         """Queue a task and rename its file, so that the cloud sees the outcome."""
         try:
             data = self._read(f"tasks/{path.name}", TASK_MAX)
-            request = request_of(msgspec.json.decode(data or b"", type=CloudTask), path.stem)
+            request = request_of(decode_json(data or b"", CloudTask), path.stem)
             delivery = self._robot[Delivery]
             if request.number not in {order.number for order in delivery.orders}:  # accepted before a crash
                 await delivery.accept(request)
             _mark(path)
-        except (RobotError, msgspec.DecodeError, RecursionError) as error:
+        except (RobotError, msgspec.DecodeError) as error:
             why = why_invalid(error, wanted=CloudTask)
             log.warning("the cloud's task %s is refused: %s", path.name, why)
             _mark(path, refused=why)

@@ -19,7 +19,7 @@ from roboglot.protocols.slamware.chapters.motion.speed_limits import CONFIGURED
 from roboglot.protocols.slamware.chapters.system.devices import MASKED, restore_masks
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
-from roboglot.validation import why_invalid
+from roboglot.validation import decode_json, why_invalid
 
 ID_MAX, IDS_MAX = 10_000, 1000
 Speed = Annotated[float, msgspec.Meta(gt=0, le=10)]
@@ -43,8 +43,8 @@ class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
 async def set_cube_config(context: Context, body: bytes) -> None:
     """Configure the machine; 400 for unknown settings or values beyond the robot's limits."""
     try:
-        config = msgspec.json.decode(body, type=CubeConfig)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        config = decode_json(body, CubeConfig)
+    except msgspec.DecodeError as error:
         raise InvalidGoal(
             f"this robot cannot read the configuration: {why_invalid(error, wanted=CubeConfig)}"
         ) from None
