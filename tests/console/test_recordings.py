@@ -184,7 +184,8 @@ async def test_recording_is_fetched_and_deleted(served: ServedConsole) -> None:
     assert (listed["seconds"], listed["robots"]) == (2.0, ["a"])
     path = served.runtime.config.data / "recordings" / file
     assert await served.read(f"/api/recordings/{file}") == path.read_bytes()
-    assert (await served.ask("/api/recordings/no.mcap"))[0] == 404
+    for unknown in ("no.mcap", "x" * 300 + ".mcap", "%00.mcap", "..%2Fno.mcap", "no.txt"):
+        assert (await served.ask(f"/api/recordings/{unknown}"))[0] == 404
     assert (await served.ask("/api/recording", {"do": "delete", "file": file}))[0] == 200
     assert not path.exists()
     assert (await served.ask("/api/recording", {"do": "delete", "file": file}))[0] == 404

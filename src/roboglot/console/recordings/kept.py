@@ -125,9 +125,11 @@ class RecordingFolder:
     def path(self, file: str) -> Path:
         """Return the path of a file. Raises NotFound."""
         path = self._folder / file
-        if "/" in file or file.startswith(".") or path.suffix != SUFFIX or path.is_symlink() or not path.is_file():
-            raise NotFound(f"there is no recording {file!r}")
-        return path
+        known = "/" not in file and not file.startswith(".") and path.suffix == SUFFIX
+        with suppress(OSError):  # no file can have such a name
+            if known and not path.is_symlink() and path.is_file():
+                return path
+        raise NotFound(f"there is no recording {file!r}")
 
     def remove(self, file: str, running: Path | None) -> None:
         """Delete a recording with all its parts. Raises NotFound, Refused."""
