@@ -87,6 +87,7 @@ async def test_one_robot_is_driven_mapped_and_refused(served: ServedConsole) -> 
         ("/api/robots/a/dance", {}, 404, "no verb 'dance'"),
         ("/api/robots/a/go_to", {"points": []}, 400, "points must have at least 1 entries"),
         ("/api/robots/a/go_to", [1], 400, "not a JSON object"),
+        ("/api/robots/a/go_to", {"points": [[9000, 9000]]}, 400, "not a place on this map: (9000, 9000)"),
         ("/api/robots/a/cancel", {"action": 999}, 404, "no action 999"),
         ("/api/world/inject_fault", {"kind": "low_batery"}, 400, "low_battery"),
         ("/api/world/inject_fault", {"kind": "low_battery", "options": {"charge": "much"}}, 400, "low_battery"),

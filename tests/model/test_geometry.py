@@ -9,11 +9,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roboglot.model.components.mapping.localization import Region
+from roboglot.model.components.motion.base import WheelSpeeds
 from roboglot.model.geometry import ORIGIN, Point, Pose, Twist, wrap_angle
 from roboglot.model.maps import OccupancyGrid
 
 numbers = st.floats(-100, 100)
 poses = st.builds(Pose, numbers, numbers, st.floats(-math.pi, math.pi))
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (Point(1.5, -20_000.0), "(1.5, -20000)"),
+        (Pose(1e300, math.nan, 0.25), "(1e+300, nan, 0.25)"),
+        (Twist(0.1, 0.0, math.inf), "(0.1, 0, inf)"),
+        (WheelSpeeds(1.0, 2.0, 3.0, 4.0), "(1, 2, 3, 4)"),
+        (Region(0.0, 0.0, -1.0, 2.0), "(0, 0) to (-1, 2)"),
+    ],
+)
+def test_sentences_show_plain_numbers(value: object, words: str) -> None:
+    assert f"not a place: {value}" == f"not a place: {words}"
 
 
 @given(st.floats(-1e6, 1e6))

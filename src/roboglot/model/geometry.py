@@ -29,11 +29,19 @@ def wrap_angle(angle: float) -> float:
     return math.pi if wrapped == -math.pi else wrapped
 
 
+def written(*values: float) -> str:
+    """Return coordinates as sentences for users show them: (1.5, -2)."""
+    return f"({', '.join(f'{value:g}' for value in values)})"
+
+
 class Point(Struct, frozen=True, gc=False):
     """A place in the plane, in metres."""
 
     x: float = 0.0
     y: float = 0.0
+
+    def __str__(self) -> str:
+        return written(self.x, self.y)
 
     def distance_to(self, other: Point | Pose) -> float:
         """Straight distance in metres."""
@@ -50,6 +58,9 @@ class Pose(Struct, frozen=True, gc=False):
     x: float = 0.0
     y: float = 0.0
     yaw: float = 0.0
+
+    def __str__(self) -> str:
+        return written(self.x, self.y, self.yaw)
 
     @property
     def point(self) -> Point:
@@ -89,6 +100,9 @@ class Twist(Struct, frozen=True, gc=False):
     x: float = 0.0
     y: float = 0.0
     yaw: float = 0.0
+
+    def __str__(self) -> str:
+        return written(self.x, self.y, self.yaw)
 
     @property
     def speed(self) -> float:

@@ -7,7 +7,7 @@ from abc import abstractmethod
 from roboglot.model.actions import Action
 from roboglot.model.components.component import Component
 from roboglot.model.events import LostReason
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Pose, written
 from roboglot.values import dataclass
 
 GOOD_FIT = 0.5  # quality from which the pose counts as known
@@ -22,6 +22,9 @@ class Region:
     min_y: float
     max_x: float
     max_y: float
+
+    def __str__(self) -> str:
+        return f"{written(self.min_x, self.min_y)} to {written(self.max_x, self.max_y)}"
 
 
 class Localization(Component):

@@ -8,7 +8,7 @@ from msgspec import Struct
 
 from roboglot.model.components.component import Component
 from roboglot.model.errors import Blocked, Refused
-from roboglot.model.geometry import STILL, Twist
+from roboglot.model.geometry import STILL, Twist, written
 from roboglot.values import dataclass
 
 
@@ -32,6 +32,9 @@ class WheelSpeeds(Struct, frozen=True, gc=False):
     front_right: float = 0.0
     rear_left: float = 0.0
     rear_right: float = 0.0
+
+    def __str__(self) -> str:
+        return written(self.front_left, self.front_right, self.rear_left, self.rear_right)
 
 
 class Base(Component):
