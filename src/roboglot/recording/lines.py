@@ -15,6 +15,7 @@ from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.hosting.error_text import in_words
 from roboglot.model.clock import Clock
 from roboglot.recording.redaction import FILES
+from roboglot.wire.cyberdog.text import code_of
 from roboglot.wire.foxglove.messages import SUBPROTOCOLS, ClientOpcode
 from roboglot.wire.robomaster.replies import Reply
 
@@ -147,9 +148,9 @@ class DogLine(Line):
 
     async def request(self, operation: str, payload: bytes, answers: Sequence[bytes]) -> Answers:
         found: Answers = []
-        if not operation.isdigit():
+        if (code := code_of(operation)) is None:
             return found
-        code, text = int(operation), payload.decode("utf-8", "replace")
+        text = payload.decode("utf-8", "replace")
         if operation in FILES and answers and answers[0][:1] != b"{":  # recorded in chunks
             async for chunk in self._link.fetch(code, text):
                 found.append((chunk.SerializeToString(), "ok"))

@@ -45,7 +45,8 @@ async def test_simultaneous_pushes_keep_their_order() -> None:
     await clock.advance(31.0)
     for number in range(3):
         played.put("2001", b"%d" % number)
-    played.put("no code", b"x")
+    for none in ("no code", "²", "٣" * 4, "9" * 5000, str(2**31), "-1", ""):
+        played.put(none, b"x")
     await settle()
     assert app.heard == []
     app.come()

@@ -18,6 +18,7 @@ from roboglot.protocols.cyberdog.frame_queue import KEPT_SECONDS
 from roboglot.values import dataclass
 from roboglot.wire.cyberdog.chapters.system import HEARTBEAT, ticks_of
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
+from roboglot.wire.cyberdog.text import code_of
 
 WAITING_MAX = 4096  # per code; beyond this the oldest are dropped
 CODES_MAX = 256
@@ -47,9 +48,9 @@ class PlayedPushes:
         if operation == HEARTBEAT:
             self._beat = message
             return
-        if not operation.isdigit():
+        if (code := code_of(operation)) is None:
             return
-        code, text = int(operation), message.decode("utf-8", "replace")
+        text = message.decode("utf-8", "replace")
         if code not in self._lines and len(self._lines) >= CODES_MAX:
             return
         self._lines.setdefault(code, _Line()).waiting.append((self._clock.time(), text))

@@ -21,6 +21,14 @@ Three = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
 TwoOrThree = Annotated[list[float], msgspec.Meta(min_length=2, max_length=3)]
 
 
+def code_of(operation: str) -> int | None:
+    """Return the code in a recording's name of an operation; None if no message could carry it."""
+    if not (operation.isascii() and operation.isdecimal() and len(operation) < 11):
+        return None
+    code = int(operation)
+    return code if code < 2**31 else None
+
+
 class NotJson(ValueError):
     """``params`` are not JSON."""
 
