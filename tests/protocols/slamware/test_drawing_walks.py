@@ -34,7 +34,7 @@ from tests.protocols.held_fairness import PATIENCE, until
 from tests.protocols.slamware.conftest import PLATE, serve
 from tests.protocols.witness import Diary, seeds
 
-ROUNDS = 50
+ROUNDS = 25
 API = "/api/core/artifact/v1"
 POIS, MARKS = f"{API}/pois", f"{API}/laser-landmarks"
 LINES, AREAS = ("walls", "tracks"), ("forbidden_area", "maintenance_area")
