@@ -13,7 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from roboglot.console.live import Page
 from roboglot.console.server import those_due
-from roboglot.console.settings import BEAT_PAGES, OTHERS_BEATS
+from roboglot.console.settings import BEAT_PAGES, OTHERS_BEATS, REQUESTS_MAX
 from roboglot.model.components.system.lease import Lease
 from tests.console.conftest import ServedConsole
 
@@ -69,6 +69,23 @@ async def test_two_pages_contend_for_control(served: ServedConsole) -> None:
         assert await done(ben, "release_control") == ""
         assert await done(anna, "go_to", points=[[1, 0]]) == ""
         assert len(served.robot.actions.running()) == 1
+
+
+async def test_waiting_stops_leave_room_for_the_clock(served: ServedConsole) -> None:
+    """Stops that are pressed again and again while time stands wait for it; the page can still change the world."""
+    stops = [{"type": "do", "id": id, "robot": "a", "verb": "stop", "values": {}} for id in range(REQUESTS_MAX + 1)]
+    change = {"type": "do", "id": 1000, "robot": "", "verb": "add_box", "values": {"x": 3, "y": 2, "width": 0.5}}
+    errors = dict[int, str]()
+    await served.ask("/api/robots/a/go_to", {"points": [[2, 0]]})
+    await served.clock.advance(2.0)  # it has to brake
+    async with connect(served.url.replace("http", "ws") + "/live") as page, asyncio.timeout(60):
+        for message in (*stops, change):
+            await page.send(json.dumps(message))
+        while 1000 not in errors:
+            text = await page.recv()
+            if isinstance(text, str) and (answer := json.loads(text))["type"] == "done":
+                errors[answer["id"]] = answer.get("error", "")
+    assert errors == {REQUESTS_MAX: "too many commands are under way", 1000: ""}
 
 
 @given(drawing=st.integers(0, 32), reading=st.integers(0, 32), number=st.integers(0, 10_000))

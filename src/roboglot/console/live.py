@@ -260,7 +260,8 @@ class Page:
             self._reply({"type": "pad", "robot": velocity.robot, "refused": why})
 
     def _begin(self, request: Request) -> None:
-        if len(self._requests) >= REQUESTS_MAX:
+        room = REQUESTS_MAX if request.robot else 2 * REQUESTS_MAX  # those that wait for a paused clock leave some
+        if len(self._requests) >= room:
             self._reply({"type": "done", "id": request.id, "error": "too many commands are under way"})
             return
         task = asyncio.get_running_loop().create_task(self._carry_out(request), name=f"console {request.verb}")
