@@ -74,6 +74,16 @@ PROCESSES = (
     "end_to_end",
     "shards",
 )  # folders that contain some
+LONGEST = (  # for a worker: what starts browsers, environments and campaigns; begun late, they would run on alone
+    "tests/browser/",
+    "tests/test_core_install.py",
+    "tests/test_house.py",
+    "tests/test_runtime.py",
+    "tests/testing/test_campaign.py",
+    "tests/testing/test_ci.py",
+    "tests/testing/test_fixtures.py",
+    "tests/testing/test_server.py",
+)
 WORLDS = {"world", "robot", "fleet", "door", "client", "engine", "screen"}
 BUILDS_A_WORLD = re.compile(r"\b(?:World|build_fleet|Runtime|lockstep_runtime|RobotServer|serving)\(")
 STARTS_A_PROCESS = re.compile(r"\b(?:subprocess\.|create_subprocess_|multiprocessing\.|Engine\(|Popen\()")
@@ -106,10 +116,11 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item], config: pytest.Config) -> None:
-    """Set the markers that follow from where a test stands and from the fixtures that it uses.
+    """Put what takes a worker longest first. Set the markers that follow from a test's place and its fixtures.
 
-    Only for a choice that asks for them: each worker would read all tests for nothing.
+    Those only for a choice that asks for them: each worker would read all tests for nothing.
     """
+    items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
     if not {"process", "simulated"} & set(re.findall(r"\w+", config.option.markexpr)):
         return
     for item in items:
