@@ -147,7 +147,7 @@ async def viewer_refusals(address: str, keys: list[str]) -> int | None:
     async for text in link:
         words = text if isinstance(text, str) else ""
         refused += "has no right to" in words
-        if "no JSON" in words:
+        if "a message is a JSON object" in words:
             break
     await link.close()
     return refused

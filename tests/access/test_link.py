@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -158,7 +159,7 @@ async def test_loop_stays_awake_for_moment_after_short_message(monkeypatch: pyte
         now, looks = now + AWAKE / 10, looks + 1
         return now
 
-    monkeypatch.setattr("roboglot.access.tunnel.busy_poll.time.perf_counter", time_passes)
+    monkeypatch.setattr("roboglot.access.tunnel.busy_poll.time", SimpleNamespace(perf_counter=time_passes))
     poll = BusyPoll()
     poll.stir(SHORT_MAX + 1)
     assert not looks

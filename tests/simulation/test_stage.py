@@ -173,21 +173,21 @@ async def test_nothing_is_put_into_a_robot(simulate):
 
 
 def test_nothing_is_put_outside_of_the_world(simulate):
-    hands = simulate("empty").world.hands
-    box, tag = hands.add_obstacle(Pose(8.0, 8.0)), hands.add_tag("1", Pose(8.0, 8.0))
+    stage = simulate("empty").world.stage
+    box, tag = stage.add_obstacle(Pose(8.0, 8.0)), stage.add_tag("1", Pose(8.0, 8.0))
     for pose, floor in ((Pose(8.0, 8.0), 1), (Pose(8.0, 8.0), -1), (Pose(-9000.0, 8.0), 0), (Pose(8.0, math.nan), 0)):
         for put in (
-            lambda pose, floor: hands.add_obstacle(pose, floor=floor),
-            lambda pose, floor: hands.move_obstacle(box, pose, floor),
-            lambda pose, floor: hands.add_tag("2", pose, floor),
-            lambda pose, floor: hands.move_tag(tag, pose, floor),
-            lambda pose, floor: hands.add_person(pose, floor),
-            lambda pose, floor: hands.place("a", pose, floor),
-            lambda pose, floor: hands.make_sound(claps(), pose.point, floor),
+            lambda pose, floor: stage.add_obstacle(pose, floor=floor),
+            lambda pose, floor: stage.move_obstacle(box, pose, floor),
+            lambda pose, floor: stage.add_tag("2", pose, floor),
+            lambda pose, floor: stage.move_tag(tag, pose, floor),
+            lambda pose, floor: stage.add_person(pose, floor),
+            lambda pose, floor: stage.place("a", pose, floor),
+            lambda pose, floor: stage.make_sound(claps(), pose.point, floor),
         ):
             with pytest.raises(ValueError, match="has no place"):
                 put(pose, floor)
-    assert (len(hands.obstacles), len(hands.tags), len(hands.people)) == (1, 1, 0)
+    assert (len(stage.obstacles), len(stage.tags), len(stage.people)) == (1, 1, 0)
 
 
 async def test_robot_goes_back_only_to_a_free_start(simulate):

@@ -184,7 +184,7 @@ async def test_client_that_says_no_more_gets_its_answer(
     bare_door: SlamwareDoor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     heard_all = asyncio.Event()
-    monkeypatch.setattr(dispatch, "late", lambda _robot: heard_all.wait())
+    monkeypatch.setattr(dispatch, "delay_response", lambda _robot: heard_all.wait())
     hear = http_connection.HttpConnection.eof_received
 
     def note_end(connection: http_connection.HttpConnection) -> bool:
