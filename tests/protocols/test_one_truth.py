@@ -1,8 +1,12 @@
-"""One robot behind five open doors and the console: in each state all of them tell the same, and what the world has."""
+"""One robot behind five open doors and the console.
+
+In each state all of them tell the same, and what the world has; of two commands at once, none succeeds falsely.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import math
 import subprocess
@@ -14,9 +18,11 @@ from typing import Any, TypeVar
 import httpx
 import pytest
 
-from roboglot.agents.console import ConsoleClient
+from roboglot.agents.console import ConsoleClient, Refused
 from roboglot.model.components.energy.power import PowerMode
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.system.lease import Lease
+from roboglot.model.events import ActionChanged
 from roboglot.model.geometry import Pose
 from roboglot.testing.addresses import free_port
 from tests.protocols.cyberdog.phone import Messages
@@ -122,6 +128,9 @@ class Doors:
         if verb:
             return await self._now(self._console.post(dict, "robots", "a", verb, values=values))
         return await self._now(self._console.get(dict, "robots", "a"))
+
+    async def console_program(self) -> Words:
+        return await self._now(self._console.get(dict, "robots", "a", "program"))
 
     # -- what they say -------------------------------------------------------------------------------------------------
 
@@ -239,8 +248,9 @@ def control(tmp_path: Path) -> Iterator[tuple[int, Control]]:
 
 
 @pytest.fixture
-async def doors(tmp_path: Path, control: tuple[int, Control]) -> AsyncIterator[Doors]:
+async def doors(tmp_path: Path, control: tuple[int, Control], monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Doors]:
     """A robot in lockstep with a client at every door."""
+    monkeypatch.setattr("roboglot.agents.console.SECONDS", PATIENCE)
     port, fleet = control
     door = {"broker": f"{BROKER}:{port}", "serials": {"a": "a"}, "visualization_period": 0.2}
     names = "slamware", "robomaster", "cyberdog", "visual", "vda5050"
@@ -297,3 +307,87 @@ async def test_all_doors_tell_the_same(doors: Doors) -> None:
     assert await doors.rest("POST", f"{SYSTEM}/power/:hibernate") == 200
     await doors.forward(6)
     await doors.agree(asleep=True, standing=False, moved=False)
+
+
+# -- two commands at once: whether each was done, by its own door's words ---------------------------------------------
+
+
+async def _turn_by_rest(doors: Doors) -> bool:
+    turn = {"action_name": "slamtec.agent.actions.RotateAction", "options": {"angle": 1.0}}
+    begun = await doors.rest("POST", f"{MOTIONS}/actions", json=turn)
+    if not isinstance(begun, dict):
+        return False
+    url = f"{MOTIONS}/actions/{begun['action_id']}"
+    while (state := (await doors.rest("GET", url))["state"])["status"] != 4:  # noqa: ASYNC110
+        await asyncio.sleep(0.01)
+    return bool(state["result"] == 0)
+
+
+async def _move_by_text(doors: Doors) -> bool:
+    return await doors.say("chassis move x 0.2 wait_for_complete true") == ["ok"]
+
+
+async def _walk_by_dog(doors: Doors) -> bool:
+    walk = {"motion_id": 303, "vel_des": [0.2, 0, 0], "duration": 1000}
+    return json.loads((await doors.life.phone.raw(MOTION, walk))[-1][1])["result"] is True
+
+
+async def _undock_by_fleet(doors: Doors) -> bool:
+    id = f"undock {doors.robot.clock.time()}"
+    doors.control.send("instantActions", instant(action("stopCharging", id)), wait=False)
+    while True:
+        doors.control.hear()
+        states = doors.control.state["instantActionStates"]
+        status = next((each["actionStatus"] for each in states if each["actionId"] == id), "")
+        if status in ("FINISHED", "FAILED"):
+            return bool(status == "FINISHED")
+        await asyncio.sleep(0.01)
+
+
+async def _drive_by_console(doors: Doors) -> bool:
+    try:
+        id = (await doors.console("drive", yaw=0.5, seconds=1.0))["result"]["action"]
+    except Refused:
+        return False
+    while not (ended := [each for each in (await doors.console())["history"] if each["id"] == id]):  # noqa: ASYNC110
+        await asyncio.sleep(0.01)
+    return bool(ended[0]["status"] == "SUCCEEDED")
+
+
+async def _turn_by_program(doors: Doors) -> bool:
+    source = "answer = cyberdog.motion.turn(20)\nprint(answer.state.code, answer.response.result)\n"
+    await doors.console("program", source=source)
+    while (run := await doors.console_program())["state"] in ("run", "run_wait"):  # noqa: ASYNC110
+        await asyncio.sleep(0.01)
+    return bool([line["text"] for line in run["log"]][-1:] == ["0 True"])
+
+
+async def _take_control(doors: Doors) -> bool:
+    await doors.robot[Lease].take("robomaster")
+    return False
+
+
+COMMANDS = (_turn_by_rest, _move_by_text, _walk_by_dog, _undock_by_fleet, _drive_by_console, _turn_by_program)
+
+
+@pytest.mark.slow  # in short: test_all_doors_tell_the_same
+@pytest.mark.timeout(600)
+async def test_no_command_succeeds_falsely_beside_another(doors: Doors) -> None:
+    ended = list[ActionChanged]()
+    doors.robot.events.listen(ActionChanged, ended.append)
+    await doors.say("robot battery ?")
+    for pair in itertools.permutations((*COMMANDS, _take_control), 2):
+        ended.clear()
+        both = asyncio.gather(*(command(doors) for command in pair))
+        async with asyncio.timeout(PATIENCE):
+            while not both.done():
+                await asyncio.sleep(0.01)
+                await doors.life.forward(0.1)
+        await doors.robot[Lease].release()
+        await doors.forward(2)
+        succeeded = {event.action.id for event in ended if event.action.status.name == "SUCCEEDED"}
+        assert sum(both.result()) <= len(succeeded), pair
+        if _take_control not in pair:
+            assert any(both.result()), pair
+        elif _move_by_text not in pair:  # who has control moves the robot, and no one else does
+            assert not succeeded, pair
