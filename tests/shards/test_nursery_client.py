@@ -121,4 +121,4 @@ async def test_closing_does_not_wait_for_loading(
     with theirs:
         async with asyncio.timeout(20.0):
             await client.close()
-    assert loading.stdout.read() == b"", "read to its end: nobody can write any more"
+    assert loading.stdout.read() == b"", "read to its end: no process has it open for writing"

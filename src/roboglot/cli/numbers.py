@@ -10,5 +10,5 @@ import typer
 def finite(value: float) -> float:
     """Return a number that is one. Raises BadParameter."""
     if not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is not a number to count with")
+        raise typer.BadParameter(f"must be a finite number, not {value}")
     return value

@@ -1,4 +1,4 @@
-"""Hibernation of this door: no states, no answers. It ends whenever the robot is awake again, whoever woke it."""
+"""Hibernation of this door: it sends no states and no answers. It ends when any client or event wakes the robot."""
 
 from __future__ import annotations
 
