@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from roboglot.model.maps import OccupancyGrid
 from roboglot.storage.transactions import Connection, Transactions
 
 MAPS_MAX = 100
+
+Row = tuple[object, ...]
 
 
 class StoredMaps(MapLibrary):
@@ -36,14 +38,26 @@ class StoredMaps(MapLibrary):
         ]
 
     async def get(self, name: str) -> StoredMap:
-        row = await self._database.run(
-            lambda c: c.execute(
-                "SELECT width, height, resolution, origin_x, origin_y, grid, labels, saved_at, outdoor, number, anchor,"
-                " dock"
-                " FROM map WHERE robot=? AND name=?",
-                (self._robot, name),
-            ).fetchone()
-        )
+        return await self._database.run(lambda connection: self._load(connection, name))
+
+    async def put(self, stored: StoredMap) -> None:
+        row = self._packed(stored)
+        await self._database.run(lambda connection: self._put(connection, row))
+
+    async def modify(self, name: str, edit: Callable[[StoredMap], StoredMap]) -> None:
+        def work(connection: Connection) -> None:
+            old = self._load(connection, name)
+            if (new := edit(old)) is not old:
+                self._put(connection, self._packed(new))
+
+        await self._database.run(work)
+
+    def _load(self, connection: Connection, name: str) -> StoredMap:
+        row = connection.execute(
+            "SELECT width, height, resolution, origin_x, origin_y, grid, labels, saved_at, outdoor, number, anchor,"
+            " dock FROM map WHERE robot=? AND name=?",
+            (self._robot, name),
+        ).fetchone()
         if row is None:
             raise NotFound(f"no map {name!r}")
         width, height, resolution, x, y, packed, labels, saved_at, outdoor, number, anchor, dock = row
@@ -59,10 +73,10 @@ class StoredMaps(MapLibrary):
             None if dock is None else Pose(*json.loads(dock)),
         )
 
-    async def put(self, stored: StoredMap) -> None:
+    def _packed(self, stored: StoredMap) -> Row:
         grid = stored.grid
         labels = [{"name": e.name, "x": e.point.x, "y": e.point.y, "kind": e.kind} for e in stored.labels]
-        row = (
+        return (
             self._robot,
             stored.name,
             grid.width,
@@ -78,12 +92,14 @@ class StoredMaps(MapLibrary):
             _anchor_text(stored.anchor),
             None if stored.dock is None else json.dumps([stored.dock.x, stored.dock.y, stored.dock.yaw]),
         )
-        await self._database.run(lambda connection: self._put(connection, row))
 
-    def _put(self, connection: Connection, row: tuple[object, ...]) -> None:
+    def _put(self, connection: Connection, row: Row) -> None:
         others = connection.execute("SELECT count(*) FROM map WHERE robot=? AND name<>?", row[:2]).fetchone()[0]
         if others >= MAPS_MAX:
             raise InvalidGoal(f"more than {MAPS_MAX} maps")
+        if (number := row[11]) != "0":
+            taken = "UPDATE map SET number='0' WHERE robot=? AND name<>? AND number=?"
+            connection.execute(taken, (*row[:2], number))
         connection.execute(
             "INSERT INTO map (robot, name, width, height, resolution, origin_x, origin_y, grid, labels, saved_at,"
             " outdoor, number, anchor, dock) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import field
 
 from roboglot.model.components.component import Component
@@ -42,7 +42,10 @@ class StoredMap:
 
 
 class MapLibrary(Component):
-    """Stored maps by name. An acknowledged change survives a crash."""
+    """Stored maps by name. An acknowledged change survives a crash.
+
+    A number means one map: stored with a number other than 0, a map takes it from any other.
+    """
 
     @abstractmethod
     async def names(self, *, outdoor: bool | None = None, number: int | None = None) -> Sequence[str]:
@@ -55,6 +58,13 @@ class MapLibrary(Component):
     @abstractmethod
     async def put(self, stored: StoredMap) -> None:
         """Store a map, replacing one of the same name."""
+
+    @abstractmethod
+    async def modify(self, name: str, edit: Callable[[StoredMap], StoredMap]) -> None:
+        """Replace a map by ``edit`` of it, after every change under way; nothing is written if that is the same map.
+
+        ``edit`` runs in any thread. Raises NotFound, and what ``edit`` raises.
+        """
 
     @abstractmethod
     async def remove(self, name: str) -> None:

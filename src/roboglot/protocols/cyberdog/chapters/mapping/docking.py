@@ -6,7 +6,7 @@ import asyncio
 import logging
 from dataclasses import replace
 
-from roboglot.model.components.mapping.map_library import MapLibrary
+from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.errors import RobotError
 from roboglot.model.map_loading import known_dock
@@ -44,9 +44,12 @@ async def keep_dock(context: Context) -> None:
     robot = context.robot
     if not context.stored_map or (home := known_dock(robot)) is None:
         return
+
+    def edit(stored: StoredMap) -> StoredMap:
+        known = stored.dock is not None and stored.dock.distance_to(home) <= MOVED
+        return stored if known else replace(stored, dock=home)
+
     try:
-        stored = await robot[MapLibrary].get(context.stored_map)
-        if stored.dock is None or stored.dock.distance_to(home) > MOVED:
-            await robot[MapLibrary].put(replace(stored, dock=home))
+        await robot[MapLibrary].modify(context.stored_map, edit)
     except (RobotError, OSError) as error:
         log.warning("cannot store the dock of map %r: %s", context.stored_map, error)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import msgspec
 
@@ -117,31 +118,36 @@ async def set_labels(
     except msgspec.ValidationError as error:
         raise BadParameters(why_invalid(error, field="locationLabelInfo", wanted=list[WireLabel])) from None
     names = [label.labelName for label in labels]
+    settable = len(set(names)) == len(names) <= LABELS_MAX and all(label.valid for label in labels)
+    if not settable and not only_delete:
+        return call.refused({"success": 1}, f"at most {LABELS_MAX} labels, each with a name of its own and a place")
+    kept = tuple(Label(x.labelName, Point(x.physicX, x.physicY)) for x in labels)
     try:
-        stored = await library.get(mapName or await _numbered(library, map_id))
+        name = mapName or await _numbered(library, map_id)
         if only_delete:
-            await _delete(context, library, stored, names)
-        elif len(names) > LABELS_MAX or len(set(names)) < len(names) or not all(x.valid for x in labels):
-            return call.refused({"success": 1}, f"at most {LABELS_MAX} labels, each with a name of its own and a place")
+            await _delete(context, library, name, names)
         else:
-            kept = tuple(Label(x.labelName, Point(x.physicX, x.physicY)) for x in labels)
-            await _take_number(library, stored.name, map_id)
-            await library.put(replace(stored, labels=kept, number=map_id or stored.number))
+            number = map_id if mapName else 0  # a map that was found by its number may have lost it meanwhile
+            await library.modify(name, lambda map: replace(map, labels=kept, number=number or map.number))
     except NotFound as error:
         return call.refused({"success": 1}, str(error))
     return {"success": 0}
 
 
-async def _delete(context: Context, library: MapLibrary, stored: StoredMap, names: list[str]) -> None:
+async def _delete(context: Context, library: MapLibrary, name: str, labels: list[str]) -> None:
     """Delete the labels of these names; without names, the map. Raises NotFound."""
-    if not names:
-        await library.remove(stored.name)
-        if context.stored_map == stored.name or not await library.names():
-            context.map_gone()
+    if labels:
+        await library.modify(name, partial(_without, labels=labels))
         return
-    if missing := set(names) - {label.name for label in stored.labels}:
+    await library.remove(name)
+    if context.stored_map == name or not await library.names():
+        context.map_gone()
+
+
+def _without(stored: StoredMap, labels: list[str]) -> StoredMap:
+    if missing := set(labels) - {label.name for label in stored.labels}:
         raise NotFound(f"there is no label {missing}")
-    await library.put(replace(stored, labels=tuple(x for x in stored.labels if x.name not in names)))
+    return replace(stored, labels=tuple(x for x in stored.labels if x.name not in labels))
 
 
 async def _numbered(library: MapLibrary, number: int) -> str:
@@ -150,13 +156,6 @@ async def _numbered(library: MapLibrary, number: int) -> str:
     if not names:
         raise NotFound(f"there is no map with the number {number}")
     return names[-1]
-
-
-async def _take_number(library: MapLibrary, name: str, number: int) -> None:
-    """Give a map its number, taking it from any other: a number means one map."""
-    for other in await library.names(number=number) if number else ():
-        if other != name:
-            await library.put(replace(await library.get(other), number=0))
 
 
 def _check_number(number: int) -> None:
