@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from roboglot.model.actions import ActionStatus
 from roboglot.model.components.energy.power import Power, PowerMode
 from roboglot.model.components.logistics.jack import Jack
+from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.errors import NotFound
+from roboglot.model.geometry import Twist
 from roboglot.model.tap import Direction
 from roboglot.protocols.vda5050.chapters.sensing import REPORTS, REPORTS_MAX
 from tests.protocols.held_fairness import held
@@ -59,6 +64,41 @@ async def test_a_load_is_picked_reported_and_dropped(yard: Opened) -> None:
     assert states(one)["d"][0] == "FINISHED"
     assert one.control.state["loads"] == []
     assert one.control.errors.count("ACTION_FAILED") == 1
+
+
+async def test_load_set_down_by_others_is_forgotten(yard: Opened) -> None:
+    one = await yard(**robot_at(7.5, 6.0))
+    one.control.send("order", here(action("pick", "p", loadId="L1")))
+    await one.until(lambda: states(one).get("p", ("", ""))[0] == "FINISHED")
+    for move, loads in (
+        (one.robot[Jack].lower_platform, []),
+        (one.robot[Jack].raise_platform, [{"loadPosition": "jack"}]),
+    ):
+        lifting = move(source="other")
+        await one.until(lambda: lifting.status is ActionStatus.SUCCEEDED)  # noqa: B023 - at once
+        await one.until(lambda: one.control.state["loads"] == loads)  # noqa: B023
+
+
+async def test_factsheet_follows_limits_and_components(yard: Opened) -> None:
+    one = await yard()
+
+    def sheet() -> tuple[float, bool]:
+        found = one.control.heard["factsheet"][-1]
+        names = {row["actionType"] for row in found["protocolFeatures"]["mobileRobotActions"]}
+        return found["physicalParameters"]["maximumSpeed"], "startCharging" in names
+
+    base = one.robot[Base]
+    built = base.limits.twist.x
+    await one.until(lambda: sheet() == (built, True))
+    base.limits = replace(base.limits, twist=Twist(0.25, 0.0, 1.0))  # as another door may
+    await one.until(lambda: sheet() == (0.25, True))
+    one.robot.withdraw(Docking)  # as a driver that learns that its robot has none
+    await one.until(lambda: sheet() == (0.25, False))
+    sent = len(one.control.heard["factsheet"])
+    await one.clock.advance(2.0)
+    one.control.send("instantActions", instant(action("stateRequest", "later")))
+    await one.until(lambda: "later" in states(one))
+    assert len(one.control.heard["factsheet"]) == sent
 
 
 async def test_flood_waits_at_the_broker(yard: Opened) -> None:

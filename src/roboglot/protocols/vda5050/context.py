@@ -12,10 +12,12 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from roboglot.model.admission import Forbidden, Right
+from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.errors import NotReady
+from roboglot.model.events import JackChanged
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from roboglot.protocols.vda5050.error_book import ErrorBook
@@ -53,6 +55,7 @@ class Context:
         self.load: dict[str, str] = {}  # fleet control's description of the picked load
         self.changed = asyncio.Event()
         self.errors = ErrorBook(robot, version, self.changed)
+        self._forget_load = robot.events.listen(JackChanged, self._jack_changed)
         self._trigger = asyncio.Event()
         self._tasks: set[asyncio.Future[None]] = set()
         self._route = Route(self)
@@ -65,6 +68,10 @@ class Context:
 
     def _metres(self) -> float:
         return self.robot[Odometry].reading.distance if Odometry in self.robot else 0.0
+
+    def _jack_changed(self, _: JackChanged) -> None:
+        if not self.robot[Jack].loaded:  # whoever set it down: the next load is another
+            self.load = {}
 
     def touch(self) -> None:
         """Schedule a state message."""
@@ -209,6 +216,7 @@ class Context:
 
     async def close(self) -> None:
         """Stop everything that fleet control began."""
+        self._forget_load()
         await self._route.stop()
         for task in self._tasks:
             task.cancel()

@@ -60,6 +60,7 @@ class Vda5050Door:
         self._log_limiter = LogLimiter(log)
         self._sent: object = None  # the last state sent, rounded, and when (robot time)
         self._sent_at = 0.0
+        self._sheet: object = None  # the last factsheet sent
         self._rests = False  # hibernation was announced
 
     @property
@@ -177,6 +178,8 @@ class Vda5050Door:
             self._rests = False
             await self._send_connection("ONLINE")
         await context.maps.look()
+        if self._sheet != self._factsheet():
+            await self._send_factsheet()
         state = self._state()
         if context.changed.is_set() or self._sent != _coarse(state) or now - self._sent_at >= STATE_PERIOD:
             context.changed.clear()
@@ -252,9 +255,11 @@ class Vda5050Door:
         await self._send("connection", {"connectionState": state}, qos=1, retain=True)
 
     async def _send_factsheet(self) -> None:
-        period = self._config.visualization_period
-        sheet = vocabulary.factsheet(self._robot, self._version, STATE_PERIOD, period)
+        self._sheet = sheet = self._factsheet()
         await self._send("factsheet", sheet, qos=0, retain=True)
+
+    def _factsheet(self) -> dict[str, object]:
+        return vocabulary.factsheet(self._robot, self._version, STATE_PERIOD, self._config.visualization_period)
 
     def _message(self, name: str, values: Mapping[str, object]) -> bytes:
         """Return a message with its header."""

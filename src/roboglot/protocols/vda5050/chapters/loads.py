@@ -68,7 +68,6 @@ async def drop(
     await context.performer.carry_out(jack.lower_platform(source=SOURCE))
     if jack.loaded:
         raise Refused("the load is still on the platform")
-    context.load = {}
     if stationType == SHELF:
         await context.performer.carry_out(robot[TagDocking].back_off(Mark.SHELF, source=SOURCE))
     return "the load stands on the floor"
