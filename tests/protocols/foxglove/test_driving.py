@@ -186,6 +186,24 @@ async def test_parameters_are_read_set_and_followed(scene: Scene) -> None:
     assert other.said["parameterValues"][-1]["parameters"][0]["value"] == 0.25
 
 
+async def test_parameters_are_followed_as_parts_appear(scene: Scene) -> None:
+    """A real robot's parts are known once it is connected."""
+    viewer, speaker = await scene.connect(), scene.robot[Speaker]
+    scene.robot.withdraw(Speaker)
+    await viewer.say("subscribeParameterUpdates", parameterNames=[])
+    await viewer.settled()
+
+    def told() -> list[Any]:
+        rows = [row for said in viewer.said["parameterValues"] for row in said["parameters"]]
+        return [row.get("value") for row in rows if row["name"] == "speaker.volume"]
+
+    scene.robot.add(Speaker, speaker)
+    await viewer.until(told, 2.0)
+    scene.robot.withdraw(Speaker)
+    await viewer.until(lambda: len(told()) == 2, 2.0)
+    assert told() == [speaker.volume, None]
+
+
 async def test_parameters_that_cannot_be_are_refused(scene: Scene) -> None:
     viewer = await scene.connect()
     for name, value in (("no.such", 1), ("robot.name", "b"), ("speaker.volume", "loud"), ("speaker.volume", 7)):

@@ -13,6 +13,7 @@ from foxglove_schemas_protobuf.Grid_pb2 import Grid
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from websockets.exceptions import InvalidStatus
 
+from roboglot.media.video import VideoStream
 from roboglot.protocols.foxglove import context as door_context
 from roboglot.protocols.foxglove import server
 from tests.protocols.foxglove.conftest import ADDRESS, Opened, Scene, Viewer
@@ -38,6 +39,17 @@ async def last(viewer: Viewer, topic: str, seconds: float = 3.0) -> Any:
     number = await viewer.subscribe(topic)
     await viewer.until(lambda: viewer.data.get(number), seconds)
     return decoded(viewer.channels[topic], viewer.data[number][-1][1])
+
+
+async def test_video_is_advertised_once_it_is_there(scene: Scene) -> None:
+    """A real robot's video is known once it is connected."""
+    video = scene.robot[VideoStream]
+    scene.robot.withdraw(VideoStream)
+    viewer = await scene.connect()
+    await viewer.topic("/a/pose", 1.0)
+    assert "/a/camera" not in viewer.channels
+    scene.robot.add(VideoStream, video)
+    assert (await viewer.topic("/a/camera", 2.0))["schemaName"] == "foxglove.CompressedVideo"
 
 
 @pytest.mark.parametrize("name", ["foxglove.sdk.v1", "foxglove.websocket.v1"])

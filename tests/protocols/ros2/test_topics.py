@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
 from roboglot.protocols.ros2.dispatch import MESSAGE_MAX
@@ -107,6 +108,17 @@ async def test_topics_come_with_the_robots_values(opened: Opened) -> None:
     picture = peer.heard["/a/image/compressed"][-1]
     assert (picture.format, bytes(picture.data[:2])) == ("jpeg", b"\xff\xd8")
     assert peer.heard["/a/joint_states"][-1].name == ["gimbal_pitch", "gimbal_yaw"]
+
+
+async def test_pictures_come_once_there_is_a_camera(opened: Opened) -> None:
+    """A real robot's camera is known once it is connected."""
+    scene = await opened()
+    camera, topic = scene.robot[Camera], "/a/image/compressed"
+    scene.robot.withdraw(Camera)
+    scene.peer.listen(topic, "sensor_msgs/msg/CompressedImage")
+    await scene.peer.clock.advance(1.0)
+    scene.robot.add(Camera, camera)
+    await scene.peer.until(lambda: scene.peer.heard[topic], 8.0)
 
 
 async def test_each_publisher_numbers_its_own_messages(opened: Opened) -> None:

@@ -49,7 +49,7 @@ class Context:
         self.robot, self.config, self.topics = robot, config, topics
         self.subscriptions: dict[int, int] = {}  # the client's subscription number by channel
         self.published: dict[int, Published] = {}
-        self.watched: dict[str, object] = {}  # parameters that it watches, with the last values sent
+        self.watched: dict[str, object] = {}  # parameters that it watches, and their last values sent, or None
         self.source = f"{DOOR} {carrier.name}"  # of the actions that this client starts
         self._carrier = carrier
         self._dropped = 0
@@ -139,11 +139,12 @@ class Context:
             self.send(playback_state(state))
 
     def report_parameters(self) -> None:
-        """Send changed parameters that the client follows."""
+        """Send changed parameters that the client follows; one that is gone has no value."""
         if not self.watched:  # without names, all would be found
             return
-        found = parameters(self.robot, list(self.watched))
-        changed = [row for row in found if self.watched[row["name"]] != row["value"]]
+        gone: dict[str, dict[str, object]] = {name: {"name": name} for name in self.watched}
+        found = gone | {row["name"]: row for row in parameters(self.robot, list(self.watched))}
+        changed = [row for name, row in found.items() if self.watched[name] != row.get("value")]
         if changed:
-            self.watched |= {row["name"]: row["value"] for row in changed}
+            self.watched |= {row["name"]: row.get("value") for row in changed}
             self.send(message("parameterValues", parameters=changed))

@@ -59,8 +59,7 @@ class Topics:
         """Add a client: it gets all known topics, and further ones."""
         if self._sampler is None:
             self._sampler = Sampler(self._robot, self._put)
-            if VideoStream in self._robot:
-                self._channel(f"/{self._robot.id}/{CAMERA}", "video")
+            self._announce_camera()
             self._sampler.beat(0)
             self._task = asyncio.get_running_loop().create_task(self._sample(), name="foxglove topics")
         self._listeners.append(listener)
@@ -105,6 +104,7 @@ class Topics:
             number += 1
             if self._sampler is not None:
                 self._sampler.beat(number)
+            self._announce_camera()
             at, _wall = self._stamps.now()
             for listener in tuple(self._listeners):
                 listener.beat(at, seldom=number % STATE_BEATS == 0)
@@ -121,6 +121,10 @@ class Topics:
                 if data is None:
                     data = encoded(entry, self._redaction)
                 listener.deliver(subscription, entry.at, data)
+
+    def _announce_camera(self) -> None:
+        if VideoStream in self._robot:  # a real robot's appears with its link
+            self._channel(f"/{self._robot.id}/{CAMERA}", "video")
 
     def _channel(self, topic: str, kind: str) -> LiveChannel | None:
         known = self._channels.get((topic, kind))

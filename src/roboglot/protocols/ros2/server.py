@@ -112,8 +112,7 @@ class Ros2Door:
             self._subscribe(key, type)
         self._sampler = Sampler(self._robot, self._put)
         self._follow(self._sample(self._sampler))
-        if Camera in self._robot:
-            self._follow(self._film())
+        self._follow(self._film())
 
     def _zenoh_config(self) -> zenoh.Config:
         import zenoh
@@ -237,6 +236,8 @@ class Ros2Door:
         from roboglot.media.stills import jpeg
 
         async for _ in self._robot.clock.every(PICTURE_PERIOD):
+            if Camera not in self._robot:  # a real robot's appears with its link
+                continue
             topic = self._topic("image/compressed")
             publisher = self._publishers.get(topic)
             if publisher is not None and not _is_watched(publisher):

@@ -44,9 +44,11 @@ async def set_parameters(context: Context, *, parameters: list[Value], id: str |
 
 @TABLE.on("subscribeParameterUpdates", right=Right.SEE)
 async def follow_parameters(context: Context, *, parameter_names: list[str] | None = None) -> None:
-    """Send parameters whenever they change; without names, all."""
-    for row in parameters(context.robot, _checked(parameter_names or [])):
-        context.watched[row["name"]] = row["value"]
+    """Send parameters whenever they change, appear or go; without names, all."""
+    wanted = _checked(parameter_names or []) or PARAMETERS
+    names = [name for name in wanted if name in PARAMETERS]
+    context.watched.update(dict.fromkeys(names))
+    context.watched.update((str(row["name"]), row["value"]) for row in _present(context.robot, names))
 
 
 @TABLE.on("unsubscribeParameterUpdates", right=Right.SEE)
