@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -135,6 +136,18 @@ async def test_the_robots_speed_limit_is_put_back(driven: Robot, slamware_door: 
         action.cancel()
         await forward(seconds=2)
         assert await other.get_system_parameter("base.max_moving_speed") == before
+
+
+async def test_lower_limit_of_client_holds_for_robot(driven: Robot, robot: Robot, forward: Forward) -> None:
+    base = driven[Base]
+    assert robot[Base].limits.twist.x > 0.5
+    base.limits = replace(base.limits, twist=Twist(0.2, 0.0, 1.0))
+    action = driven[Driving].drive(Twist(x=0.5), source="test")
+    await forward(seconds=2)
+    assert robot[Base].velocity.x == pytest.approx(0.2, abs=0.03)
+    action.cancel()
+    await forward(seconds=2)
+    assert robot[Base].limits.twist.x > 0.5
 
 
 async def test_limit_of_killed_program_is_restored_next_time(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import AsyncIterator
+from dataclasses import replace
 
 import httpx
 import pytest
@@ -382,6 +383,13 @@ async def test_jack_and_doors_are_refused_while_stopped(
     assert 0.0 < robot[Jack].position == height
     assert await put(client, "base.emergency_stop", "off") == 200
     assert (await client.put(f"{box}/:open")).status_code == 200
+
+
+async def test_limits_of_robot_connected_later_count(robot: Robot, client: httpx.AsyncClient) -> None:
+    base = robot[Base]
+    base.limits = replace(base.limits, twist=Twist(9.0, 0.0, 5.0))  # as its driver sets them
+    assert [await put(client, "base.max_moving_speed", text) for text in ("9.5", "8")] == [400, 200]
+    assert base.limits.twist == Twist(8.0, 0.0, 5.0)
 
 
 async def test_last_moments_of_the_door_refuse_changes(robot: Robot, client: httpx.AsyncClient) -> None:

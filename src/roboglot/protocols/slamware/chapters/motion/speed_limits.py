@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.base import Base, BaseLimits
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import ModuleRestarting, Rebooted
@@ -17,11 +17,12 @@ SPEED_MIN = 0.01  # m/s and rad/s; below this it would not move
 
 
 class SpeedLimits:
-    """Speed limits of the drive, within those of its build."""
+    """Speed limits of the drive, within those of its build, which a real robot reports once it is connected."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._built = robot[Base].limits.twist if Base in robot else Twist()
+        self._last_set: BaseLimits | None = None
+        self._known = Twist()
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
@@ -35,15 +36,24 @@ class SpeedLimits:
         for end in self._endings:
             end()
         if Base in self._robot:
-            self._robot[Base].limits = replace(self._robot[Base].limits, twist=self._built)
+            self._limit(self._built)
 
     def reset(self) -> None:
         """Set the configured limits, else those of the build."""
         if Base in self._robot:
-            base = self._robot[Base]
-            speed, turning = self._configured()
-            twist = Twist(speed or self._built.x, self._built.y, turning or self._built.yaw)
-            base.limits = replace(base.limits, twist=twist)
+            built, (speed, turning) = self._built, self._configured()
+            self._limit(Twist(speed or built.x, built.y, turning or built.yaw))
+
+    @property
+    def _built(self) -> Twist:
+        limits = self._robot[Base].limits
+        if limits is not self._last_set:
+            self._known = limits.twist
+        return self._known
+
+    def _limit(self, twist: Twist) -> None:
+        base = self._robot[Base]
+        base.limits = self._last_set = replace(base.limits, twist=twist)
 
     def _configured(self) -> tuple[float | None, float | None]:
         if Settings not in self._robot:
@@ -55,15 +65,12 @@ class SpeedLimits:
         """Raise InvalidGoal for limits beyond those of the drive."""
         base = self._robot[Base]
         x, yaw = base.limits.twist.x if speed is None else speed, base.limits.twist.yaw if turning is None else turning
-        if not (SPEED_MIN <= x <= self._built.x and SPEED_MIN <= yaw <= self._built.yaw):
-            raise InvalidGoal(
-                f"{SPEED_MIN:g} to {self._built.x:g} m/s and {SPEED_MIN:g} to {self._built.yaw:g} rad/s are possible"
-            )
+        built = self._built
+        if not (SPEED_MIN <= x <= built.x and SPEED_MIN <= yaw <= built.yaw):
+            raise InvalidGoal(f"{SPEED_MIN:g} to {built.x:g} m/s and {SPEED_MIN:g} to {built.yaw:g} rad/s are possible")
 
     def set(self, *, speed: float | None = None, turning: float | None = None) -> None:
         """Set the limits: ``speed`` m/s, ``turning`` rad/s. Raises InvalidGoal beyond those of the drive."""
         self.check(speed, turning)
-        base = self._robot[Base]
-        now = base.limits.twist
-        twist = Twist(now.x if speed is None else speed, now.y, now.yaw if turning is None else turning)
-        base.limits = replace(base.limits, twist=twist)
+        now = self._robot[Base].limits.twist
+        self._limit(Twist(now.x if speed is None else speed, now.y, now.yaw if turning is None else turning))
