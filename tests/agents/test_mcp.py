@@ -154,7 +154,7 @@ async def test_drive_brakes_by_itself_and_is_bounded(served: ServedConsole) -> N
             result = await call(client, "drive", x=0.3, seconds=1.0)
         assert result["status"] == "SUCCEEDED"
         assert 0.1 < result["pose"][0] < 0.4
-        assert "less than or equal to 2" in await refusal(client, "drive", x=0.3, seconds=3.0)
+        assert "seconds must be at most 2" in await refusal(client, "drive", x=0.3, seconds=3.0)
 
 
 async def test_stop_ends_what_moves(served: ServedConsole) -> None:
@@ -195,10 +195,51 @@ async def test_a_fault_and_its_end(served: ServedConsole) -> None:
 async def test_refusals_say_why(served: ServedConsole) -> None:
     async with tools(served) as client:
         assert "no robot 'b'" in await refusal(client, "where_am_i", robot="b")
-        for plan in ({"plan": [], "plans": []}, {"plan": [{"do": "drive", "z": 1.0}]}):
-            assert "Extra inputs are not permitted" in await refusal(client, "rehearse", **plan)
         async with tools_of("http://127.0.0.1:1") as lost:
             assert "start it with `roboglot up`" in await refusal(lost, "robots")
+
+
+@pytest.mark.parametrize(
+    ("tool", "values", "why"),
+    [
+        ("go_to", {}, "x is missing; y is missing"),
+        ("go_to", {"x": True, "y": "1"}, "x must be a number, not true or false; y must be a number, not text"),
+        ("go_to", {"x": 1e9, "y": None}, "x must be at most 10000; y must be a number, not null"),
+        ("drive", {"seconds": 0, "robt": "a"}, "seconds must be above 0; robt is unknown; did you mean 'robot'?"),
+        ("robots", {"x": 1}, "x is unknown"),
+        ("where_am_i", {"robot": 7}, "robot must be text, not a whole number"),
+        ("run_program", {"source": ""}, "source must have at least 1 characters"),
+        ("rehearse", {"plan": {}}, "plan must be a list, not an object"),
+        ("rehearse", {"plan": [5]}, "plan[0] must be an object, not a whole number"),
+        ("rehearse", {"plan": [{"x": 1}]}, "plan[0].do is missing"),
+        ("rehearse", {"plan": [{"do": "fly"}]}, "plan[0].do cannot be 'fly'; use go_to or drive"),
+        (
+            "rehearse",
+            {"plan": [{"do": "go_to", "x": 1}, {"do": "drive", "z": 1}]},
+            "plan[0].y is missing; plan[1].z is unknown; there are do, seconds, x, y, yaw",
+        ),
+        ("go_too", {}, "there is no tool 'go_too'; did you mean 'go_to'?"),
+    ],
+)
+async def test_wrong_arguments_are_named_in_words(tool: str, values: dict[str, Any], why: str) -> None:
+    async with tools_of("http://127.0.0.1:1") as client:
+        assert await refusal(client, tool, **values) == why
+
+
+async def test_a_flood_of_arguments_has_a_short_refusal() -> None:
+    async with tools_of("http://127.0.0.1:1") as client:
+        why = await refusal(client, "go_to", **{f"{index}{'x' * 10_000}": 1 for index in range(1000)})
+    assert len(why) < 2000
+    assert why.endswith("994 more")
+
+
+async def test_an_unknown_prompt_is_refused_without_traceback(caplog: pytest.LogCaptureFixture) -> None:
+    from mcp.shared.exceptions import MCPError
+
+    async with tools_of("http://127.0.0.1:1") as client:
+        with pytest.raises(MCPError, match="there is no prompt 'greet'; this server has tools only"):
+            await client.get_prompt("greet")
+    assert not [record for record in caplog.records if record.exc_info]
 
 
 async def test_a_plan_is_tried_before_the_robot_moves(served: ServedConsole) -> None:

@@ -9,12 +9,16 @@ from typing import Annotated, Literal, TypeVar
 
 import msgspec
 from mcp.server import MCPServer
-from mcp.server.mcpserver import Image
+from mcp.server.mcpserver import Context, Image
 from mcp.server.mcpserver.exceptions import ToolError
 from mcp.server.mcpserver.tools import Tool
-from pydantic import BaseModel, Field
+from mcp.shared.exceptions import MCPError
+from mcp.types import INVALID_PARAMS, CallToolResult, GetPromptResult, InputRequiredResult
+from pydantic import BaseModel, Field, ValidationError
 
 from roboglot.agents.console import ConsoleClient, Refused
+from roboglot.agents.refusals import why_refused
+from roboglot.spelling import WORD_MAX, instead
 
 T = TypeVar("T")
 SECONDS_MAX = 120.0  # a tool's longest wait for an action or a program
@@ -22,9 +26,13 @@ LOOK = 0.1  # s between two checks of a running action
 DEFAULT = "a"
 
 Robot = Annotated[str, Field(min_length=1, max_length=80, description="The robot's name, as `robots` lists it.")]
-Meters = Annotated[float, Field(ge=-10_000, le=10_000)]
-Speed = Annotated[float, Field(ge=-10, le=10)]
-Wait = Annotated[float, Field(ge=0, le=SECONDS_MAX, description="Seconds to wait for its end; 0 returns at once.")]
+# strict: else the library reads true as 1
+Meters = Annotated[float, Field(ge=-10_000, le=10_000, strict=True)]
+Speed = Annotated[float, Field(ge=-10, le=10, strict=True)]
+Moment = Annotated[float, Field(gt=0, le=2, strict=True)]
+Wait = Annotated[
+    float, Field(ge=0, le=SECONDS_MAX, strict=True, description="Seconds to wait for its end; 0 returns at once.")
+]
 
 
 class GoTo(BaseModel, extra="forbid"):
@@ -42,7 +50,7 @@ class Drive(BaseModel, extra="forbid"):
     x: Speed = 0.0
     y: Speed = 0.0
     yaw: Speed = 0.0
-    seconds: Annotated[float, Field(gt=0, le=2)] = 1.0
+    seconds: Moment = 1.0
 
 
 Plan = Annotated[list[Annotated[GoTo | Drive, Field(discriminator="do")]], Field(min_length=1, max_length=20)]
@@ -91,7 +99,30 @@ def make_server(console: ConsoleClient) -> MCPServer:
         tools.clear_faults,
     )
     exact = [_exact(tool) for tool in listed]
-    return MCPServer("roboglot", version=version("roboglot"), instructions=INSTRUCTIONS, tools=exact)
+    return ToolServer("roboglot", version=version("roboglot"), instructions=INSTRUCTIONS, tools=exact)
+
+
+class ToolServer(MCPServer):
+    """The library's server with refusals in plain words: it has tools, and no prompts."""
+
+    async def call_tool(
+        self, name: str, arguments: dict[str, object], context: Context | None = None
+    ) -> CallToolResult | InputRequiredResult:
+        """Run a tool. Raises ToolError with the reason."""
+        schemas = {tool.name: tool.input_schema for tool in await self.list_tools()}
+        if name not in schemas:
+            raise ToolError(f"there is no tool {name[:WORD_MAX]!r}{instead(name, schemas)}")
+        try:
+            return await super().call_tool(name, arguments, context)
+        except ToolError as error:
+            if isinstance(error.__cause__, ValidationError):
+                raise ToolError(why_refused(error.__cause__, arguments, schemas[name])) from None
+            raise
+
+    async def get_prompt(self, name: str, *_: object) -> GetPromptResult | InputRequiredResult:
+        """Refuse any prompt, as the protocol does for unknown ones; the library would log a traceback."""
+        message = f"there is no prompt {name[:WORD_MAX]!r}; this server has tools only"
+        raise MCPError(code=INVALID_PARAMS, message=message)
 
 
 def _exact(function: Callable[..., object]) -> Tool:
@@ -146,7 +177,7 @@ class Tools:
         x: Speed = 0.0,
         y: Speed = 0.0,
         yaw: Speed = 0.0,
-        seconds: Annotated[float, Field(gt=0, le=2)] = 1.0,
+        seconds: Moment = 1.0,
         robot: Robot = DEFAULT,
     ) -> dict[str, object]:
         """Drive with a velocity (m/s ahead, m/s left, rad/s) for at most 2 s, then brake."""
@@ -187,7 +218,7 @@ class Tools:
         self,
         kind: Annotated[str, Field(min_length=1, max_length=80)],
         robot: Robot | None = None,
-        seconds: Annotated[float, Field(gt=0, le=86_400)] | None = None,
+        seconds: Annotated[float, Field(gt=0, le=86_400, strict=True)] | None = None,
     ) -> list[int]:
         """Break something of the simulation on purpose (needs the right to administer); the faults' numbers."""
         values = {"kind": kind, "robot": robot, "duration": seconds}
