@@ -18,6 +18,7 @@ from tests.protocols.cyberdog.phone import App, Client, Stream, answered, until
 pytestmark = pytest.mark.world("office", body="cyberdog2")
 BRACELET, HEADPHONES = "C4:7C:8D:00:00:01", "11:22:33:44:55:66"
 WANTED = {"mac": BRACELET, "addr_type": "random", "name": "Bracelet"}
+NO_OBJECTS = ("[]", '" "', "7", "null", f'[{{"mac": "{HEADPHONES}"}}]')
 
 
 @pytest.fixture
@@ -49,6 +50,9 @@ async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
     assert await client.ask(8001, {}) == {"device_info_list": []}  # the history omits the connected one
     again = (await client.ask(8001, {"scan_seconds": 3}))["device_info_list"]  # at once, without a scan
     assert {device["mac"] for device in again} == {device["mac"] for device in found}, "the last scan's list"
+    for wrong in NO_OBJECTS:
+        assert await client.ask(8002, wrong) == {"error_code": 323}
+    assert robot[Bluetooth].connected is not None
     assert await client.ask(8002) == {"result": 0}
     assert robot[Bluetooth].connected is None
     assert await client.ask(8002) == {"result": 3}
@@ -56,7 +60,9 @@ async def test_scan_connect_and_history(client, robot, gadget, forward) -> None:
     assert await client.ask(8006) == {"connected": False, "persentage": 0.0}
     assert [d["mac"] for d in (await client.ask(8001, {}))["device_info_list"]] == [BRACELET]
     assert await client.ask(8007, {"mac": HEADPHONES}) == {"success": False}
-    assert await client.ask(8007, {"mac": 7}) == {"error_code": 323}  # and nothing is forgotten
+    for not_said in ({"mac": 7}, *NO_OBJECTS):
+        assert await client.ask(8007, not_said) == {"error_code": 323}
+    assert [device.address for device in robot[Bluetooth].history] == [BRACELET], "nothing is forgotten"
     assert await client.ask(8007, {"mac": BRACELET}) == {"success": True}
     assert await client.ask(8001, {}) == {"device_info_list": []}
 

@@ -33,8 +33,15 @@ from roboglot.protocols.cyberdog.errors import RecordedEnd, codes_of
 from roboglot.protocols.cyberdog.table import TABLE, unread
 from roboglot.transport.log_limiter import LogLimiter
 from roboglot.wire.contracts import contract
-from roboglot.wire.cyberdog.codes import SILENT_WITHOUT_SERVICE, TEXT_ONLY, UNPUBLISHED, UNUSED, InBandError
-from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_params, unknown_names, write
+from roboglot.wire.cyberdog.codes import (
+    SILENT_WITHOUT_SERVICE,
+    TEXT_ONLY,
+    UNPUBLISHED,
+    UNUSED,
+    WITH_FIELDS,
+    InBandError,
+)
+from roboglot.wire.cyberdog.text import NotJson, fitting, mismatches, read_json, read_params, unknown_names, write
 
 log = logging.getLogger(__name__)
 limited_log = LogLimiter(log)
@@ -116,7 +123,7 @@ async def _run(call: Call) -> object | None:
             admission.check(DOOR, str(int(call.code)), operation.right)
         if operation is not None:
             call.context.robot.starts.check(operation.right)
-        values = {} if call.code in unread else read_params(call.text)
+        values = _fields_of(call)
         if operation is None:
             call.why = "this operation is not implemented"
             return _answer_unsupported(call.code)
@@ -139,6 +146,15 @@ async def _run(call: Call) -> object | None:
         call.why = f"internal error: {failure}"
         log.exception("%d crashed", call.code)
         return error(InBandError.UNAVAILABLE)
+
+
+def _fields_of(call: Call) -> Mapping[str, object]:
+    """Return the fields of a request. Raises NotJson, and BadParameters where none would do more than was asked."""
+    if call.code in unread:
+        return {}
+    if call.code in WITH_FIELDS and not isinstance(read_json(call.text), dict):
+        raise BadParameters("the parameters must be an object")
+    return read_params(call.text)
 
 
 def _valid_values(

@@ -170,6 +170,11 @@ async def test_labels_are_set_replaced_and_deleted(client, robot, passing: Passi
     assert await client.ask(6002, nonsense) == {"error_code": 323}  # and the map is still there:
     for wrong in ({"only_delete": "true"}, {"only_delete": 1, "locationLabelInfo": [sofa]}, {}):
         assert await client.ask(6002, {"mapName": "home", **wrong}) == {"error_code": 323}
+    for no_list in ({}, "", 0, 0.0, False):  # each false in Python, as no labels are
+        for more in ({}, {"only_delete": True}):
+            assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": no_list, **more}) == {
+                "error_code": 323
+            }
     assert await client.ask(6002, {"mapName": "home", "locationLabelInfo": [{"labelName": "bed"}]}) == {"success": 1}
     assert (await client.ask(6003, {"mapName": "home"}))["locationLabelInfo"] == [sofa, door]
     missing = {"mapName": "home", "locationLabelInfo": [{"labelName": "bed"}], "only_delete": True}
@@ -209,6 +214,9 @@ async def test_map_is_found_by_its_app_s_number(client: Client, robot: Robot) ->
     assert (await client.ask(6003, {"mapName": "attic"}))["locationLabelInfo"] == [bed]
     assert await client.ask(6002, {**numbered, "mapName": "cellar"}) == {"success": 0}  # it means one map at a time
     assert (await client.ask(6003, {"map_id": 2**63 + 5}))["mapName"] == "cellar"
+    for no_name in (7, ["attic"], {}, False):  # taken as absent, it would mean the map of that number
+        wrong = {"mapName": no_name, "map_id": 2**63 + 5, "only_delete": True}
+        assert await client.ask(6002, wrong) == {"error_code": 323}
     assert await client.ask(6002, {"map_id": 2**63 + 5, "only_delete": True}) == {"success": 0}
     assert await robot[MapLibrary].names() == ["attic"]
     for number in (-1, 2**64):

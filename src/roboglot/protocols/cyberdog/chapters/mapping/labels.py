@@ -95,14 +95,14 @@ async def get_labels(
 async def set_labels(
     call: Call,
     *,
-    mapName: str = "",  # noqa: N803
+    mapName: object = "",  # noqa: N803
     map_id: int = 0,
     locationLabelInfo: object = None,  # noqa: N803
     only_delete: object = False,
 ) -> dict[str, int]:
     """Replace the labels of a stored map; or delete the given ones; or, with none given, the map itself.
 
-    A list or ``only_delete`` of the wrong type, taken as absent, would delete labels or the map: it is refused.
+    A name, a list or ``only_delete`` of the wrong type, taken as absent, would delete labels or a map: it is refused.
 
     With labels the map takes the number ``map_id`` on, if one is given; without a name it is the map of that number.
     """
@@ -111,10 +111,12 @@ async def set_labels(
     library = context.robot[MapLibrary]
     if not isinstance(only_delete, bool):
         raise BadParameters("only_delete is true or false")
+    if not isinstance(mapName, str):
+        raise BadParameters("mapName must be text")
     if locationLabelInfo is None and not only_delete:
         raise BadParameters("locationLabelInfo is missing")
     try:
-        labels = msgspec.convert(locationLabelInfo or [], list[WireLabel])
+        labels = msgspec.convert([] if locationLabelInfo is None else locationLabelInfo, list[WireLabel])
     except msgspec.ValidationError as error:
         raise BadParameters(why_invalid(error, field="locationLabelInfo", wanted=list[WireLabel])) from None
     names = [label.labelName for label in labels]
