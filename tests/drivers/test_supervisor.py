@@ -4,11 +4,14 @@ import asyncio
 from collections.abc import Collection
 from itertools import pairwise
 
+import pytest
+
 from roboglot.clients.errors import LinkLost
-from roboglot.drivers.supervisor import STEADY, Supervisor
+from roboglot.drivers.supervisor import SENDING_MAX, STEADY, Supervisor
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.errors import Refused
 from roboglot.model.robot import Description, Robot
 
 SERVED, FLAPPING = STEADY + 1.0, 1.0  # s until it is gone again
@@ -55,3 +58,29 @@ async def test_pauses_grow_to_ten_seconds_until_a_connection(clock: LockstepCloc
 async def test_link_that_flaps_is_tried_ever_more_seldom(clock: LockstepClock) -> None:
     pauses, _ = await pauses_of(clock, range(100), FLAPPING)
     assert pauses[:6] == [FLAPPING + pause for pause in (0.5, 1.0, 2.0, 4.0, 8.0, 10.0)]
+
+
+async def test_full_link_refuses_all_but_stops(clock: LockstepClock) -> None:
+    robot = Robot("a", UNKNOWN, clock)
+    link = Link("ep://slow", clock, robot.events, Health(clock, robot.events))
+    answered, sent = asyncio.Event(), []
+
+    async def command(name: str) -> None:
+        sent.append(name)
+        await answered.wait()
+
+    async def nothing() -> None:
+        await clock.sleep(0)
+
+    supervisor = Supervisor(link, clock, nothing, answered.wait)
+    supervisor.start()
+    await supervisor.first_try()
+    for number in range(SENDING_MAX):
+        supervisor.send("a light", command(f"light {number}"))
+    with pytest.raises(Refused, match="pending"):
+        supervisor.send("a light", command("one light too many"))
+    supervisor.send("emergency stop", command("stop"), always=True)
+    await asyncio.sleep(0)
+    assert sent == [*(f"light {number}" for number in range(SENDING_MAX)), "stop"]
+    answered.set()
+    await supervisor.close(nothing())

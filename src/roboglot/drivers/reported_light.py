@@ -57,6 +57,6 @@ class ReportedLight(ShownLight):
             raise InvalidGoal("the lamps of this robot cannot be set one by one")
         if effect not in self.effects:
             raise InvalidGoal(f"this robot's lamps do not know {effect}; they know {', '.join(self.effects)}")
-        self._supervisor.link.require()
+        self._supervisor.require()
         super().shine(zone, colour, effect, frequency=frequency, lamp=lamp)
         self._supervisor.send(f"the light {zone}", self.send_zone(zone, self.state(zone), lamp))

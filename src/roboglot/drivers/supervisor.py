@@ -14,11 +14,12 @@ from collections.abc import Awaitable, Callable, Coroutine
 from roboglot.clients.errors import ClientError
 from roboglot.model.clock import Clock
 from roboglot.model.components.system.link import Link, LinkState
+from roboglot.model.errors import Refused
 
 log = logging.getLogger(__name__)
 PAUSE_MIN, PAUSE_MAX = 0.5, 10.0  # s between two attempts
 STEADY = 5.0  # s of connection that reset the back-off, so that a flapping link is retried less and less often
-SENDING_MAX = 32  # pending commands sent without waiting
+SENDING_MAX = 32  # pending commands sent without waiting, stops apart
 PARTING_SECONDS = 1.0  # real seconds for the last command: time-outs on a stopped virtual clock never expire
 
 
@@ -55,23 +56,31 @@ class Supervisor:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def send(self, what: str, command: Coroutine[None, None, object]) -> None:
-        """Send a command without waiting; log a failure. Raises Unconnected at once without a link."""
+    def require(self) -> None:
+        """Raise Unconnected without a link, Refused while too many commands are pending."""
+        self.link.require()
+        if len(self._sending) >= SENDING_MAX:
+            raise Refused(f"{SENDING_MAX} commands are pending on the link to the robot already")
+
+    def send(self, what: str, command: Coroutine[None, None, object], *, always: bool = False) -> None:
+        """Send a command without waiting; log a failure. Raises what ``require`` does, at once.
+
+        ``always``: also send it while too many commands are pending. For stops, and for what is sent once at a time.
+        """
         try:
-            self.link.require()
+            if always:
+                self.link.require()
+            else:
+                self.require()
         except Exception:
             command.close()
             raise
-        if len(self._sending) >= SENDING_MAX:
-            command.close()
-            log.warning("%s: %s dropped: too many commands pending", self.link.address, what)
-            return
         task = asyncio.get_running_loop().create_task(self._send(what, command), name=what)
         self._sending.add(task)
         task.add_done_callback(self._sending.discard)
 
     def send_setting(self, what: str, command: Callable[[], Awaitable[None]], undo: Callable[[], object]) -> None:
-        """Send a setting without waiting; call ``undo`` if the robot refuses it. Raises Unconnected without a link.
+        """Send a setting without waiting; call ``undo`` if the robot refuses it. Raises what ``require`` does.
 
         Commands that follow are sent behind it, so they arrive after it.
         """

@@ -66,7 +66,7 @@ class PacketFeed(Feed[P]):
             await self._stream.off()
 
         with contextlib.suppress(RobotError):  # without a link it has ended anyway
-            self._supervisor.send(f"stopping the {self._what}", off())
+            self._supervisor.send(f"stopping the {self._what}", off(), always=True)
 
     async def _run(self) -> None:
         while True:

@@ -65,7 +65,7 @@ class RoboMasterArm(Arm):
     def stop(self) -> None:
         for action in self._robot.actions.running(ARM):
             action.cancel("the arm was stopped")
-        self._supervisor.send("stopping the arm", self._client.robotic_arm.stop())
+        self._supervisor.send("stopping the arm", self._client.robotic_arm.stop(), always=True)
 
     @property
     def _scale(self) -> tuple[float, ArmPosition]:

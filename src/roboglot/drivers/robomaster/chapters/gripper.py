@@ -45,7 +45,7 @@ class RoboMasterGripper(Gripper):
     def stop(self) -> None:
         for action in self._robot.actions.running(GRIPPER):
             action.cancel("the gripper was stopped")
-        self._supervisor.send("stopping the gripper", self._client.robotic_gripper.stop())
+        self._supervisor.send("stopping the gripper", self._client.robotic_gripper.stop(), always=True)
 
     def _start(self, goal: GripperStatus, level: int, source: str) -> Action:
         check_level(level)

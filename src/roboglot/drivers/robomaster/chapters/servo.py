@@ -81,7 +81,7 @@ class RoboMasterServos(Servos):
         for each in range(1, self.count + 1) if number is None else (self._index(number) + 1,):
             for action in self._robot.actions.running(servo_resource(each)):
                 action.cancel("the servo was stopped")
-        self._supervisor.send("stopping servos", self._client.servo.stop(number))
+        self._supervisor.send("stopping servos", self._client.servo.stop(number), always=True)
 
     async def _ask(self, number: int) -> float:
         return math.remainder(math.radians(await self._client.servo.get_angle(number)), math.tau)

@@ -103,7 +103,7 @@ class CyberDogLegs(Legs):
             for action in self._robot.actions.running(resource):
                 action.cancel("emergency: the legs went limp")
         self._base.set_velocity(STILL)
-        self._supervisor.send("emergency stop", self._client.emergency_stop())
+        self._supervisor.send("emergency stop", self._client.emergency_stop(), always=True)
 
     def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
         lift = lift or FootLift(*STEP)

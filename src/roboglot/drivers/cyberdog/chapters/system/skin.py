@@ -27,12 +27,12 @@ class CyberDogSkin(ShownSkin):
         return {}
 
     def enable(self, on: bool) -> None:
-        self._supervisor.link.require()
+        self._supervisor.require()
         super().enable(on)
         self._supervisor.send("switching the skin", self.probe())
 
     def show(self, pattern: SkinPattern, *, cycle: float = 1.0, standing: Shade = Shade.LIGHT) -> None:
-        self._supervisor.link.require()
+        self._supervisor.require()
         super().show(pattern, cycle=cycle, standing=standing)
         self._supervisor.send("the skin's pattern", self.probe())
 

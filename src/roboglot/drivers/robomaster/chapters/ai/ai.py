@@ -56,13 +56,13 @@ class DetectionSwitches:
         """Switch ``kind`` on and pass its pushes to ``heard``."""
         self._watching[kind] = heard
         with contextlib.suppress(RobotError):  # without a link: at the next connection
-            self.supervisor.send(f"looking for a {kind}", self.switch(kind, True))
+            self.supervisor.send(f"looking for a {kind}", self.switch(kind, True), always=True)
 
     def leave(self, kind: str) -> None:
         """Switch ``kind`` off."""
         del self._watching[kind]
         with contextlib.suppress(RobotError):
-            self.supervisor.send(f"no longer looking for a {kind}", self.switch(kind, False))
+            self.supervisor.send(f"no longer looking for a {kind}", self.switch(kind, False), always=True)
 
     def rival(self, kind: str) -> str | None:
         """Return a watched kind that excludes ``kind``, or None."""

@@ -73,9 +73,9 @@ class SlamwareEmergencyStop(EmergencyStop):
         return self._engaged
 
     def engage(self) -> None:
-        self._set("base.emergency_stop", "on")
         for action in self._robot.actions.running(BASE):
             action.cancel("the emergency stop is engaged")
+        self._set("base.emergency_stop", "on", always=True)
 
     def release(self) -> None:
         self._set("base.emergency_stop", "off")
@@ -87,12 +87,12 @@ class SlamwareEmergencyStop(EmergencyStop):
     def release_brake(self, released: bool) -> None:
         self._set("base.brake_release", "on" if released else "off")
 
-    def _set(self, parameter: Settable, value: str) -> None:
+    def _set(self, parameter: Settable, value: str, *, always: bool = False) -> None:
         async def change() -> None:
             await self._client.set_system_parameter(Parameter(parameter, value))
             await self._health.refresh()
 
-        self._supervisor.send(parameter, change())
+        self._supervisor.send(parameter, change(), always=always)
 
     def _take(self) -> None:
         stamp = self._robot.clock.time()
