@@ -17,6 +17,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 import msgspec
 
+from roboglot.confirmation import Confirmation
 from roboglot.validation import KINDS, why_invalid
 from roboglot.values import dataclass
 
@@ -130,9 +131,19 @@ class Operation(Generic[K]):
 
     async def call(self, context: object, values: Mapping[str, object]) -> Any:
         """Parse ``values`` and run the handler with ``context`` first."""
-        parsed = self.parse(values) if values or self.parameters.__struct_fields__ else {}
-        answer = self.handler(context, **parsed)
-        return await answer if isinstance(answer, CoroutineType) else answer
+        return await self.run(context, self.parse(values) if values or self.parameters.__struct_fields__ else {})
+
+    async def run(self, context: object, values: Mapping[str, object]) -> object:
+        """Run the handler with parsed values; return its answer once a real robot has confirmed what it sent.
+
+        Raises the RobotError of a command that the robot refuses.
+        """
+        with Confirmation() as confirmation:
+            answer = self.handler(context, **values)
+            if isinstance(answer, CoroutineType):
+                answer = await answer
+        await confirmation.wait()
+        return answer
 
 
 class OperationTable(Generic[K]):

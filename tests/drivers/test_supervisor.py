@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Collection
+from contextlib import nullcontext
 from itertools import pairwise
 
 import pytest
@@ -37,7 +38,7 @@ async def pauses_of(clock: LockstepClock, there: Collection[int], served: float)
     async def stop() -> None:
         """Refuse commands."""
 
-    supervisor = Supervisor(link, clock, begin, serve)
+    supervisor = Supervisor(link, clock, begin, serve, nullcontext)
     supervisor.start()
     states = set()
     for _ in range(200):
@@ -70,9 +71,12 @@ async def test_full_link_refuses_all_but_stops(clock: LockstepClock) -> None:
         await answered.wait()
 
     async def nothing() -> None:
-        await clock.sleep(0)
+        """Succeed at once."""
 
-    supervisor = Supervisor(link, clock, nothing, answered.wait)
+    async def serve() -> None:
+        await answered.wait()
+
+    supervisor = Supervisor(link, clock, nothing, serve, nullcontext)
     supervisor.start()
     await supervisor.first_try()
     for number in range(SENDING_MAX):

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 from roboglot.clients.errors import LinkLost
+from roboglot.drivers.errors import plain_errors
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.link import Link
@@ -16,13 +19,21 @@ class Driver(ABC):
 
     Optional components are added at the first connection. ``address`` is the robot's URL. With ``touches`` false the
     driver only observes: it skips every component that must write to the robot to probe or keep its state.
+    ``robot_errors``: context that raises the client's errors as the model's.
     """
 
-    def __init__(self, robot: Robot, address: str, *, touches: bool = True) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        address: str,
+        *,
+        touches: bool = True,
+        robot_errors: Callable[[], AbstractContextManager[None]] = plain_errors,
+    ) -> None:
         self.robot = robot
         health = robot[Health] if Health in robot else robot.add(Health, Health(robot.clock, robot.events))
         self.link = robot.add(Link, Link(address, robot.clock, robot.events, health))
-        self.supervisor = Supervisor(self.link, robot.clock, self.begin, self.serve)
+        self.supervisor = Supervisor(self.link, robot.clock, self.begin, self.serve, robot_errors)
         self.supervisor.touches = touches
         self._serial = ""
 

@@ -107,7 +107,7 @@ class EntrySync(Generic[T]):
     def _changed(self, _: Event) -> None:
         if not (self._syncing or self._due or self._supervisor.link.refusal):
             self._due = True  # one pending sync covers all changes until it begins
-            self._supervisor.send(f"synchronising {self._what}", self.sync(), always=True)
+            self._supervisor.send_aside(f"synchronising {self._what}", self.sync())
 
 
 def _changes(now: Mapping[Hashable, T], before: Mapping[Hashable, T]) -> dict[Hashable, T | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.model.errors import RobotError, Unconnected
@@ -18,3 +18,8 @@ def model_errors(translated: Callable[[ClientError], RobotError | None]) -> Iter
         raise Unconnected(str(error)) from None
     except ClientError as error:
         raise translated(error) or RobotError(str(error)) from None
+
+
+def plain_errors() -> AbstractContextManager[None]:
+    """Raise client errors as model errors, for drivers of robots whose refusals have no special meanings."""
+    return model_errors(lambda _: None)

@@ -10,11 +10,13 @@ import asyncio
 import logging
 import math
 from collections.abc import Awaitable, Callable, Coroutine
+from contextlib import AbstractContextManager
 
 from roboglot.clients.errors import ClientError
+from roboglot.confirmation import Sent, confirm
 from roboglot.model.clock import Clock
 from roboglot.model.components.system.link import Link, LinkState
-from roboglot.model.errors import Refused
+from roboglot.model.errors import Refused, RobotError
 
 log = logging.getLogger(__name__)
 PAUSE_MIN, PAUSE_MAX = 0.5, 10.0  # s between two attempts
@@ -24,16 +26,24 @@ PARTING_SECONDS = 1.0  # real seconds for the last command: time-outs on a stopp
 
 
 class Supervisor:
-    """Runs ``begin`` (connect and probe the robot) and ``serve``, which ends by raising ClientError or OSError."""
+    """Runs ``begin`` (connect and probe the robot) and ``serve``, which ends by raising ClientError or OSError.
+
+    ``robot_errors``: context that raises the client's errors as the model's.
+    """
 
     def __init__(
-        self, link: Link, clock: Clock, begin: Callable[[], Awaitable[None]], serve: Callable[[], Awaitable[None]]
+        self,
+        link: Link,
+        clock: Clock,
+        begin: Callable[[], Awaitable[None]],
+        serve: Callable[[], Awaitable[None]],
+        robot_errors: Callable[[], AbstractContextManager[None]],
     ) -> None:
         self.link = link
         self.touches = True  # whether the driver may change the state of the robot; false for observers
-        self._clock, self._begin, self._serve = clock, begin, serve
+        self._clock, self._begin, self._serve, self._robot_errors = clock, begin, serve, robot_errors
         self._task: asyncio.Task[None] | None = None
-        self._sending: set[asyncio.Task[None]] = set()
+        self._sending: set[Sent] = set()
         self._first = asyncio.Event()
 
     def start(self) -> None:
@@ -63,9 +73,9 @@ class Supervisor:
             raise Refused(f"{SENDING_MAX} commands are pending on the link to the robot already")
 
     def send(self, what: str, command: Coroutine[None, None, object], *, always: bool = False) -> None:
-        """Send a command without waiting; log a failure. Raises what ``require`` does, at once.
+        """Send a command without waiting; the present request is answered once the robot has confirmed it.
 
-        ``always``: also send it while too many commands are pending. For stops, and for what is sent once at a time.
+        ``always``: also send it while too many commands are pending: for stops. Raises what ``require`` does, at once.
         """
         try:
             if always:
@@ -75,9 +85,22 @@ class Supervisor:
         except Exception:
             command.close()
             raise
+        confirm(self._begin_sending(what, command))
+
+    def send_aside(self, what: str, command: Coroutine[None, None, object]) -> None:
+        """Send what no request waits for, even while too many commands are pending. Raises Unconnected."""
+        try:
+            self.link.require()
+        except Exception:
+            command.close()
+            raise
+        self._begin_sending(what, command)
+
+    def _begin_sending(self, what: str, command: Coroutine[None, None, object]) -> Sent:
         task = asyncio.get_running_loop().create_task(self._send(what, command), name=what)
         self._sending.add(task)
         task.add_done_callback(self._sending.discard)
+        return task
 
     def send_setting(self, what: str, command: Callable[[], Awaitable[None]], undo: Callable[[], object]) -> None:
         """Send a setting without waiting; call ``undo`` if the robot refuses it. Raises what ``require`` does.
@@ -94,11 +117,15 @@ class Supervisor:
 
         self.send(what, send())
 
-    async def _send(self, what: str, command: Coroutine[None, None, object]) -> None:
+    async def _send(self, what: str, command: Coroutine[None, None, object]) -> Exception | None:
+        """Send a command; log and return the error of the robot or of the link."""
         try:
-            await command
-        except ClientError as error:
+            with self._robot_errors():
+                await command
+        except RobotError as error:
             log.warning("%s: %s failed: %s", self.link.address, what, error)
+            return error
+        return None
 
     async def _run(self) -> None:
         pause = PAUSE_MIN

@@ -82,7 +82,7 @@ class CyberDogDriver(Driver):
         app_port: int,
         touches: bool = True,
     ) -> None:
-        super().__init__(robot, address, touches=touches)
+        super().__init__(robot, address, touches=touches, robot_errors=robot_errors)
         self._host, self._port, self._app_port = host, port, app_port
         self._certificates = certificates
         reported = self._reported = ReportedState()

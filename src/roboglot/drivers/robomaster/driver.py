@@ -18,6 +18,7 @@ from roboglot.drivers.robomaster.chapters.chassis import RoboMasterBase, RoboMas
 from roboglot.drivers.robomaster.components import OptionalComponents
 from roboglot.drivers.robomaster.state import ReportedState
 from roboglot.drivers.robomaster.telemetry import TelemetryListener
+from roboglot.drivers.robomaster.vocabulary import robot_errors
 from roboglot.drivers.robomaster.watchdog import Watchdog
 from roboglot.model.clock import RealClock
 from roboglot.model.components.energy.battery import Battery
@@ -59,7 +60,7 @@ class RoboMasterDriver(Driver):
         own: Collection[str] = (),
         touches: bool = True,
     ) -> None:
-        super().__init__(robot, address, touches=touches)
+        super().__init__(robot, address, touches=touches, robot_errors=robot_errors)
         self._endpoint = endpoint
         self._pushes = pushes
         self._own = own

@@ -66,7 +66,7 @@ class PacketFeed(Feed[P]):
             await self._stream.off()
 
         with contextlib.suppress(RobotError):  # without a link it has ended anyway
-            self._supervisor.send(f"stopping the {self._what}", off(), always=True)
+            self._supervisor.send_aside(f"stopping the {self._what}", off())
 
     async def _run(self) -> None:
         while True:

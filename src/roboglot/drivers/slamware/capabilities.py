@@ -32,7 +32,7 @@ APPROXIMATIONS: dict[type[Component], str] = {
     Battery: "no voltage and no cycles; current and temperature where the robot reports them",
     DockContact: "",
     Localization: "the pose is up to 0.1 s old",
-    Mapping: "the map is up to 2 s old; changes are sent without waiting for them; merges keep the origin",
+    Mapping: "the map is up to 2 s old; merges keep the origin",
     Navigation: "by the robot's own skill, which goes on when the link is lost; plans begin where the robot is",
     Docking: "by the robot's own skill",
     Jack: "only where the robot has one; its stroke is assumed and its load is not reported",

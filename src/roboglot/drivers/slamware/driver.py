@@ -17,6 +17,7 @@ from roboglot.drivers.slamware.chapters.slam import SlamwareLocalization, Slamwa
 from roboglot.drivers.slamware.components import OptionalComponents
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.telemetry import TelemetryPoller
+from roboglot.drivers.slamware.vocabulary import robot_errors
 from roboglot.model.components.component import Component
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.mapping.localization import Localization
@@ -46,7 +47,7 @@ class SlamwareDriver(Driver):
     """Connects ``robot`` to the REST robot at ``host``."""
 
     def __init__(self, robot: Robot, address: str, host: str, port: int = PORT, *, touches: bool = True) -> None:
-        super().__init__(robot, address, touches=touches)
+        super().__init__(robot, address, touches=touches, robot_errors=robot_errors)
         self._client = SlamwareClient(host, port, clock=robot.clock, timeout=TIMEOUT)
         self._client.note_in(robot.tap.line("slamware", f"{host}:{port}"))
         reported = self._reported = ReportedState()

@@ -55,7 +55,7 @@ async def call(session: Session, name: str, args: Sequence[object], kwargs: Mapp
     try:
         if session.robot.admission.enforced and identity():  # programs without a client's identity belong to the robot
             session.robot.admission.check("visual", operation.key, operation.right)
-        result = await operation.handler(session, **bind(operation, args, kwargs))
+        result = await operation.run(session, bind(operation, args, kwargs))
     except RobotError as error:
         remember(session, operation.key, error)
         raise

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import lru_cache, partial
 from inspect import iscoroutinefunction
-from types import CoroutineType
+from typing import cast
 
+from roboglot.model.components.system.link import Link
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
 from roboglot.model.stand_in import StandIn
@@ -110,9 +111,7 @@ async def _run(context: Context, text: str | None, request: _Request) -> Answer:
             _admit(context, line.key, text, request)
         if line.refusal is not None:
             raise _Refusal(*line.refusal)
-        result = TABLE[line.key].handler(context, **line.values)
-        if isinstance(result, CoroutineType):
-            result = await result
+        result = cast(Result, await TABLE[line.key].run(context, line.values))
     except (Malformed, _Refusal) as refusal:
         if refusal.reply is Reply.PARSE_ERROR and not context.active:
             return Answer(context.profile.result(Reply.NOT_IN_SDK_MODE, seq), lambda: "send `command;` first")
@@ -163,6 +162,8 @@ def fast_path(context: Context, text: str) -> FastPath | None:
         return None
     if line.refusal is not None or iscoroutinefunction(TABLE[line.key].handler):
         return None
+    if Link in this_robot and TABLE[line.key].right is not Right.SEE:
+        return None  # the real robot has to confirm it
     handler = partial(TABLE[line.key].handler, context, **line.values)
     tap, profile, seq = this_robot.tap, context.profile, line.seq
     network = this_robot[Network] if Network in this_robot else None  # noqa: SIM401 - a later one is real

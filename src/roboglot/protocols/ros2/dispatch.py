@@ -44,7 +44,7 @@ async def _do(context: Context, key: str, data: bytes | None, read: Read) -> tup
             message = read(data, TYPES[key])
         except ValueError as error:
             return logging.ERROR, f"the message cannot be read: {error}"
-        await operation.handler(context, message=message)
+        await operation.run(context, {"message": message})
     except RobotError as error:
         return level_of(error), str(error)
     except Exception as error:  # one message must not end the listening

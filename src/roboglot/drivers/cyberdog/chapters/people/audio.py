@@ -71,7 +71,7 @@ class CyberDogSpeaker(Speaker):
             except TimeoutError:
                 raise Expired("the dog does not report the end of its speech") from None
             except BaseException:
-                self._supervisor.send("being silent", client.operate("task", "shutdown", TASK), always=True)
+                self._supervisor.send_aside("being silent", client.operate("task", "shutdown", TASK))
                 raise
 
 

@@ -62,7 +62,7 @@ class DetectionSwitches:
         """Switch ``kind`` off."""
         del self._watching[kind]
         with contextlib.suppress(RobotError):
-            self.supervisor.send(f"no longer looking for a {kind}", self.switch(kind, False), always=True)
+            self.supervisor.send_aside(f"no longer looking for a {kind}", self.switch(kind, False))
 
     def rival(self, kind: str) -> str | None:
         """Return a watched kind that excludes ``kind``, or None."""

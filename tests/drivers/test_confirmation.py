@@ -1,0 +1,68 @@
+"""A request to a real robot is answered when the robot has answered: its refusals reach the client."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from roboglot.clients.slamware import SlamwareRefused
+from roboglot.confirmation import Confirmation, confirm
+from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
+from roboglot.model.errors import Refused
+from roboglot.model.robot import Robot
+from roboglot.wire.slamware.geometry import Pose3D
+from tests.drivers.clients import Open, OpenRest
+
+
+def refuse(*_: object) -> None:
+    """Refuse, in place of a method of the real robot."""
+    raise Refused("not now")
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_pose_is_set_when_it_is_answered(driven: Robot, robot: Robot, rest: OpenRest) -> None:
+    front = await rest(driven)
+    await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
+    assert robot[Localization].pose.x == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.world("empty", body="hermes")
+async def test_refused_pose_is_refused_in_front(
+    driven: Robot, robot: Robot, rest: OpenRest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    front = await rest(driven)
+    monkeypatch.setattr(robot[Localization], "set_pose", refuse)
+    with pytest.raises(SlamwareRefused, match="not now"):
+        await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
+
+
+@pytest.mark.world("empty", body="robomaster_ep")
+async def test_refused_mode_fails_also_when_repeated(
+    driven_ep: Robot, robot: Robot, text_door: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client = await text_door(driven_ep)
+    assert await client.ask("robot mode gimbal_lead;") == "ok"
+    assert robot[Gimbal].mode is FollowMode.GIMBAL_LEAD
+    monkeypatch.setattr(robot[Gimbal], "set_mode", refuse)
+    for _ in range(3):  # repeated lines may take a shorter way
+        assert await client.ask("robot mode free;") == "fail"
+        assert await client.ask("robot mode ?;") == "gimbal_lead"
+
+
+async def test_commands_of_other_tasks_are_not_awaited() -> None:
+    async def refused() -> Exception:
+        return Refused("not now")
+
+    async def action() -> None:
+        confirm(asyncio.ensure_future(refused()))
+
+    with Confirmation() as confirmation:
+        begun = asyncio.create_task(action())
+        await begun
+    await confirmation.wait()
+    with Confirmation() as confirmation:
+        confirm(asyncio.ensure_future(refused()))
+    with pytest.raises(Refused, match="not now"):
+        await confirmation.wait()
