@@ -19,7 +19,13 @@ from tests.protocols.visual.front_end import FrontEnd
 
 Connect = Callable[..., Coroutine[Any, Any, FrontEnd]]
 
-WALK = "while True:\n    cyberdog.motion.go_straight(0.2, 0.5)\n    cyberdog.motion.go_straight(-0.2, 0.5)\n"
+# It waits between its walks: a restart refuses these at once, and asking again would take a processor for 3 or 8 s.
+WALK = """
+while True:
+    cyberdog.motion.go_straight(0.2, 0.5)
+    cyberdog.motion.go_straight(-0.2, 0.5)
+    time.sleep(0.1)
+"""
 SQUARE = """
 cyberdog.task.block('stand~1');
 cyberdog.motion.resume_standing();
