@@ -41,6 +41,8 @@ settings.load_profile("same")
 # httpx's pool tries to import it at every request: a third of a request's time was spent on a missing module.
 if importlib.util.find_spec("sniffio") is None:
     sys.modules["sniffio"] = None  # type: ignore[assignment]
+# jsonschema, and with it MCP, would compile its grammar, for 2 s; no schema of the tests has an IRI.
+sys.modules["rfc3987_syntax"] = None  # type: ignore[assignment]
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background; tests interrupt their processes
     signal.signal(signal.SIGINT, signal.default_int_handler)
