@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 
 from roboglot.model.actions import Action
 from roboglot.model.clock import RealClock
@@ -48,6 +49,15 @@ def go(robot: Robot, frame: str, pose: Pose, source: str) -> Action:
 def place(robot: Robot, frame: str, pose: Pose) -> None:
     """Set the robot's pose in its map. Raises RobotError."""
     robot[Localization].set_pose(pose_in_map(robot, frame, pose))
+
+
+def heading(x: float, y: float, z: float, w: float) -> float:
+    """Return the yaw of a quaternion of any length, rad. Raises InvalidGoal for one that turns nothing."""
+    if not all(map(math.isfinite, (x, y, z, w))) or not any((x, y, z, w)):
+        raise InvalidGoal("the orientation is not a quaternion")
+    largest = max(map(abs, (x, y, z, w)))
+    x, y, z, w = x / largest, y / largest, z / largest, w / largest
+    return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
 def pose_in_map(robot: Robot, frame: str, pose: Pose) -> Pose:

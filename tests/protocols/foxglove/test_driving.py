@@ -114,6 +114,17 @@ async def test_the_pose_is_set(scene: Scene) -> None:
     assert (pose.x, pose.y, pose.yaw) == pytest.approx((1.0, 2.0, 0.5), abs=0.01)
 
 
+@pytest.mark.parametrize("length", [1e200, 3.0, 1e-300])
+async def test_a_quaternion_of_any_length_turns(scene: Scene, length: float) -> None:
+    viewer = await publisher(scene, "/initialpose", "geometry_msgs/PoseWithCovarianceStamped")
+    turn = {"x": 0, "y": 0, "z": length * math.sin(0.5), "w": length * math.cos(0.5)}
+    for orientation, yaw in ((turn, 1.0), ({"x": 0, "y": length, "z": 0, "w": 0}, math.pi)):
+        await viewer.publish({"pose": {"pose": {"position": {"x": 1}, "orientation": orientation}}})
+        await viewer.settled()
+        assert viewer.complaints == []
+        assert math.cos(scene.robot[Localization].pose.yaw - yaw) > 0.99
+
+
 async def test_invalid_messages_are_refused(scene: Scene) -> None:
     viewer = await publisher(scene, "/cmd_vel")
     await viewer.advertise("/fly", "geometry_msgs/Twist", 2)

@@ -193,6 +193,29 @@ async def test_goal_is_reached_and_the_pose_is_set(opened: Opened) -> None:
     assert scene.robot[Localization].pose.x == pytest.approx(2.0, abs=0.05)
 
 
+@pytest.mark.parametrize("length", [1e200, 3.0, 1e-300])
+async def test_a_quaternion_of_any_length_turns(opened: Opened, length: float) -> None:
+    scene = await opened()
+    turn = made("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=length * math.sin(0.5), w=length * math.cos(0.5))
+    tilted = made("geometry_msgs/msg/Quaternion", x=0.0, y=length, z=0.0, w=0.0)
+    for orientation, yaw in ((turn, 1.0), (tilted, math.pi)):
+        there = made(
+            WITH_COVARIANCE,
+            header=header("map"),
+            pose=made(
+                "geometry_msgs/msg/PoseWithCovariance",
+                pose=made(
+                    "geometry_msgs/msg/Pose",
+                    position=made("geometry_msgs/msg/Point", x=1.0, y=0.0, z=0.0),
+                    orientation=orientation,
+                ),
+                covariance=np.zeros(36),
+            ),
+        )
+        await published(scene, "/a/initialpose", WITH_COVARIANCE, there)
+        assert math.cos(scene.robot[Localization].pose.yaw - yaw) > 0.99
+
+
 async def test_refused_commands_are_logged(opened: Opened) -> None:
     scene = await opened()
     peer: Peer = scene.peer

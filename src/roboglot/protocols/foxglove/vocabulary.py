@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -12,10 +11,10 @@ from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping as Mapper
 from roboglot.model.components.motion.base import Base
-from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.operations import Right
+from roboglot.protocols.ros_commands import heading
 from roboglot.validation import decode_json
 from roboglot.values import dataclass
 from roboglot.wire.foxglove.messages import PUBLISHED_SIZE, ClientOpcode
@@ -42,9 +41,7 @@ class Quaternion(msgspec.Struct):
     @property
     def yaw(self) -> float:
         """The heading, rad. Raises InvalidGoal for what turns nothing."""
-        if not all(map(math.isfinite, (self.x, self.y, self.z, self.w))) or not any((self.x, self.y, self.z, self.w)):
-            raise InvalidGoal("the orientation is not a quaternion")
-        return math.atan2(2 * (self.w * self.z + self.x * self.y), 1 - 2 * (self.y**2 + self.z**2))
+        return heading(self.x, self.y, self.z, self.w)
 
 
 class RosPose(msgspec.Struct):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import Protocol, runtime_checkable
 
-from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Pose, Twist
+from roboglot.protocols.ros_commands import heading
 
 DOOR = "ros2"
 TYPES = {
@@ -81,8 +80,4 @@ def twist(message: TwistMessage) -> Twist:
 def pose(message: PoseMessage) -> Pose:
     """Return a geometry_msgs/Pose. Raises InvalidGoal."""
     turn = message.orientation
-    parts = turn.x, turn.y, turn.z, turn.w
-    if not all(map(math.isfinite, parts)) or not any(parts):
-        raise InvalidGoal("the orientation is not a quaternion")
-    yaw = math.atan2(2 * (turn.w * turn.z + turn.x * turn.y), 1 - 2 * (turn.y**2 + turn.z**2))
-    return Pose(message.position.x, message.position.y, yaw)
+    return Pose(message.position.x, message.position.y, heading(turn.x, turn.y, turn.z, turn.w))
