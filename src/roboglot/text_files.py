@@ -6,9 +6,12 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
+
+if TYPE_CHECKING:
+    from yaml import SafeLoader
 
 T = TypeVar("T")
 
@@ -54,3 +57,16 @@ def parse_toml(text: str) -> dict[str, object]:
 def convert_toml(text: str, kind: type[T], *, strict: bool = True) -> T:
     """Return a TOML document as a value of a type. Raises ValueError, msgspec.ValidationError (which is one)."""
     return msgspec.convert(parse_toml(text), kind, strict=strict, str_keys=True)
+
+
+def parse_yaml(text: str, loader: type[SafeLoader] | None = None) -> object:
+    """Return the values of a YAML document, read by a ``loader`` of plain values. Raises ValueError."""
+    import yaml
+
+    with in_bounds():
+        try:
+            return yaml.load(text, loader or yaml.SafeLoader)
+        except yaml.YAMLError as error:
+            raise ValueError(str(error)) from None
+        except (AttributeError, LookupError, TypeError):  # the library's own, of "!!int ''" or "!!bool maybe"
+            raise ValueError("a value does not fit its tag") from None

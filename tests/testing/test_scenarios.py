@@ -25,6 +25,8 @@ WRONG = {
     "name: x\nwhen: []\nthen: [{refused: 0}]\ngiven: {robots: []}\n": "robots must have at least 1 entries",
     "name: x\nwhen: []\nthen: [{refused: 0}]\nthen: [{refused: 1}]\n": "'then' is given twice in .* line 4",
     "name: x\nwhen: []\nthen: [{moved: {x: 1, x: 2}}]\n": "'x' is given twice",
+    "name: x\nwhen: !!int ''\n": "a value does not fit its tag",
+    "name: x\nwhen: !!bool maybe\n": "a value does not fit its tag",
     "? [a, b]\n: c": "unhashable key",
     "a: [": "while parsing",
     "!!python/object/apply:os.system [true]": "constructor",

@@ -12,9 +12,10 @@ from roboglot.model.components.sensing.lidar import Lidar
 from roboglot.model.geometry import Pose, Twist
 from roboglot.simulation.building.blueprint import SolidKind, solids_of
 from roboglot.simulation.world.declarations import BadFile
-from roboglot.simulation.world.world_files import load_world
+from roboglot.simulation.world.world_files import load_world, read_ros_grid
 
 MAP = "image: {image}\nresolution: 0.1\norigin: [{x}, -2.0, {yaw}]\noccupied_thresh: 0.65\nfree_thresh: 0.25\n{more}"
+TAGGED = ("!!int ''", "!!bool maybe", "!!timestamp soon", "!!float ''")  # each another error of the library's own
 
 
 @pytest.fixture
@@ -110,6 +111,27 @@ def test_grey_is_neither_wall_nor_place_for_dock(write):
     assert not [s for s in solids_of(world.floors[0], None, False) if 0.2 < s.pose.x < 3.9 and s.size[1] > 0.2]
 
 
+@pytest.mark.parametrize("image", ["deep.png", "deep.tiff", "deep.pgm"])
+def test_sixteen_bits_are_grey_as_eight_are(write, tmp_path, image):
+    pixels = room()
+    pixels[20:30, 20:30] = 128
+    wanted = load_world(write(pixels))
+    deep = np.asarray(pixels, np.uint16) * 257
+    if image.endswith(".pgm"):
+        (tmp_path / image).write_bytes(b"P5 80 60 65535\n" + deep.byteswap().tobytes())
+    else:
+        Image.fromarray(deep).save(tmp_path / image)
+    assert load_world(write(pixels, image=image)) == wanted
+    known = read_ros_grid(write(pixels, image=image)).log_odds
+    assert not known[60 - 30 : 60 - 20, 20:30].any(), "grey is unknown"
+
+
+def test_pixels_that_are_fractions_are_refused(write, tmp_path):
+    Image.fromarray(np.asarray(room(), np.float32)).save(tmp_path / "real.tiff")
+    with pytest.raises(BadFile, match="pixels are fractions"):
+        load_world(write(room(), image="real.tiff"))
+
+
 def test_the_same_map_gives_the_same_world(write):
     path = write(room())
     assert load_world(path) == load_world(path)
@@ -123,6 +145,7 @@ def test_the_same_map_gives_the_same_world(write):
         ({"image": "gone.pgm"}, "gone.pgm: No such file"),
         ({"image": "map.yaml"}, "not an image"),
         ({"more": "negate: [\n"}, "not YAML"),
+        *(({"more": f"negate: {word}\n"}, "not YAML: a value does not fit its tag") for word in TAGGED),
     ],
 )
 def test_bad_maps_are_named(write, options, message):

@@ -30,13 +30,14 @@ from roboglot.simulation.world.description import (
 )
 from roboglot.simulation.world.description_checks import completed
 from roboglot.spelling import instead
-from roboglot.text_files import in_bounds
+from roboglot.text_files import parse_yaml
 from roboglot.validation import why_invalid
 
 WORLDS = Path(__file__).parent.parent / "worlds"
 CELLS_MAX = 16_000_000
 ROS_MAP_BYTES_MAX = 64 << 10  # of the yaml, which has six fields
 IMAGES = ("PPM", "PNG", "BMP", "GIF", "JPEG", "TIFF")  # not EPS, which Pillow has Ghostscript run as a program
+DEEP = 257  # a grey value of 16 bits for each of 8: 65535 is 255
 HEIGHT = 2.5
 WALL_LENGTH = 1.0  # m from which a solid counts as a wall rather than an object
 ROOM = (2.0, 1.5, 1.0, 0.75, 0.6, 0.5)  # m of free floor around a robot that leaves its dock; the first that exists
@@ -108,16 +109,12 @@ def read_ros_grid(path: Path) -> OccupancyGrid:
 
 
 def _read(path: Path) -> RosMap:
-    import yaml
-
     text = text_below(path, ROS_MAP_BYTES_MAX)
     try:
-        with in_bounds():
-            values = yaml.safe_load(text)
-        ros_map = msgspec.convert(values, RosMap, strict=False)
+        ros_map = msgspec.convert(parse_yaml(text), RosMap, strict=False)
     except msgspec.ValidationError as error:
         raise BadFile(f"{path}: not a ROS map: {why_invalid(error, wanted=RosMap)}") from None
-    except (yaml.YAMLError, ValueError) as error:
+    except ValueError as error:
         raise BadFile(f"{path}: not YAML: {error}") from None
     if ros_map.origin[2]:
         raise BadFile(f"{path}: origin has a yaw of {ros_map.origin[2]}; only maps with yaw 0 can be imported")
@@ -138,6 +135,10 @@ def _pixels(path: Path) -> NDArray[np.float64]:
         with Image.open(path, formats=IMAGES) as image:
             if image.width * image.height > CELLS_MAX:
                 raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than {CELLS_MAX}")
+            if image.mode == "F":
+                raise BadFile(f"{path}: its pixels are fractions; map_server takes 8 or 16 bits of grey, or colours")
+            if image.mode.startswith("I"):  # 16 bits, which the library would cut off at 255
+                return np.clip(np.asarray(image.convert("I"), dtype=np.float64)[::-1] / DEEP, 0, 255)
             return np.asarray(image.convert("L"), dtype=np.float64)[::-1]
     except OSError as error:
         reason = "not an image" if isinstance(error, UnidentifiedImageError) else error.strerror or str(error)

@@ -206,8 +206,6 @@ def verb_of(value: Step | Check, verbs: Sequence[str]) -> str:
 
 def read(path: Path) -> Found:
     """Read one file. Raises BadScenario."""
-    from yaml import YAMLError
-
     from roboglot.testing.scenarios.strict_yaml import read_yaml
 
     try:
@@ -220,7 +218,7 @@ def read(path: Path) -> Found:
         scenario = msgspec.convert(values, Scenario)
         _check(scenario)
         scenario.given.wanted(path.parent)
-    except (OSError, ValueError, YAMLError, BadScenario) as error:
+    except (OSError, ValueError, BadScenario) as error:
         spoken = isinstance(error, OSError) and error.strerror
         why = spoken or why_invalid(error, "the file", wanted=Scenario)
         raise BadScenario(f"{path}: {' '.join(why.split())}") from None

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from yaml import MappingNode, SafeLoader, ScalarNode, load
+from yaml import MappingNode, SafeLoader, ScalarNode
 from yaml.constructor import ConstructorError
+
+from roboglot.text_files import parse_yaml
 
 
 class _Loader(SafeLoader):
@@ -19,5 +21,5 @@ class _Loader(SafeLoader):
 
 
 def read_yaml(text: str) -> object:
-    """Return the values of a document. Raises yaml.YAMLError."""
-    return load(text, _Loader)
+    """Return the values of a document. Raises ValueError."""
+    return parse_yaml(text, _Loader)
