@@ -7,10 +7,10 @@ import dataclasses
 import functools
 import json
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from websockets.asyncio.client import connect
 
@@ -44,6 +44,7 @@ from tests.access.matrix import (
     ADDRESS,
     CALLERS,
     Caller,
+    HttpCaller,
     TextCaller,
     dog_answers,
     dog_file_errors,
@@ -111,8 +112,7 @@ async def test_rest_does_what_the_right_allows(runtime: Runtime, reached: set[ob
     keys = [row.key for row in contract("slamware")]
     for caller in CALLERS:
         reached.clear()
-        transport = httpx.AsyncHTTPTransport(local_address=caller.address, verify=False)
-        async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=transport) as client:
+        with closing(HttpCaller(caller.address, ADDRESS, 1448)) as client:
             statuses = {key: await rest_status(client, key) for key in keys}
         allowed = {key for key in keys if may(caller, REST, key)}
         assert reached <= allowed, caller.name
@@ -241,14 +241,11 @@ async def test_the_console_does_what_the_right_allows(runtime: Runtime, monkeypa
     assert runtime.console is not None
     await runtime.console.ready()
     for caller in CALLERS:
-        transport = httpx.AsyncHTTPTransport(local_address=caller.address, verify=False)
-        url = f"http://127.0.0.1:{runtime.console.port}/api"
-        async with httpx.AsyncClient(base_url=url, transport=transport) as client:
+        with closing(HttpCaller(caller.address, "127.0.0.1", runtime.console.port)) as client:
             for path, right in CONSOLE_POSTS.items():
                 for body in (b'{"no": "such value"}', b"{no JSON"):  # the right is checked before the body is read
-                    reply = await client.post(f"/{path}", content=body)
-                    refused = reply.status_code in REFUSED
-                    assert refused == (right not in caller.rights), (caller.name, path, reply.text)
+                    status = await client.status("POST", f"/api/{path}", body)
+                    assert (status in REFUSED) == (right not in caller.rights), (caller.name, path, status)
 
 
 async def test_page_learns_nothing_of_others_world(runtime: Runtime) -> None:
@@ -314,8 +311,7 @@ async def test_wire_view_shows_every_row_on_a_wire(runtime: Runtime, reached: se
 
 async def ask_everything(runtime: Runtime, caller: Caller, data: Path) -> None:
     """Every row of the three catalogues whose operations go over a wire one by one."""
-    transport = httpx.AsyncHTTPTransport(local_address=caller.address, verify=False)
-    async with httpx.AsyncClient(base_url=f"http://{ADDRESS}:1448", transport=transport) as client:
+    with closing(HttpCaller(caller.address, ADDRESS, 1448)) as client:
         for row in contract("slamware"):
             await rest_status(client, row.key)
     session = runtime_session(runtime)
