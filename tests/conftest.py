@@ -64,6 +64,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 TESTS = Path(__file__).parent
+FEW = ("quick", "some")  # profiles
+OF_ITS_OWN = "_hypothesis_internal_use_settings"  # attribute of a property
 NO_CONSTANTS = Constants()
 PROCESSES = (
     "access",
@@ -123,6 +125,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item], config: pytest.Confi
     Those only for a choice that asks for them: each worker would read all tests for nothing.
     """
     items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
+    if (profile := config.getoption("hypothesis_profile", None)) in FEW:
+        for item in items:
+            take_few_examples(getattr(item, "obj", None), settings.get_profile(profile).max_examples)
     if not {"process", "simulated"} & set(re.findall(r"\w+", config.option.markexpr)):
         return
     for item in items:
@@ -134,6 +139,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item], config: pytest.Confi
             traits.add("simulated")
         for trait in sorted(traits):
             item.add_marker(trait)
+
+
+def take_few_examples(test: object, most: int) -> None:
+    """Have a property of Hypothesis with a number of examples of its own take ``most`` of them.
+
+    ``scripts/test --slow`` takes all.
+    """
+    own = getattr(test, OF_ITS_OWN, None)
+    if isinstance(own, settings) and own.max_examples > most:
+        setattr(getattr(test, "__func__", test), OF_ITS_OWN, settings(own, max_examples=most))
 
 
 def _fixtures(item: pytest.Item) -> set[Callable[..., object]]:
