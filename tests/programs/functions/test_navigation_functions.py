@@ -202,6 +202,17 @@ async def test_newer_outdoor_map_leaves_indoor_points_alone(home: Caller) -> Non
     assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 3)
 
 
+async def test_replaced_map_switches_navigation_off(home: Caller) -> None:
+    """Points of the map that it was on for lie elsewhere on another client's map."""
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (0, 0)
+    grid, pose = home.robot[Mapping].grid, home.robot[Localization].pose
+    home.robot[Mapping].load(grid, pose)
+    await home.clock.advance(1.0)
+    assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (1, 2)
+    assert result_of(await home("cyberdog.navigation.turn_on_navigation")) == (0, 0)
+    assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (0, 0)
+
+
 async def test_a_tour_of_presets_passes_them_in_turn(caller: Caller, world: World) -> None:
     await caller.clock.advance(3.0)
     spots = {"a": Point(1.2, 0.8), "b": Point(1.2, -0.2), "c": Point(1.8, 0.3)}

@@ -13,6 +13,7 @@ from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, NotLocalized, Refused, RobotError
+from roboglot.model.events import MapReplaced
 from roboglot.model.geodesy import sky_over
 from roboglot.model.geometry import Point
 from roboglot.model.map_loading import known_dock, load_map
@@ -35,14 +36,22 @@ REQUEST = "I do not know where I am. Please take me to a place that I know"
 
 
 class NavigationMode:
-    """The map for which the program switched navigation on; a newer map may have its points elsewhere."""
+    """The map for which the program switched navigation on; a newer map may have its points elsewhere.
 
-    def __init__(self, _session: Session) -> None:
+    It is off again once another client has replaced the map in use.
+    """
+
+    def __init__(self, session: Session) -> None:
         self.map: str | None = None
+        self._end = session.robot.events.listen(MapReplaced, lambda _: self._forget())
+
+    def _forget(self) -> None:
+        self.map = None
 
     def close(self) -> None:
         """Forget the map; the program's end cancels its drive."""
-        self.map = None
+        self._end()
+        self._forget()
 
 
 @ABILITIES.on("cyberdog.navigation.get_preset", needs=(MapLibrary,))
