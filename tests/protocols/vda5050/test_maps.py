@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
@@ -55,6 +56,17 @@ async def test_kept_map_is_enabled_and_orders_name_it(yard: Opened) -> None:
     await one.until(lambda: one.control.state["orderId"] == "new" and one.control.state["nodeStates"] == [])
     assert one.control.state["lastNodeId"] == "n1"
     assert one.control.state["distanceSinceLastNode"] < 0.2
+
+
+async def test_each_floor_has_a_map_id(yard: Opened) -> None:
+    """Places of one floor are none of another."""
+    one = await yard(world="office")
+    await one.until(lambda: listed(one) == {"map": "ENABLED"})
+    one.robot[Floors].begin_on(1)  # as a client's ride, or one that says where the robot was carried
+    await one.until(lambda: listed(one) == {"map-1": "ENABLED"})
+    assert one.control.state["mobileRobotPosition"]["mapId"] == "map-1"
+    one.control.send("order", order("old", [(0, 0), (0.5, 0)]))
+    await one.until(lambda: "UNKNOWN_MAP_ID" in one.control.errors)
 
 
 async def test_unusable_or_undeletable_maps_are_refused(yard: Opened) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
@@ -16,14 +17,25 @@ LOOK_PERIOD = 2.0  # s of robot time: maximum age of the list of stored maps
 
 
 class Maps:
-    """Maps of one robot. ``own`` is the mapId of a map that it made itself or that another client loaded."""
+    """Maps of one robot. ``own`` is the mapId of a map that it made itself or that another client loaded.
+
+    On the lift's second floor that is ``own``-1, and so on: each floor has a map.
+    """
 
     def __init__(self, robot: Robot, own: str) -> None:
         self._robot, self._own = robot, own
-        self.in_use = own
+        self._used: str | None = None  # the stored map in use
         self._names: tuple[str, ...] = ()
         self._looked_at = float("-inf")
         self._loads = 0  # our own loads whose MapReplaced is still to come
+
+    @property
+    def in_use(self) -> str:
+        """Id of the map in use."""
+        if self._used is not None:
+            return self._used
+        floor = self._robot[Floors].current if Floors in self._robot else 0
+        return f"{self._own}-{floor}" if floor else self._own
 
     async def look(self) -> None:
         """Read the names of the stored maps, if the last time is long ago."""
@@ -40,7 +52,7 @@ class Maps:
                 if self._loads:
                     self._loads -= 1
                 elif event.origin is None:
-                    self.in_use = self._own
+                    self._used = None
 
     async def kept(self, name: str, version: str) -> StoredMap:
         """Return a stored map. Raises NotFound, also for any version: one map is stored under each name."""
@@ -51,7 +63,7 @@ class Maps:
     def use(self, stored: StoredMap, pose: Pose) -> None:
         """Use a map from now on, with the robot at ``pose`` in it. Raises the errors of ``Mapping.load``."""
         self._load(stored, pose)
-        self.in_use = stored.name
+        self._used = stored.name
 
     async def change(self, stored: StoredMap) -> None:
         """Use a map and localize the robot in it; if that fails, keep the map in use and raise the reason."""
@@ -69,7 +81,7 @@ class Maps:
         except BaseException:
             self._load(before, pose)
             raise
-        self.in_use = stored.name
+        self._used = stored.name
 
     async def remove(self, name: str) -> None:
         """Delete a stored map. Raises NotFound."""
