@@ -56,9 +56,13 @@ class Life:
         return [data for _, data in await self.during(self.phone.raw(code, params))]
 
     async def visual(self, words: dict[str, Any]) -> object:
+        return await self.during(self.visual_now(words))
+
+    async def visual_now(self, words: dict[str, Any]) -> list[Any]:
+        """Ask what takes no robot time."""
         frames: list[Any] = []
         stop = self._visual.subscribe(lambda text: frames.append(json.loads(text)))
-        await self.during(self._visual.receive(json.dumps({"id": "q"} | words)))
+        await self._visual.receive(json.dumps({"id": "q"} | words))
         stop()
         answers = [frame.get("feedback") or frame.get("response") or {} for frame in frames]
         return [answer for answer in answers if answer.get("id") == "q"]
