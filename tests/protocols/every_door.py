@@ -193,11 +193,7 @@ class Doors:
                 sorted((await self.console("maps"))["result"]),
                 await self._maps_of_programs(),
             ),
-            "floor": (
-                page["place"]["floor"] or 0,
-                int(fleet["mobileRobotPosition"]["mapId"].removeprefix("map").removeprefix("-") or 0),
-                int(next(each["mapId"] for each in fleet["maps"] if each["mapStatus"] == "ENABLED")[4:] or 0),
-            ),
+            "floor": floors_told(fleet, page),
             "volume": (info["volume"], round(page["body"]["volume"] * 100)),
         }
         for what, words in said.items():
@@ -234,6 +230,13 @@ class Doors:
         assert Pose(place["x"], place["y"], place["theta"]).distance_to(here) < (LATE * 1.5 if moves else 0.05)
         if not lost:
             assert self.origin.compose(here).distance_to(self.world.truth.pose_of("a")) < LOST
+
+
+def floors_told(fleet: Words, page: Words) -> tuple[int, ...]:
+    """Return the floor of the console, and those that fleet control's ids of maps name."""
+    in_use = next(each["mapId"] for each in fleet["maps"] if each["mapStatus"] == "ENABLED")
+    ids = fleet["mobileRobotPosition"]["mapId"], in_use
+    return page["place"]["floor"] or 0, *(int(id.removeprefix("map").removeprefix("-") or 0) for id in ids)
 
 
 def _faults(fleet: Words) -> list[Words]:

@@ -39,11 +39,11 @@ class Sweep:
 
     async def refused(self, down: Callable[[], bool]) -> None:
         """Give each command while ``down``: none may be done, and the robot stands as long as that lasts."""
-        await self._wait(0.5)  # a robot that lies down stirs
+        await self.wait(0.5)  # a robot that lies down stirs
         asked = 0
         for command in COMMANDS:
             if down():
-                done = await self._give(command, down)
+                done = await self.give(command, down)
                 assert not (done and down()), command
                 asked += 1
         assert asked
@@ -52,23 +52,24 @@ class Sweep:
         """Give each command; all are done, and by an action that succeeded."""
         for command in COMMANDS:
             self._ended.clear()
-            assert await self._give(command, lambda: False), command
+            assert await self.give(command), command
             assert any(event.action.status.name == "SUCCEEDED" for event in self._ended), command
-            await self._wait(SETTLED)
+            await self.wait(SETTLED)
 
     async def until(self, true: Callable[[], bool]) -> None:
         """Let robot time pass until the condition holds; sockets take real time."""
         deadline = time.monotonic() + PATIENCE
         while not true():
             assert time.monotonic() < deadline
-            await self._wait(0.2)
+            await self.wait(0.2)
 
-    async def _wait(self, seconds: float) -> None:
+    async def wait(self, seconds: float) -> None:
+        """Let robot time pass, and sockets take a little."""
         for _ in range(math.ceil(seconds / 0.1)):
             await asyncio.sleep(0.005)
             await self._doors.life.forward(0.1)
 
-    async def _give(self, command: Command, down: Callable[[], bool]) -> bool:
+    async def give(self, command: Command, down: Callable[[], bool] = lambda: False) -> bool:
         """Return whether the command was done. Nothing may move while ``down``."""
         truth = self._doors.world.truth
         task, passed = asyncio.ensure_future(_answer(command, self._doors)), 0.0
