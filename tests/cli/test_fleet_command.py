@@ -77,10 +77,13 @@ class Late(Unfinished):
         return 0.0
 
 
-async def test_a_fleet_is_ready_with_its_first_world(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("lasting", [False, True])
+async def test_a_fleet_is_ready_with_its_first_world(
+    lasting: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     host, said = Late(tmp_path), list[str]()
     serving_it = asyncio.ensure_future(
-        serving.serve(lambda: cast("FleetHost", host), tmp_path, said.append, 0.0, lasting=False)
+        serving.serve(lambda: cast("FleetHost", host), tmp_path, said.append, 0.0, lasting=lasting)
     )
     async with asyncio.timeout(10.0):
         while "no world is up yet: 127.0.0.1:1448 is in use" not in caplog.text:  # noqa: ASYNC110 - there is no event of it
@@ -92,7 +95,8 @@ async def test_a_fleet_is_ready_with_its_first_world(tmp_path: Path, caplog: pyt
         host.ended.set_result(None)
         await serving_it
     assert said[0].startswith("1 of 2 worlds with 1 robot are up")
-    assert said[1:] == ["ready"]
+    assert said[1] == "ready"
+    assert ["the worlds keep running" in line for line in said[2:]] == ([True] if lasting else [])
 
 
 @pytest.mark.parametrize("known", [False, True])

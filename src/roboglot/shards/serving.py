@@ -55,6 +55,11 @@ async def serve(
         say(up_text(host, time.monotonic() - began, seconds, page.address))
         say("ready")
         await host.ended
+        if lasting:
+            say(
+                "the worlds keep running; `fleet up` in the same folder serves them again, and without --detached it "
+                "stops them when it ends"
+            )
     finally:
         starting.cancel()
         await page.close()
