@@ -70,7 +70,7 @@ class Context:
         return self.robot[Odometry].reading.distance if Odometry in self.robot else 0.0
 
     def _jack_changed(self, _: JackChanged) -> None:
-        if not self.robot[Jack].loaded:  # whoever set it down: the next load is another
+        if not self.robot[Jack].loaded:  # the next load is another, whichever door set this one down
             self.load = {}
 
     def touch(self) -> None:

@@ -130,7 +130,7 @@ async def set_labels(
             await _delete(context, library, name, names)
         else:
             number = map_id if mapName else 0  # a map that was found by its number may have lost it meanwhile
-            await library.modify(name, lambda map: replace(map, labels=kept, number=number or map.number))
+            await library.modify(name, lambda stored: replace(stored, labels=kept, number=number or stored.number))
     except NotFound as error:
         return call.refused({"success": 1}, str(error))
     return {"success": 0}
