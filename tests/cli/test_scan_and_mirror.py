@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from roboglot.cli import scan
-from roboglot.cli.mirror import UNKNOWN, rows
+from roboglot.cli.mirror import UNKNOWN, changes, rows
 from roboglot.cli.scan import ADDRESSES_MAX, cyberdog_at, expand, slamware_at
 from roboglot.config import RobotConfig
 from roboglot.drivers.urls import Drivers
@@ -99,6 +99,12 @@ async def test_mirror_shows_the_robots_reports(door: SlamwareDoor, clock: Lockst
     assert shown["link"] == "up"
     assert shown["battery"].startswith("90%")
     assert shown["by odometry"].startswith("x +0.00 m")
+    shown = {}
+    assert {"link", "battery", "by odometry"} <= dict(changes(fleet.robots["b"], shown)).keys()
+    assert dict(changes(fleet.robots["b"], shown)).keys() <= {"scan"}  # of a robot at rest
+    await door.close()
+    await forward(seconds=2)
+    assert dict(changes(fleet.robots["b"], shown))["link"].startswith("lost")
     await fleet.close()
     database.close()
 

@@ -32,7 +32,9 @@ from roboglot.model.geometry import Pose
 from roboglot.model.robot import Description, Robot
 
 PERIOD = 0.2  # s between two pictures
+PIPE_PERIOD = 1.0  # s between two looks where there is no terminal
 CONNECT_SECONDS = 12.0  # for --once; a dog that does not call back is given up after 10
+AGES = ("last news", "old")
 UNKNOWN = Description(maker="", model="", serial="", hardware_version="", software_version="", radius=0.25, height=0.3)
 
 
@@ -40,7 +42,7 @@ def command(
     url: Annotated[str, typer.Argument(help="slamware://HOST, robomaster://HOST …; as `roboglot scan` prints them.")],
     once: Annotated[bool, typer.Option("--once", help="Print the state once and end.")] = False,
 ) -> None:
-    """Show the live state of a robot until Ctrl-C."""
+    """Show the live state of a robot until Ctrl-C; in a pipe, each value that has changed within a second."""
     with contextlib.suppress(KeyboardInterrupt):
         sys.exit(asyncio.run(_mirror(url, once)))
 
@@ -55,7 +57,9 @@ async def _mirror(url: str, once: bool) -> int:
     (driver,) = drivers.all
     await driver.start(wait=False)
     try:
-        return await _once(robot) if once else await _live(robot)
+        if once:
+            return await _once(robot)
+        return await (_live(robot) if sys.stdout.isatty() else _print_changes(robot))
     finally:
         await driver.close()
 
@@ -79,6 +83,21 @@ async def _live(robot: Robot) -> int:
                 table.add_row(name, Text(in_line(words)))  # no markup
             screen.update(table)
             await asyncio.sleep(PERIOD)
+
+
+async def _print_changes(robot: Robot) -> int:
+    shown: dict[str, str] = {}
+    while True:
+        for name, words in changes(robot, shown):
+            print(in_line(f"{name:14} {words}"), flush=True)
+        await asyncio.sleep(PIPE_PERIOD)
+
+
+def changes(robot: Robot, shown: dict[str, str]) -> list[tuple[str, str]]:
+    """Return the values, without their ages, that differ from those ``shown``, and add them there."""
+    found = [row for row in rows(robot) if row[0] not in AGES and shown.get(row[0]) != row[1]]
+    shown.update(found)
+    return found
 
 
 def rows(robot: Robot) -> list[tuple[str, str]]:
