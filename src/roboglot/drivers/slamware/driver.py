@@ -65,7 +65,7 @@ class SlamwareDriver(Driver):
         robot.add(Lidar, ReportedLidar(lambda: reported.scan))
         robot.add(Localization, SlamwareLocalization(self._client, supervisor, telemetry, runner, reported))
         robot.add(Mapping, SlamwareMapping(self._client, supervisor, telemetry, reported, self._optional.replacing_map))
-        robot.add(Navigation, SlamwareNavigation(self._client, runner, reported))
+        robot.add(Navigation, SlamwareNavigation(self._client, runner, reported, self._base))
         robot.add(Docking, SlamwareDocking(self._client, supervisor, runner, driving, reported))
         self._met = False
 

@@ -69,6 +69,11 @@ class SlamwareBase(LinkedBase):
     def velocity(self) -> Twist:
         return self._reported.twist
 
+    @property
+    def share(self) -> float:
+        """Share of the robot's own top speed that clients allow."""
+        return min(1.0, self.limits.twist.x / max(self._own.twist.x, SPEED_MIN))
+
     async def probe(self) -> None:
         """Poll the limits of the robot."""
         speed, yaw_speed = SPEED, YAW_SPEED

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner, VendorAction
+from roboglot.drivers.slamware.chapters.motion.base import SlamwareBase
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.drivers.slamware.vocabulary import location, robot_errors
 from roboglot.extras import lazy
@@ -45,12 +47,14 @@ TOUR_PASSES = 30
 class SlamwareNavigation(Navigation):
     """Navigation by MoveTo and SeriesMoveTo. The robot plans and avoids by itself, even while the link is down."""
 
-    def __init__(self, client: SlamwareClient, runner: ActionRunner, reported: ReportedState) -> None:
-        self._client, self._runner, self._reported = client, runner, reported
+    def __init__(
+        self, client: SlamwareClient, runner: ActionRunner, reported: ReportedState, base: SlamwareBase
+    ) -> None:
+        self._client, self._runner, self._reported, self._base = client, runner, reported, base
 
     def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
         check_goals(goals, options, most=GOALS_MAX)
-        how = move_options(options)
+        how = move_options(replace(options, speed_ratio=options.speed_ratio * self._base.share))
         wanted: MoveToOptions | SeriesMoveToOptions
         if len(goals) == 1:
             name, wanted = "MoveToAction", MoveToOptions(location(goals[0]), how)
