@@ -13,7 +13,9 @@ from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.errors import Refused
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.geometry import Pose3D
+from tests.drivers.bad_link import Connect
 from tests.drivers.clients import Open, OpenRest
+from tests.drivers.rig import Rig
 
 
 def refuse(*_: object) -> None:
@@ -49,6 +51,19 @@ async def test_refused_mode_fails_also_when_repeated(
     for _ in range(3):  # repeated lines may take a shorter way
         assert await client.ask("robot mode free;") == "fail"
         assert await client.ask("robot mode ?;") == "gimbal_lead"
+
+
+@pytest.mark.world("empty", body="hermes")
+@pytest.mark.parametrize("back", ["slamware"])
+async def test_silent_robot_confirms_nothing(way: Rig, robot: Robot, connect: Connect, rest: OpenRest) -> None:
+    async with connect() as driven:
+        front = await rest(driven)
+        way.fault.silent = True
+        begun = driven.clock.time()
+        with pytest.raises(SlamwareRefused):
+            await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
+        assert driven.clock.time() - begun < 2.0
+        assert robot[Localization].pose.x == pytest.approx(0.0, abs=0.1)
 
 
 async def test_commands_of_other_tasks_are_not_awaited() -> None:
