@@ -6,9 +6,7 @@ import asyncio
 import contextlib
 import json
 import socket
-import ssl
 from collections.abc import AsyncIterator, Callable, Collection
-from dataclasses import replace
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,30 +14,22 @@ from typing import Any, NoReturn
 import httpx
 import pytest
 
-from roboglot.access.store import Grant, open_store
+from roboglot.access.store import open_store
 from roboglot.access.trail import open_trail
 from roboglot.access.tunnel import connector, heartbeat
 from roboglot.access.tunnel import tunnel as carrying
 from roboglot.access.tunnel.connector import APPS, Connector, KnownGateways, NotTrusted, Refused
-from roboglot.access.tunnel.frames import HEAD, FrameKind, encode
+from roboglot.access.tunnel.frames import FrameKind, encode
 from roboglot.access.tunnel.link import TunnelLink
-from roboglot.config import AccessConfig, RobotConfig, load_config
 from roboglot.model.clock import LockstepClock
-from roboglot.operations import Right
 from roboglot.runtime import Runtime
 from roboglot.testing.addresses import free_addresses
 from roboglot.transport import listening
+from tests.access.conftest import dial, next_kind
 from tests.access.matrix import ADDRESS
 
 HERE = free_addresses(1)
 POSE = "/api/core/slam/v1/localization/pose"
-
-
-async def next_kind(reader: asyncio.StreamReader) -> FrameKind:
-    """Read a frame; return its kind."""
-    number, _, size = HEAD.unpack(await reader.readexactly(HEAD.size))
-    await reader.readexactly(size)
-    return FrameKind(number)
 
 
 async def pushed_by(inbox: socket.socket, robot: str) -> bytes:
@@ -52,22 +42,6 @@ async def pushed_by(inbox: socket.socket, robot: str) -> bytes:
             data, (sender, _) = await asyncio.get_running_loop().sock_recvfrom(inbox, 1000)
             if sender == robot:
                 return data
-
-
-@pytest.fixture
-async def gateway(data: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[tuple[Runtime, str]]:
-    """A robot behind a gateway, and a token that drives it."""
-    for limit in ("QUIET_AFTER", "LOST_AFTER"):
-        monkeypatch.setattr(heartbeat, limit, 20.0)  # a busy machine must not look like a lost tunnel
-    store = open_store(data)
-    token = store.add_machine("cell", [Grant("a", frozenset({Right.DRIVE}))])
-    store.close()
-    base = load_config(None, {"data": str(data), "world": "empty", "lockstep": True})
-    access = AccessConfig(on=True, local=False, gateway="127.0.0.1:0")
-    runtime = Runtime(replace(base, robots=(RobotConfig("a", "universal", ADDRESS),), access=access))
-    await runtime.start()
-    yield runtime, token
-    await runtime.close()
 
 
 @contextlib.asynccontextmanager
@@ -252,25 +226,41 @@ def test_another_certificate_is_not_trusted(tmp_path: Path) -> None:
 
 
 async def test_frames_of_strangers_end_the_connection(gateway: tuple[Runtime, str]) -> None:
-    import ssl
-
     runtime, token = gateway
-    assert runtime._gateway is not None
-    context = ssl.create_default_context()
-    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     hello = encode(FrameKind.HELLO, 0, json.dumps({"robot": "a", "token": token}).encode())
     for data in (
         b"GET / HTTP/1.1\r\n\r\n",
         encode(FrameKind.HELLO, 0, b"{}"),
         hello + encode(FrameKind.OPEN, 2, b"\0\1"),
     ):
-        reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port, ssl=context)
+        reader, writer = await dial(runtime)
         writer.write(data)
         async with asyncio.timeout(60):
             with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError):
                 while await next_kind(reader) in (FrameKind.WELCOME, FrameKind.PING, FrameKind.CLOSE):
                     pass
         writer.close()
+
+
+async def test_streams_opened_and_closed_hold_up_nobody(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
+    runtime, token = gateway
+    hello = encode(FrameKind.HELLO, 0, json.dumps({"robot": "a", "token": token}).encode())
+    flood = (
+        encode(FrameKind.OPEN, number, (1448).to_bytes(2, "big")) + encode(FrameKind.CLOSE, number)
+        for number in range(1, 2 * 20_000, 2)
+    )
+    reader, writer = await dial(runtime)
+    async with asyncio.timeout(60):
+        writer.write(hello)
+        while await next_kind(reader) is not FrameKind.WELCOME:
+            pass
+        writer.write(b"".join(flood))
+        while await next_kind(reader) is not FrameKind.CLOSE:  # the first that is turned away
+            pass
+    base = f"http://{HERE}:1448"
+    async with connected(runtime, token, tmp_path), httpx.AsyncClient(base_url=base, verify=False) as client:
+        assert (await client.get(POSE)).status_code == 200
+    writer.transport.abort()
 
 
 async def until(condition: Callable[[], object]) -> None:
@@ -333,10 +323,7 @@ async def test_without_the_key_nothing_beats(
     gateway: tuple[Runtime, str], greeting: dict[str, object], kind: FrameKind | None
 ) -> None:
     runtime, _ = gateway
-    assert runtime._gateway is not None
-    context = ssl.create_default_context()
-    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
-    reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port, ssl=context)
+    reader, writer = await dial(runtime)
     writer.write(encode(FrameKind.HELLO, 0, json.dumps(greeting).encode()))
     async with asyncio.timeout(60):
         if kind is None:
@@ -382,7 +369,6 @@ async def test_no_datagram_comes_before_the_welcome(
 ) -> None:
     """Robots announce themselves all the time, also while the gateway still opens ports for a tunnel."""
     runtime, token = gateway
-    assert runtime._gateway is not None
     tap, listen, opened = runtime.fleet.robots["a"].tap, listening.listen, list[int]()
 
     async def while_announced(factory: Any, address: str, port: int) -> asyncio.Server:
@@ -391,9 +377,7 @@ async def test_no_datagram_comes_before_the_welcome(
         return await listen(factory, address, port)
 
     monkeypatch.setattr("roboglot.access.tunnel.gateway.listen", while_announced)
-    context = ssl.create_default_context()
-    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
-    reader, writer = await asyncio.open_connection("127.0.0.1", runtime._gateway.port, ssl=context)
+    reader, writer = await dial(runtime)
     writer.write(encode(FrameKind.HELLO, 0, json.dumps({"robot": "a", "token": token}).encode()))
     assert await next_kind(reader) is FrameKind.WELCOME
     assert opened

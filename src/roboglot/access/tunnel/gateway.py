@@ -279,7 +279,9 @@ class _Calls:
         server, door = offered
         if not server.is_serving():
             raise ConnectionRefusedError(f"nothing listens on port {port} now")
-        number = next(free for free in self._numbers if free not in self._open)
+        tried = itertools.islice(self._numbers, len(PORTS_WITHIN))
+        if (number := next((free for free in tried if free not in self._open), None)) is None:
+            raise OSError(f"{len(PORTS_WITHIN)} connections of the tunnel are open")
         stream = self._open[number] = protocol()
         join(stream, door(), (self._own, number), (address, port))
         return None

@@ -15,6 +15,7 @@ from roboglot.access.tunnel.stream import RECEIVED_MAX, WINDOW, Stream
 log = logging.getLogger(__name__)
 
 STREAMS_MAX = 64
+DEAF_MAX = 16 * 1024 * 1024  # bytes queued for an end that opens streams and does not read that they are closed
 UNSENT_MAX = 1024 * 1024  # bytes queued for the tunnel; datagrams beyond this are dropped, as UDP may do
 DATAGRAM_MAX = 32 * 1024  # bytes
 QUICK = b"!"  # payload of a PING: answer in kind
@@ -161,6 +162,10 @@ class Tunnel:
                 raise BadFrame("this stream is open already")
 
     def _open(self, number: int, port: int) -> None:
+        """Begin to connect a stream; close it at once while too many begin, which may have been closed meanwhile."""
+        if len(self._opening) >= STREAMS_MAX:
+            self._turn_away(number)
+            return
         task = self._loop.create_task(self._answer(number, self._new(number), port))
         self._opening.add(task)
         task.add_done_callback(self._opening.discard)
@@ -171,7 +176,13 @@ class Tunnel:
         except OSError as error:
             log.info("cannot open port %d: %s", port, error)
             self._forget(number)
-            self._link.send(FrameKind.CLOSE, number)
+            self._turn_away(number)
+
+    def _turn_away(self, number: int) -> None:
+        """Tell the other end that its stream is closed; hang up if it does not read that."""
+        if self._link.transport.get_write_buffer_size() > DEAF_MAX:
+            self._link.end("the other end opens streams and does not read")
+        self._link.send(FrameKind.CLOSE, number)
 
 
 class _Turned(asyncio.Protocol):
