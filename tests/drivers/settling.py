@@ -10,7 +10,7 @@ import threading
 import time
 from typing import TypeVar
 
-from roboglot.model.clock import LockstepClock
+from roboglot.model.clock import LockstepClock, _ready
 
 T = TypeVar("T")
 ROUNDS = 3  # idle samples in a row: a thread that waits for Python's lock seems to sleep
@@ -25,7 +25,7 @@ async def settle(patience: float = SETTLE_MAX) -> None:
 
     What lies in a socket of this machine has woken the thread that reads it; another process is not waited for.
     """
-    ready = asyncio.get_running_loop()._ready  # type: ignore[attr-defined]
+    ready = _ready()
     deadline, quiet = time.monotonic() + patience, 0
     while quiet < ROUNDS:
         await asyncio.sleep(0)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from asyncio import AbstractEventLoop
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 
 import grpc
 import pytest
+import uvloop
 
 from roboglot.autonomy.navigation.driving import OdometryDriving
 from roboglot.model.clock import LockstepClock
@@ -23,6 +25,12 @@ from roboglot.simulation.world.world_files import load_world
 from roboglot.testing import Forward
 from tests.drivers.settling import settle
 from tests.protocols.cyberdog.phone import ADDRESS, PATIENCE, App, Client, Messages, Pems
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_asyncio_loop_factories() -> dict[str, Callable[[], AbstractEventLoop]]:
+    """Run the tests on the loop that robots have: it takes a sixth of their processor time less than asyncio's own."""
+    return {"uvloop": uvloop.new_event_loop}
 
 
 @pytest.fixture(scope="session")

@@ -1,9 +1,11 @@
 """A door on a free port and a plain HTTP client."""
 
-from collections.abc import AsyncIterator, Iterator
+from asyncio import AbstractEventLoop
+from collections.abc import AsyncIterator, Callable, Iterator
 
 import httpx
 import pytest
+import uvloop
 
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import MapAnnotations
@@ -32,6 +34,12 @@ PLATE = Description(
     radius=0.2,
     height=0.3,
 )
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_asyncio_loop_factories() -> dict[str, Callable[[], AbstractEventLoop]]:
+    """Run the tests on the loop that robots have: it takes a sixth of their processor time less than asyncio's own."""
+    return {"uvloop": uvloop.new_event_loop}
 
 
 async def serve(robot: Robot) -> AsyncIterator[SlamwareDoor]:
