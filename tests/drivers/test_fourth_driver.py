@@ -32,7 +32,8 @@ from tests.drivers.clients import Drive, Until
 class CartBase(LinkedBase):
     """Sends each velocity as a line."""
 
-    limits = BaseLimits(twist=Twist(1.0, yaw=1.0), linear_acceleration=1.0, angular_acceleration=1.0, holonomic=False)
+    built = BaseLimits(twist=Twist(1.0, yaw=1.0), linear_acceleration=1.0, angular_acceleration=1.0, holonomic=False)
+    limits = built
     velocity = STILL
 
     def __init__(self, driver: CartDriver) -> None:

@@ -43,7 +43,7 @@ class RoboMasterBase(LinkedBase):
         super().__init__(link)
         self._bounded = bounded
         self._client, self._clock, self._reported = client, clock, reported
-        self.limits = BaseLimits(
+        self.built = self.limits = BaseLimits(
             twist=Twist(SPEED, SPEED, YAW_SPEED),
             linear_acceleration=ACCELERATION,
             angular_acceleration=YAW_ACCELERATION,

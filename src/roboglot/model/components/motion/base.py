@@ -38,8 +38,12 @@ class WheelSpeeds(Struct, frozen=True, gc=False):
 
 
 class Base(Component):
-    """Keeps the last velocity until the next command. Only actions that hold BASE call it; doors use Driving."""
+    """Keeps the last velocity until the next command. Only actions that hold BASE call it; doors use Driving.
 
+    ``built``: limits of its build; ``limits``: those in force, which clients may set lower.
+    """
+
+    built: BaseLimits
     limits: BaseLimits
 
     @property

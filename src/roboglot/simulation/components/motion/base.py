@@ -35,7 +35,7 @@ class SimulatedBase(Base):
         self.when_driven: list[Callable[[], None]] = []  # called when the wheels' speed changes
         self.when_fast: list[Duty] = []  # start when it moves faster than SLOW, or is to
         self.wheels = wheels = Wheels(section, self._rewired)
-        self.limits = BaseLimits(
+        self.built = self.limits = BaseLimits(
             twist=Twist(section.speed, section.speed if wheels.mecanum else 0.0, section.yaw_speed),
             holonomic=wheels.mecanum,
             linear_acceleration=section.acceleration,

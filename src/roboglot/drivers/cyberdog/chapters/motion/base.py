@@ -30,7 +30,7 @@ class CyberDogBase(LinkedBase):
     def __init__(self, client: CyberDogClient, clock: Clock, link: Link, reported: ReportedState) -> None:
         super().__init__(link)
         self._client, self._clock, self._reported = client, clock, reported
-        self.limits = BaseLimits(
+        self.built = self.limits = BaseLimits(
             twist=Twist(SPEED, SIDE_SPEED, YAW_SPEED),
             linear_acceleration=ACCELERATION,
             angular_acceleration=YAW_ACCELERATION,

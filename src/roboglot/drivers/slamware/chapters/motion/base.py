@@ -45,7 +45,7 @@ class SlamwareBase(LinkedBase):
         super().__init__(link)
         self._client, self._clock, self._reported = client, robot.clock, reported
         self._runner, self._limit_restore = runner, SpeedLimitRestore(robot, client, link)
-        self.limits = self._own = _limits(SPEED, YAW_SPEED)  # the robot's own, until a client lowers them
+        self.built = self.limits = _limits(SPEED, YAW_SPEED)
         self._target = STILL
         self._changed = asyncio.Event()
         self._still = asyncio.Event()
@@ -72,7 +72,7 @@ class SlamwareBase(LinkedBase):
     @property
     def share(self) -> float:
         """Share of the robot's own top speed that clients allow."""
-        return min(1.0, self.limits.twist.x / max(self._own.twist.x, SPEED_MIN))
+        return min(1.0, self.limits.twist.x / max(self.built.twist.x, SPEED_MIN))
 
     async def probe(self) -> None:
         """Poll the limits of the robot."""
@@ -82,8 +82,8 @@ class SlamwareBase(LinkedBase):
         with contextlib.suppress(SlamwareRefused, ValueError):
             speed = float(await self._client.get_system_parameter(PARAMETER))
             yaw_speed = float(await self._client.get_system_parameter(YAW_PARAMETER))
-        if (found := _limits(speed, yaw_speed)) != self._own:  # a client's limit stays over a break of the link
-            self.limits = self._own = found
+        if (found := _limits(speed, yaw_speed)) != self.built:  # a client's limit stays over a break of the link
+            self.built = self.limits = found
 
     async def stop(self) -> None:
         """Brake; return when the command was sent or has failed."""
@@ -127,7 +127,7 @@ class SlamwareBase(LinkedBase):
 
     async def _limit_speed(self, speed: float) -> None:
         """Send the limit if it differs enough; the robot's own limit is restored exactly."""
-        speed, own = max(speed, SPEED_MIN), self._own.twist.x
+        speed, own = max(speed, SPEED_MIN), self.built.twist.x
         limit = own if self._limit is None else self._limit
         if abs(speed - limit) < SPEED_STEP and (speed == own) == (limit == own):
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from roboglot.model.components.motion.base import Base, BaseLimits
+from roboglot.model.components.motion.base import Base
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import ModuleRestarting, Rebooted
@@ -21,8 +21,6 @@ class SpeedLimits:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._last_set: BaseLimits | None = None
-        self._known = Twist()
         self._endings: list[Callable[[], None]] = []
 
     def start(self) -> None:
@@ -36,24 +34,17 @@ class SpeedLimits:
         for end in self._endings:
             end()
         if Base in self._robot:
-            self._limit(self._built)
+            self._limit(self._robot[Base].built.twist)
 
     def reset(self) -> None:
         """Set the configured limits, else those of the build."""
         if Base in self._robot:
-            built, (speed, turning) = self._built, self._configured()
+            built, (speed, turning) = self._robot[Base].built.twist, self._configured()
             self._limit(Twist(speed or built.x, built.y, turning or built.yaw))
-
-    @property
-    def _built(self) -> Twist:
-        limits = self._robot[Base].limits
-        if limits is not self._last_set:
-            self._known = limits.twist
-        return self._known
 
     def _limit(self, twist: Twist) -> None:
         base = self._robot[Base]
-        base.limits = self._last_set = replace(base.limits, twist=twist)
+        base.limits = replace(base.limits, twist=twist)
 
     def _configured(self) -> tuple[float | None, float | None]:
         if Settings not in self._robot:
@@ -65,7 +56,7 @@ class SpeedLimits:
         """Raise InvalidGoal for limits beyond those of the drive."""
         base = self._robot[Base]
         x, yaw = base.limits.twist.x if speed is None else speed, base.limits.twist.yaw if turning is None else turning
-        built = self._built
+        built = base.built.twist
         if not (SPEED_MIN <= x <= built.x and SPEED_MIN <= yaw <= built.yaw):
             raise InvalidGoal(f"{SPEED_MIN:g} to {built.x:g} m/s and {SPEED_MIN:g} to {built.yaw:g} rad/s are possible")
 
