@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from dataclasses import replace
 
 import numpy as np
@@ -41,17 +41,22 @@ class NavigationMode:
     It is off again once another client has replaced the map in use.
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, _session: Session) -> None:
         self.map: str | None = None
-        self._end = session.robot.events.listen(MapReplaced, lambda _: self._forget())
+        self._end_listening: Callable[[], None] | None = None
 
-    def _forget(self) -> None:
-        self.map = None
+    def switch_on(self, name: str, robot: Robot) -> None:
+        """Take the map of this name, which the robot uses now."""
+        self.close()
+        self.map = name
+        self._end_listening = robot.events.listen(MapReplaced, lambda _: self.close())
 
     def close(self) -> None:
         """Forget the map; the program's end cancels its drive."""
-        self._end()
-        self._forget()
+        self.map = None
+        if self._end_listening is not None:
+            self._end_listening()
+            self._end_listening = None
 
 
 @ABILITIES.on("cyberdog.navigation.get_preset", needs=(MapLibrary,))
@@ -97,7 +102,7 @@ async def turn_on_navigation(
 @ABILITIES.on("cyberdog.navigation.turn_off_navigation")
 async def turn_off_navigation(session: Session) -> Record:
     """Cancel all drives to places, and switch navigation off."""
-    session.part(NavigationMode).map = None
+    session.part(NavigationMode).close()
     return await _outcome(_cancel(session.robot))
 
 
@@ -175,7 +180,7 @@ async def _turn_on(session: Session, outdoor: bool, assisted: bool, interact: bo
     elif localization.quality < GOOD_FIT:
         await _find_itself(session, stored, assisted, interact)
     localization.enable(True)
-    session.part(NavigationMode).map = stored.name
+    session.part(NavigationMode).switch_on(stored.name, robot)
 
 
 async def _find_itself(session: Session, stored: StoredMap, assisted: bool, interact: bool) -> None:
