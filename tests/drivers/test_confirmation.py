@@ -8,6 +8,7 @@ import pytest
 
 from roboglot.clients.slamware import SlamwareRefused
 from roboglot.confirmation import Confirmation, confirm
+from roboglot.model.components.interaction.light import Light
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.errors import Refused
@@ -18,7 +19,7 @@ from tests.drivers.clients import Open, OpenRest
 from tests.drivers.rig import Rig
 
 
-def refuse(*_: object) -> None:
+def refuse(*_: object, **__: object) -> None:
     """Refuse, in place of a method of the real robot."""
     raise Refused("not now")
 
@@ -64,6 +65,18 @@ async def test_silent_robot_confirms_nothing(way: Rig, robot: Robot, connect: Co
             await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
         assert driven.clock.time() - begun < 2.0
         assert robot[Localization].pose.x == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.world("empty", body="robomaster_ep")
+async def test_refused_light_stays_as_it_was(
+    driven_ep: Robot, robot: Robot, text_door: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client, light = await text_door(driven_ep), driven_ep[Light]
+    assert await client.ask("led control comp all r 9 g 0 b 0 effect solid;") == "ok"
+    before = {zone: light.lamps(zone) for zone in light.zones}
+    monkeypatch.setattr(robot[Light], "shine", refuse)
+    assert await client.ask("led control comp all r 0 g 9 b 0 effect solid;") == "fail"
+    assert {zone: light.lamps(zone) for zone in light.zones} == before
 
 
 async def test_commands_of_other_tasks_are_not_awaited() -> None:

@@ -58,5 +58,12 @@ class ReportedLight(ShownLight):
         if effect not in self.effects:
             raise InvalidGoal(f"this robot's lamps do not know {effect}; they know {', '.join(self.effects)}")
         self._supervisor.require()
+        lamps, last = list(self._lamps(zone)), self.state(zone)
         super().shine(zone, colour, effect, frequency=frequency, lamp=lamp)
-        self._supervisor.send(f"the light {zone}", self.send_zone(zone, self.state(zone), lamp))
+        sent = self.state(zone)
+
+        def undo() -> None:
+            if self.state(zone) is sent:  # else a later command replaced it
+                self._commanded[zone], self._last[zone] = lamps, last
+
+        self._supervisor.send_setting(f"the light {zone}", lambda: self.send_zone(zone, sent, lamp), undo)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.drivers.supervisor import Supervisor
-from roboglot.model.components.interaction.skin import Shade, SkinPattern
+from roboglot.model.components.interaction.skin import Shade, SkinPattern, SkinState
 from roboglot.model.components.interaction.skin_effects import ShownSkin
 from roboglot.model.components.motion.feet import Foot, FootState
 from roboglot.model.robot import Robot
@@ -28,13 +28,25 @@ class CyberDogSkin(ShownSkin):
 
     def enable(self, on: bool) -> None:
         self._supervisor.require()
+        before = self._state
         super().enable(on)
-        self._supervisor.send("switching the skin", self.probe())
+        self._send("switching the skin", before)
 
     def show(self, pattern: SkinPattern, *, cycle: float = 1.0, standing: Shade = Shade.LIGHT) -> None:
         self._supervisor.require()
+        before = self._state
         super().show(pattern, cycle=cycle, standing=standing)
-        self._supervisor.send("the skin's pattern", self.probe())
+        self._send("the skin's pattern", before)
+
+    def _send(self, what: str, before: SkinState) -> None:
+        """Send the state; return to ``before`` if the dog refuses it and no later command replaced it."""
+        sent = self._state
+
+        def undo() -> None:
+            if self._state is sent:
+                self._state = before
+
+        self._supervisor.send_setting(what, self.probe, undo)
 
     async def probe(self) -> None:
         """Send the current state. Raises ClientError."""
