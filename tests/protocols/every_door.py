@@ -193,7 +193,7 @@ class Doors:
                 sorted((await self.console("maps"))["result"]),
                 await self._maps_of_programs(),
             ),
-            "floor": floors_told(fleet, page),
+            "floor": reported_floors(fleet, page),
             "volume": (info["volume"], round(page["body"]["volume"] * 100)),
         }
         for what, words in said.items():
@@ -202,7 +202,7 @@ class Doors:
         await self._agree_about_motion(fleet, page, lost=bool(said["lost"][0]))
 
     async def _maps_of_programs(self) -> list[str]:
-        """Return the names that block programs are told, and check the newest map of the dog's app against them."""
+        """Return the names that block programs get, and check the newest map of the dog's app against them."""
         inquiry = {"operate": "inquiry", "type": "SLAM", "mode": "map", "target_id": []}
         frames = await self._now(self.life.visual_now(inquiry))
         names = [each["id"] for each in frames[0]["list"]]
@@ -232,7 +232,7 @@ class Doors:
             assert self.origin.compose(here).distance_to(self.world.truth.pose_of("a")) < LOST
 
 
-def floors_told(fleet: Words, page: Words) -> tuple[int, ...]:
+def reported_floors(fleet: Words, page: Words) -> tuple[int, ...]:
     """Return the floor of the console, and those that fleet control's ids of maps name."""
     in_use = next(each["mapId"] for each in fleet["maps"] if each["mapStatus"] == "ENABLED")
     ids = fleet["mobileRobotPosition"]["mapId"], in_use

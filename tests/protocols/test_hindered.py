@@ -23,7 +23,7 @@ from tests.protocols.commands import (
     undock_by_fleet,
     walk_by_dog,
 )
-from tests.protocols.every_door import Doors, floors_told
+from tests.protocols.every_door import Doors, reported_floors
 from tests.protocols.test_restarts import STIRS, Command, Sweep
 
 GOES = {  # m and rad, where nothing hinders it
@@ -116,4 +116,4 @@ async def test_command_in_lift_ends_the_ride(doors: Doors) -> None:
         assert moved.yaw == pytest.approx(radians, rel=SHARE, abs=STIRS), command
         await sweep.wait(20.0)
         await doors.forward(0.5)
-        assert {*floors_told(doors.control.state, await doors.console())} == {truth.floor_of("a")}
+        assert {*reported_floors(doors.control.state, await doors.console())} == {truth.floor_of("a")}

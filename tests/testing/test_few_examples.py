@@ -1,4 +1,4 @@
-"""Properties in ``scripts/test``: they take few examples, whatever number they name themselves."""
+"""Properties in ``scripts/test``: they take few examples, even if they name a higher number themselves."""
 
 from __future__ import annotations
 

@@ -204,15 +204,15 @@ async def test_parameters_are_followed_as_parts_appear(scene: Scene) -> None:
     await viewer.say("subscribeParameterUpdates", parameterNames=[])
     await viewer.settled()
 
-    def told() -> list[Any]:
+    def volumes() -> list[Any]:
         rows = [row for said in viewer.said["parameterValues"] for row in said["parameters"]]
         return [row.get("value") for row in rows if row["name"] == "speaker.volume"]
 
     scene.robot.add(Speaker, speaker)
-    await viewer.until(told, 2.0)
+    await viewer.until(volumes, 2.0)
     scene.robot.withdraw(Speaker)
-    await viewer.until(lambda: len(told()) == 2, 2.0)
-    assert told() == [speaker.volume, None]
+    await viewer.until(lambda: len(volumes()) == 2, 2.0)
+    assert volumes() == [speaker.volume, None]
 
 
 async def test_parameters_that_cannot_be_are_refused(scene: Scene) -> None:
