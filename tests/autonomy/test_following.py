@@ -94,6 +94,7 @@ async def test_a_bracelet_is_followed_through_doors(tour: Tour, body: str) -> No
     assert not tour.bumps
 
 
+@pytest.mark.slow  # long; in short: test_it_keeps_near_who_walks
 @pytest.mark.world(BRACELET)
 async def test_a_person_is_followed_round_the_corner(tour: Tour) -> None:
     action = tour.robot[Following].follow(distance=1.2)

@@ -184,6 +184,7 @@ async def test_cancelled_alignment_leaves_the_dog_standing(stand: Make) -> None:
     assert 0.57 < FOOT - here.x < 0.745
 
 
+@pytest.mark.slow  # a long pause
 async def test_a_pause_takes_no_time_from_it(stand: Make) -> None:
     dog = await stand()
     await dog.put(0.75, 15.0, 0.0)

@@ -155,6 +155,7 @@ async def test_buttons_follow_rights_that_change(guarded: Guarded, open_page: Op
             await page.wait_for_selector(name + on + (f":{words}" if words else ""))
 
 
+@pytest.mark.slow  # in short: test_buttons_are_on_for_those_who_may
 async def test_studio_says_which_right_its_buttons_need(guarded: Guarded, open_page: Open) -> None:
     guarded.add("driver", "drive")
     page = await open_page("/?to=studio")

@@ -59,6 +59,7 @@ async def engine() -> AsyncIterator[Engine]:
         yield engine
 
 
+@pytest.mark.slow  # long; each block is run below
 async def test_functions_are_called_with_their_block_s_values(played: dict[str, Any], engine: Engine) -> None:
     assert played["functions"] == len(list(contract("visual"))) == 169
     assert check(played["code"], ability_set().names()) == []
@@ -84,6 +85,7 @@ async def test_reopened_blocks_write_the_same_program(played: dict[str, Any]) ->
     assert played["said"] == []
 
 
+@pytest.mark.slow  # draws everything twice
 async def test_quick_loading_draws_the_same_blocks(page: Any) -> None:
     found = await page.evaluate(TOGETHER)
     assert found["elements"] > 1000

@@ -147,6 +147,7 @@ async def test_block_is_joined_by_mouse(studio: Open) -> None:
 FOUND = "studio.editor.workspace.getToolbox().getFlyout().getWorkspace().getTopBlocks().map(b => b.type)"
 
 
+@pytest.mark.slow  # in short: test_blocks_are_found_and_joined_by_keyboard
 async def test_language_blocks_are_found_in_both_languages(studio: Open) -> None:
     page = await studio(language="zh")
     wanted = {"如果": "controls_if", "循环": "forever", "变量": "variables_set", "函数": "procedures_defnoreturn"}

@@ -55,6 +55,7 @@ async def error_is_in_the_teachers_language(teacher: Page, pupil: Page) -> None:
         await teacher.click(f"header >> text={other}")
 
 
+@pytest.mark.slow  # a long story; tests/console/test_studio_socket.py has the class
 async def test_a_class_from_its_code_to_its_results(studio: Open) -> None:
     teacher, anna = await studio(), await studio()
     await teacher.click("#tab-group")

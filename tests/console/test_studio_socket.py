@@ -243,6 +243,7 @@ async def test_malformed_messages_close_only_their_page(served: ServedConsole) -
         assert (await other.kind("checked"))["problems"] == []
 
 
+@pytest.mark.slow  # every attack; tests/programs/test_attacks.py judges them
 async def test_hostile_programs_are_judged_through_the_page_alike(served: ServedConsole) -> None:
     wish = {"type": "task", "operate": "run", "target_id": ["t"], "mode": "single", "condition": "now"}
     async with page(served) as studio:

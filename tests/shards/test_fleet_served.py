@@ -141,6 +141,7 @@ def test_killed_shard_returns_with_what_it_acknowledged(fleet: Fleet) -> None:
     assert fleet.shards()["w2"]["pid"] == before["w2"]["pid"], "the other world went on"
 
 
+@pytest.mark.slow  # waits; in short: test_killed_shard_returns_with_what_it_acknowledged
 def test_a_hung_shard_is_killed_and_started_again(fleet: Fleet) -> None:
     assert SILENCE_MAX < PATIENCE
     before = fleet.shards()["w2"]
@@ -194,7 +195,7 @@ def test_logs_and_top_show_shards(fleet: Fleet) -> None:
     assert any(float(row.split()[4]) > 0 for row in table.splitlines() if row.startswith("w"))  # cores
 
 
-@pytest.mark.slow  # long; in short: test_a_hung_shard_is_killed_and_started_again
+@pytest.mark.slow  # long; in short: test_killed_shard_returns_with_what_it_acknowledged
 def test_killed_parents_leave_no_orphan_and_no_lock(fleet: Fleet) -> None:
     """The nursery first: the supervisor starts it again, and the shards. Then the supervisor: everything ends."""
     nursery, *shards = fleet.processes()

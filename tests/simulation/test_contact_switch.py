@@ -45,6 +45,7 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
     return lives, calm, touched
 
 
+@pytest.mark.slow  # compares two worlds; in short: test_robot_at_rest_feels_obstacles
 async def test_skipped_contact_searches_miss_no_contact(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
     simulation = simulate("office", robots=("a", "b"), seed=3)
     simulation.world._physics.load_kernels()

@@ -161,6 +161,7 @@ def test_ctrl_c_while_kernels_load_interrupts_in_words(folder: Path) -> None:
     assert "Traceback" not in said
 
 
+@pytest.mark.slow  # in short: test_interrupted_campaign_leaves_a_table_and_no_process
 def test_a_killed_campaign_leaves_no_process(folder: Path) -> None:
     (folder / "scenarios/b_hangs.yaml").write_text(HANGS)
     process = begin(folder, "--seeds", "1")

@@ -27,6 +27,7 @@ def robot(folder: Path, *arguments: str, **more: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow  # a whole job; in short: test_named_version_is_installed
 @pytest.mark.timeout(900)  # a hang; the robot and its app are patient, however busy the machine is
 def test_job_starts_and_drives_a_robot_keeping_events(tmp_path: Path) -> None:
     address = robot(tmp_path, "up", ARGUMENTS=f"--address {ADDRESS} --no-console --world empty --speed 4").strip()

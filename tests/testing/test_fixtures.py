@@ -18,6 +18,7 @@ from tests.warm_start import COLD
 START = Path(__file__).parents[2] / "docs/start.md"
 
 
+@pytest.mark.slow  # a test suite of its own
 def test_start_pages_example_passes_in_an_empty_folder(tmp_path: Path) -> None:
     [example] = [block for block in re.findall(r"```python\n(.*?)```", START.read_text(), re.S) if "def test_" in block]
     (tmp_path / "test_example.py").write_text(example)

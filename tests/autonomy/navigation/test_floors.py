@@ -63,6 +63,7 @@ def agreement(earlier: OccupancyGrid, later: OccupancyGrid) -> float:
     return float(np.count_nonzero(np.sign(before) == np.sign(after)) / len(known))
 
 
+@pytest.mark.slow  # a long story; tests/simulation/building/test_lift.py has the ride
 async def test_up_and_down_with_maps_and_docks(tour: Tour) -> None:
     floors, reported = tour.robot[Floors], []
     await tour.go((4.5, 10.0))
@@ -138,6 +139,7 @@ async def test_ride_succeeds_outside_a_lift_that_has_failed(tour: Tour) -> None:
     assert action.status is ActionStatus.SUCCEEDED, action.reason
 
 
+@pytest.mark.slow  # long; in short: test_given_up_ride_mixes_no_floors
 async def test_ride_in_lift_that_leaves_fails(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> None:
     """It does not get out on another floor and call that the goal."""
     action, lift = await leave_the_lift(tour), known(tour.world.building.lift)
@@ -155,6 +157,7 @@ async def test_ride_in_lift_that_leaves_fails(tour: Tour, monkeypatch: pytest.Mo
     assert tour.world.truth.floor_of("a") == 1
 
 
+@pytest.mark.slow  # long; in short: test_given_up_ride_mixes_no_floors
 async def test_ride_given_up_in_the_car(tour: Tour) -> None:
     floors, reached = tour.robot[Floors], list[int]()
     say_where_the_lift_is(tour)
@@ -319,7 +322,7 @@ class Where(TypedDict, total=False):
     floor: int
 
 
-@pytest.mark.slow  # the ride itself: test_up_and_down_with_maps_and_docks
+@pytest.mark.slow  # the ride itself: test_ride_succeeds_outside_a_lift_that_has_failed
 @pytest.mark.parametrize(
     ("fault", "options", "stage", "floor"),
     [

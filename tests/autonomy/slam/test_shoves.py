@@ -138,6 +138,7 @@ async def test_driving_and_turning_are_no_shoves(tour: Tour, seed: int) -> None:
     assert not shoves.drain()
 
 
+@pytest.mark.slow  # long; in short: test_driving_and_turning_are_no_shoves
 @pytest.mark.world("obstacle_course")
 async def test_slipping_wheels_are_no_displacement(tour: Tour) -> None:
     """Against the side of a ramp, which the lidar does not see."""

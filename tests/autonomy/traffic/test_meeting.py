@@ -37,7 +37,12 @@ async def test_two_pass_a_corridor_for_one(building: OccupancyGrid, bodies: tupl
     ("bodies", "ends"),
     [
         pytest.param(("universal", "hermes"), (Pose(5.5, 9.5), Pose(8.6, 9.5, math.pi)), id="door"),
-        pytest.param(("hermes", "cyberdog2"), (Pose(10.0, 3.6, math.pi / 2), Pose(5.6, 6.0)), id="dead end"),
+        pytest.param(
+            ("hermes", "cyberdog2"),
+            (Pose(10.0, 3.6, math.pi / 2), Pose(5.6, 6.0)),
+            id="dead end",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 @pytest.mark.asyncio(loop_scope="module")

@@ -77,6 +77,7 @@ async def test_shut_landing_door_is_seen_open_one_not(simulate):
     assert sim.robot[Lidar].scan.ranges[800] == pytest.approx(2.6 - 0.15, abs=0.05)  # the car's back wall
 
 
+@pytest.mark.slow  # long; in short: test_the_door_can_be_held_and_shut
 async def test_door_waits_for_obstructions_and_complains(simulate):
     sim, lift, heard = start(simulate, BEFORE)
     sim.world.stage.place("a", Pose(2.0, 10.0, math.pi))
