@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog import service
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.dispatch import KNOWN, answer
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.testing.addresses import free_addresses
 from roboglot.testing.process import ServedRobot, served
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
@@ -116,8 +116,10 @@ async def test_messages_that_are_too_long(client: Client) -> None:
 
 
 @pytest.mark.world("empty")
-async def test_one_host_leaves_calls_to_others(client: Client, robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(service, "HOST_CALLS_MAX", 1)
+async def test_one_host_leaves_calls_to_others(
+    door: CyberDogDoor, client: Client, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(door._calls, "most", 1)
     slow = client.open(1004, {"motion_id": 101})
     await until(lambda: robot.actions.running())
     for attempt in (client.raw(10001), client.file(4003)):

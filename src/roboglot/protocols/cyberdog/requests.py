@@ -8,6 +8,7 @@ from typing import Protocol
 
 import grpc
 
+from roboglot.transport.host_calls import Handler, HostCalls
 from roboglot.transport.last_messages import ending_with_last
 from roboglot.wire.cyberdog.channel import SERVICE
 from roboglot.wire.cyberdog.messages import reading
@@ -28,15 +29,22 @@ class Calls(Protocol):
 
 
 def add_calls(
-    server: grpc.aio.Server, calls: Calls, holding: Callable[[], AbstractContextManager[None]] = nullcontext
+    server: grpc.aio.Server,
+    calls: Calls,
+    limit: HostCalls,
+    holding: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> None:
-    """Have ``server`` serve ``calls``; ``holding`` is held while a last answer is sent."""
+    """Have ``server`` serve ``calls`` within ``limit``; ``holding`` is held while a last answer is sent."""
     read = reading(pb.SendRequest.FromString)
     written, chunk, result = pb.RecResponse.SerializeToString, pb.FileChunk, pb.Result
     answering = ending_with_last(calls.sendMsg, written, holding)
+
+    def method(handler: Handler, read: Callable[[bytes], object], write: Callable[..., bytes]) -> object:
+        return grpc.unary_stream_rpc_method_handler(limit.limiting(handler), read, write)
+
     methods = {
-        "sendMsg": grpc.unary_stream_rpc_method_handler(answering, read, written),
-        "getFile": grpc.unary_stream_rpc_method_handler(calls.getFile, read, chunk.SerializeToString),
-        "heartbeat": grpc.unary_unary_rpc_method_handler(calls.heartbeat, lambda _: None, result.SerializeToString),
+        "sendMsg": method(answering, read, written),
+        "getFile": method(calls.getFile, read, chunk.SerializeToString),
+        "heartbeat": method(calls.heartbeat, lambda _: None, result.SerializeToString),  # as a stream: it has no answer
     }
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, methods),))

@@ -19,7 +19,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import RobotError
 from roboglot.model.events import BatteryChanged, LocalizationLost, LocalizationRecovered, MapReplaced
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute
+from roboglot.protocols.cyberdog.app_link import AppLink, AppRoute, host_of
 from roboglot.protocols.cyberdog.certificates import Certificates, CertificateStore
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
 from roboglot.protocols.cyberdog.chapters.camera.transfers import Transfers
@@ -45,10 +45,11 @@ from roboglot.protocols.cyberdog.pem_files import FOLDER
 from roboglot.protocols.cyberdog.profile import Profile
 from roboglot.protocols.cyberdog.recorded_pushes import PlayedPushes
 from roboglot.protocols.cyberdog.requests import add_calls
-from roboglot.protocols.cyberdog.service import CALLS_MAX, Service
+from roboglot.protocols.cyberdog.service import CALLS_MAX, HOST_CALLS_MAX, Service
 from roboglot.protocols.cyberdog.table import TABLE
 from roboglot.protocols.door import Endpoint
 from roboglot.transport.grpc_wakeups import prompt_wakeups
+from roboglot.transport.host_calls import HostCalls
 from roboglot.wire.cyberdog.channel import ROBOT_NAME, server_options
 from roboglot.wire.cyberdog.codes import MachineState
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -78,6 +79,7 @@ class CyberDogDoor:
         self._robot = robot
         self._relay = frames
         self._server: grpc.aio.Server | None = None
+        self._calls = HostCalls(host_of, HOST_CALLS_MAX)
         self._context: Context | None = None
         self._handshakes: Handshakes
         self._resting: asyncio.Task[None] | None = None
@@ -94,7 +96,7 @@ class CyberDogDoor:
         self._cleanup.append(self._handshakes.close)
         service = Service(self._context, self._handshakes)
         self._cleanup.append(self._robot.admission.on_lost(service.cut_off))
-        add_calls(server, service, self._robot.clock.holding)
+        add_calls(server, service, self._calls, self._robot.clock.holding)
         if self._config.reflection:
             from roboglot.protocols.cyberdog.reflection import add_reflection
 

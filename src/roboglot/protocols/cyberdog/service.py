@@ -24,7 +24,6 @@ from roboglot.protocols.cyberdog.handshakes import Handshakes
 from roboglot.protocols.cyberdog.stops import stops
 from roboglot.protocols.turns import wait_for_turn
 from roboglot.transport.limiter import pay
-from roboglot.values import dataclass
 from roboglot.wire.cyberdog.channel import MESSAGE_MAX
 from roboglot.wire.cyberdog.codes import FileError, InBandError
 from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
@@ -41,21 +40,12 @@ WRITE_MAX = 10.0  # s of real time for a client to take a message after its call
 HOST_CALLS_MAX = CALLS_MAX * 3 // 4  # of one host, so that others still reach the robot
 
 
-@dataclass(frozen=True, slots=True)
-class _Caller:
-    """Name of a client that did not prove another, and its host."""
-
-    name: str
-    host: str
-
-
 class Service:
     """The three calls of the gRPC service."""
 
     def __init__(self, context: Context, handshakes: Handshakes) -> None:
         self._context, self._handshakes = context, handshakes
-        self._callers: dict[str, _Caller] = {}  # by peer, as gRPC writes it
-        self._open: dict[str, int] = {}  # calls under way, by host
+        self._callers: dict[str, str] = {}  # names of clients that did not prove another, by peer, as gRPC writes it
         self._of: dict[asyncio.Task[object], str] = {}  # with access: the client whose request a task serves
 
     def cut_off(self, who: str) -> None:
@@ -66,29 +56,21 @@ class Service:
 
     async def sendMsg(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:  # noqa: N802 - the service's name
         """Serve one request with any number of answers, and return the last; the status is OK but for too many."""
-        return await self._counted(self._send, request, rpc)
+        return await self._entered(self._send, request, rpc)
 
-    async def _counted(
+    async def _entered(
         self,
         serve: Callable[[pb.SendRequest | None, grpc.aio.ServicerContext], Awaitable[T]],
         request: pb.SendRequest | None,
         rpc: grpc.aio.ServicerContext,
     ) -> T:
-        """Serve a call unless its host has too many open."""
-        host = self._enter(rpc.peer())
-        count = self._open[host] = self._open.get(host, 0) + 1
+        """Serve a call of the caller, who is the current client meanwhile."""
+        self._enter(rpc.peer())
         try:
-            if count > HOST_CALLS_MAX:
-                reason = f"a host has at most {HOST_CALLS_MAX} calls at the same time"
-                await rpc.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, reason)
             return await serve(request, rpc)
         except RecordedEnd as end:
             await rpc.abort(grpc.StatusCode.__members__.get(end.code, grpc.StatusCode.UNKNOWN), "as recorded")
             raise
-        finally:
-            self._open[host] -= 1
-            if not self._open[host]:
-                del self._open[host]
 
     async def _send(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> pb.RecResponse | None:
         robot, peer = self._context.robot, rpc.peer()
@@ -149,7 +131,7 @@ class Service:
 
     async def getFile(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:  # noqa: N802
         """Serve photos and recordings in chunks; errors are chunks, too."""
-        await self._counted(self._fetch, request, rpc)
+        await self._entered(self._fetch, request, rpc)
 
     async def _fetch(self, request: pb.SendRequest | None, rpc: grpc.aio.ServicerContext) -> None:
         peer, tap = rpc.peer(), self._context.robot.tap
@@ -199,19 +181,17 @@ class Service:
         if admission.enforced:
             await pay(admission.spend(identity() or host_of(peer), size))
 
-    def _enter(self, peer: str) -> str:
-        """Return the caller's host; set the caller as the current client: where rights count, ``_admit`` does that."""
+    def _enter(self, peer: str) -> None:
+        """Set the caller as the current client; where rights count, ``_admit`` does that."""
         caller = self._callers.get(peer)
         if caller is None:
             self._handshakes.note_request(peer)
             if len(self._callers) >= CALLERS_MAX:
                 self._callers.clear()
-            host = host_of(peer)
-            caller = self._callers[peer] = _Caller(f"cyberdog {host}", host)
+            caller = self._callers[peer] = f"cyberdog {host_of(peer)}"
         if not self._context.robot.admission.enforced:
             self._context.app.seen(peer)
-            set_client(caller.name, peer)
-        return caller.host
+            set_client(caller, peer)
 
     async def _admit(self, rpc: grpc.aio.ServicerContext, peer: str) -> None:
         """Set the caller as the current client; only one with the right to see becomes the robot's app."""
