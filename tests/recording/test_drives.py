@@ -49,8 +49,10 @@ def compared(one: Way, other: Way, mask: Mask | None = None) -> Comparison:
     return Comparison([], outcome.rows, outcome.figures, outcome.reason)
 
 
-def record(path: Path, places: Mapping[str, Way], *actions: tuple[str, str]) -> Path:
-    """Write a recording as the console makes one: the door's own pushes, places and actions."""
+def record(
+    path: Path, places: Mapping[str, Way], *actions: tuple[str, str], stray: tuple[str, float, Pose] | None = None
+) -> Path:
+    """Write a recording as the console makes one: the door's own pushes, places and actions; ``stray``: one more."""
     files = Files(path, Origin({"version": "1"}), Redaction(), Limits())
     files.open(NANO)
 
@@ -70,6 +72,8 @@ def record(path: Path, places: Mapping[str, Way], *actions: tuple[str, str]) -> 
             if topic == "/tf":
                 value = (("a/odom", "a/base_link", way(number / 10)), ("b/odom", "b/base_link", Pose(9.0, 9.0, 0.0)))
             put(topic, "transforms" if topic == "/tf" else "pose", number / 10, value)
+    if stray is not None:
+        put(stray[0], "pose", stray[1], ("world", stray[2]))
     files.close()
     return path
 
@@ -103,6 +107,23 @@ def test_real_robots_are_compared_by_what_they_estimate(tmp_path: Path, topic: s
     comparison = compare_recordings(one, other, Mask())
     assert comparison.figures.startswith(source)
     assert comparison.fidelity < 1.0
+
+
+@pytest.mark.parametrize(
+    ("seconds", "place", "why"),
+    [
+        (4e9, Pose(0.0, 0.0, 0.0), r"ground truth are 46296 days apart \(at most 7\): one of their times is wrong"),
+        (-5e8, Pose(0.0, 0.0, 0.0), "one of their times is wrong"),
+        (1.0, Pose(math.nan, 0.0, 0.0), "a place is not finite"),
+        (1.0, Pose(0.0, math.inf, 0.0), "a place is not finite"),
+    ],
+)
+def test_damaged_place_or_time_is_named(tmp_path: Path, seconds: float, place: Pose, why: str) -> None:
+    topic = "/truth/a/pose"
+    one = record(tmp_path / "1.mcap", {topic: straight()})
+    other = record(tmp_path / "2.mcap", {topic: straight()}, stray=(topic, seconds, place))
+    with pytest.raises(BadRecording, match=why):
+        compare_recordings(one, other, Mask())
 
 
 def test_recording_without_places_says_so(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import field
 from difflib import SequenceMatcher
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from roboglot.values import dataclass
 SECTION = "drive"
 TRUTH, POSES, ODOMETRY = "ground truth", "estimated poses", "odometry"
 STEP = 0.1  # s between two moments
+SPAN_MAX = 7 * 86400.0  # s from the first place to the last: more has a wrong time in it
 SHIFTS = 21  # moments tried within the tolerance of time, at either side
 AROUND = 0.25  # s before and after a moment that are compared to tell whether the robot moves
 STILL = 0.01, np.radians(1.0)  # m, rad: less motion than this within them is standing
@@ -114,6 +116,11 @@ def read_drive(path: Path, robot: str) -> Drive:
                 places[topics.get(record.topic, ODOMETRY)].append((record.at / 1e9, pose))
     except (DecodeError, ValueError, KeyError, TypeError) as error:
         raise BadRecording(f"{path} has a message that cannot be read: {error}") from None
+    for source, found in places.items():
+        found.sort(key=itemgetter(0))
+        if found and (span := found[-1][0] - found[0][0]) > SPAN_MAX:
+            days = f"{span / 86400:.0f} days apart (at most {SPAN_MAX / 86400:.0f})"
+            raise BadRecording(f"{path}: its {source} are {days}: one of their times is wrong")
     return Drive({source: Track(found) for source, found in places.items() if found}, list(actions.values()), floors)
 
 
@@ -130,6 +137,8 @@ def _pose(record: Record, robot: str) -> Pose | None:
 
 
 def _flat(x: float, y: float, z: float, w: float) -> Pose:
+    if not np.isfinite((x, y, z, w)).all():
+        raise ValueError("a place is not finite")
     return Pose(x, y, float(2 * np.arctan2(z, w)))
 
 
