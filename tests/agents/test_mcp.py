@@ -208,6 +208,7 @@ async def test_refusals_say_why(served: ServedConsole) -> None:
         ("drive", {"seconds": 0, "robt": "a"}, "seconds must be above 0; robt is unknown; did you mean 'robot'?"),
         ("robots", {"x": 1}, "x is unknown"),
         ("where_am_i", {"robot": 7}, "robot must be text, not a whole number"),
+        ("where_am_i", {"robot": "a/program"}, "robot must match ^[^/]+$"),
         ("run_program", {"source": ""}, "source must have at least 1 characters"),
         ("rehearse", {"plan": {}}, "plan must be a list, not an object"),
         ("rehearse", {"plan": [5]}, "plan[0] must be an object, not a whole number"),

@@ -23,6 +23,7 @@ _FORMS = {  # by the library's type of error; names in braces are those of its c
     "too_short": "{place} must have at least {min_length} entries",
     "string_too_long": "{place} must have at most {max_length} characters",
     "string_too_short": "{place} must have at least {min_length} characters",
+    "string_pattern_mismatch": "{place} must match {pattern}",
     "string_unicode": "{place} must be text of whole characters",
     "finite_number": "{place} must be a finite number",
     "union_tag_not_found": "{place}.do is missing",

@@ -25,7 +25,9 @@ SECONDS_MAX = 120.0  # a tool's longest wait for an action or a program
 LOOK = 0.1  # s between two checks of a running action
 DEFAULT = "a"
 
-Robot = Annotated[str, Field(min_length=1, max_length=80, description="The robot's name, as `robots` lists it.")]
+# no slash: it would become a path to something else of the console
+ROBOT = Field(min_length=1, max_length=80, pattern="^[^/]+$", description="The robot's name, as `robots` lists it.")
+Robot = Annotated[str, ROBOT]
 # strict: else the library reads true as 1
 Meters = Annotated[float, Field(ge=-10_000, le=10_000, strict=True)]
 Speed = Annotated[float, Field(ge=-10, le=10, strict=True)]
