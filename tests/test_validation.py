@@ -219,3 +219,10 @@ async def test_strange_greetings_of_gateways_are_refused(greeting: bytes) -> Non
     connector._robot = connector._token = ""
     with pytest.raises(Refused, match="greeting"):
         await connector._greet(cast(TunnelLink, Link()))
+
+
+@pytest.mark.parametrize("sent", [{"x" * 100_000: 1}, {"side": "y" * 100_000}, {"by_number": {"z" * 100_000: 1}}])
+def test_sentences_quote_only_the_beginning(sent: object) -> None:
+    with pytest.raises(msgspec.ValidationError) as invalid:
+        msgspec.convert(sent, Sent)
+    assert len(why_invalid(invalid.value, wanted=Sent)) < 1000

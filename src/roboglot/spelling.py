@@ -1,4 +1,4 @@
-"""Finds the known name that a mistyped one stands for. Knows no command, key or robot, only letters."""
+"""Finds the known name that a mistyped one stands for; bounds quoted text. Knows no command, key or robot."""
 
 from __future__ import annotations
 
@@ -9,6 +9,11 @@ from difflib import SequenceMatcher
 WORD_MAX = 64  # characters that are compared
 LIKE = 0.75  # share of common letters: one wrong letter in four
 STEM_MIN = 3  # letters of an abbreviation
+
+
+def brief(text: str, most: int) -> str:
+    """Return the first ``most`` characters of a text, and then its length if it is longer."""
+    return text if len(text) <= most else f"{text[:most]} … ({len(text)} characters)"
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

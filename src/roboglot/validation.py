@@ -13,9 +13,10 @@ from typing import TypeVar
 import msgspec
 from msgspec import inspect
 
-from roboglot.spelling import meant
+from roboglot.spelling import brief, meant
 
 CHOICES_MAX = 30  # words or fields named in a sentence
+SENTENCE_MAX = 500  # characters about what is wrong, which may quote its sender
 PORT_MAX = 65535
 T = TypeVar("T")
 
@@ -64,7 +65,7 @@ def why_invalid(
     ``kinds``: the words for types. ``wanted``: the type that the value should have; with it, the sentence names the
     words and fields that are allowed, or guesses the one that was meant.
     """
-    message = _plain(error, whole, field, kinds)
+    message = brief(_plain(error, whole, field, kinds), SENTENCE_MAX)
     if wanted is None or not isinstance(error, msgspec.ValidationError):
         return message
     return message + _remedy(str(error), wanted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 from xml.etree import ElementTree
 
 import pytest
@@ -25,6 +26,21 @@ def test_controls_are_written_out_and_words_stay() -> None:
 @given(st.text())
 def test_nothing_that_drives_a_terminal_is_left(text: str) -> None:
     assert all(character in "\t\n" or character.isprintable() or ord(character) > 0x9F for character in visible(text))
+
+
+def test_log_lines_are_bounded() -> None:
+    """Clients' names, and errors that quote them, may have megabytes."""
+    try:
+        raise ValueError("y" * 1_000_000)
+    except ValueError:
+        caught = sys.exc_info()
+    record = logging.LogRecord("x", logging.INFO, "x.py", 1, "no file %r", ("z" * 1_000_000,), caught)
+    text = VisibleFormatter("%(message)s  (%(name)s)").format(record)
+    line, *traceback = text.split("\n")
+    assert line.startswith("no file 'zzz")
+    assert line.endswith("zzz … (1000010 characters)  (x)")
+    assert traceback[-1].endswith("yyy")
+    assert len(text) < 25_000
 
 
 HOSTILE = "x\x1b]0;mine\x07\n9 a row of its own\x9b2J"

@@ -5,6 +5,10 @@ from __future__ import annotations
 import logging
 import re
 
+from roboglot.spelling import brief
+
+LINE_MAX = 2000  # characters of a log line's message
+TRACEBACK_MAX = 20_000  # characters of a line with its traceback
 _KEPT = "\t\n"
 _REORDERING = (0x061C, 0x200E, 0x200F, 0x2028, 0x2029, *range(0x202A, 0x202F), *range(0x2066, 0x206A))
 _CONTROLS = (*range(0x20), *range(0x7F, 0xA0))
@@ -32,15 +36,19 @@ def xml_text(text: str) -> str:
 
 
 class VisibleFormatter(logging.Formatter):
-    """Escapes log lines, so that no text of clients and programs reaches the terminal as a command.
+    """Escapes log lines, so that no text of clients and programs reaches the terminal as a command, and bounds them.
 
     The system's errors lose their numbers.
     """
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's name
         """Return the line without its traceback."""
+        record.message = brief(record.message, LINE_MAX)
         return re.sub(r"\[Errno -?\d+\] ", "", super().formatMessage(record))
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line, escaped."""
-        return visible(super().format(record))
+        """Return the line, escaped; of a long traceback, its end."""
+        text = super().format(record)
+        if len(text) > TRACEBACK_MAX:
+            text = f"{text[: 2 * LINE_MAX]}\n…\n{text[2 * LINE_MAX - TRACEBACK_MAX :]}"
+        return visible(text)

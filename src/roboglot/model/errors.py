@@ -5,9 +5,17 @@ from __future__ import annotations
 import re
 from typing import Self
 
+from roboglot.spelling import brief
+
+SENTENCE_MAX = 1000  # characters of a message, which may quote a client
+
 
 class RobotError(Exception):
     """Anything the robot refuses or fails to do; the message is a plain sentence for the log."""
+
+    def __str__(self) -> str:
+        """Return the message; a long one is cut off."""
+        return brief(super().__str__(), SENTENCE_MAX)
 
     def again(self) -> Self:
         """Return a copy to raise again: each raise adds its stack, with all objects on it, to the raised error."""
