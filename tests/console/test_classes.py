@@ -11,9 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 import pytest_asyncio
 
 from roboglot.config import AccessConfig, ConsoleConfig, RobotConfig, load_config
+from roboglot.console.studio import classroom
 from roboglot.console.studio.programs import ClassHome
 from roboglot.model.action import ActionStatus
 from roboglot.model.clock import LockstepClock
@@ -155,6 +157,27 @@ async def test_a_world_that_ends_leaves_the_class(tmp_path: Path) -> None:
         assert (await teacher.kind("left"))["type"] == "left"
         await asked(teacher, do="open", id=4, name="8c")
         assert "out of reach" in (await teacher.kind("refused"))["why"]
+
+
+@pytest.mark.parametrize("shared", [False, True])
+async def test_pages_gone_at_once_keep_no_class(tmp_path: Path, shared: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their pages have gone before their classes are stored."""
+    monkeypatch.setattr(classroom, "CLASSES_MAX", 1)
+    classes = FleetClasses(tmp_path)
+    await classes.open()
+    async with world(tmp_path, "w", ADDRESS, shared=shared) as served:
+        for number in range(10):
+            async with page(served) as gone:
+                await asked(gone, do="open", name=str(number))
+                gone._socket.transport.abort()
+        answer = {"type": "refused"}
+        async with asyncio.timeout(60):
+            while answer["type"] == "refused":  # until the console has heard of it
+                async with page(served) as teacher:
+                    await asked(teacher, do="open", name="7b")
+                    answer = await teacher.until(lambda m: m["type"] in ("grid", "refused"))
+        assert answer["name"] == "7b"
+    await classes.close()
 
 
 async def test_handed_in_work_survives_a_restart(tmp_path: Path) -> None:

@@ -116,7 +116,7 @@ class _Link:
             if mine is not None and self._room.worlds.get(self._world) is mine:
                 del self._room.worlds[self._world]
             for seat in self._seats.values():
-                seat.leave()
+                seat.close()
             for waiting in self._stops.values():
                 waiting.cancel()
             for task in self._pending:
@@ -147,7 +147,7 @@ class _Link:
                 self._seat(number).draw(png)
             case Left(seat=number):
                 if (seat := self._seats.pop(number, None)) is not None:
-                    seat.leave()
+                    seat.close()
 
     async def _change(self, message: Opened | Closed) -> None:
         """Open or close the class of one world."""

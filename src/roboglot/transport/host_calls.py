@@ -16,7 +16,7 @@ from grpc._cython import cygrpc
 # gRPC's own function for a call with one request and a stream of answers; another version may take other parameters.
 _CALL, _TAKES = "_handle_unary_stream_rpc", ["method_handler", "rpc_state", "loop"]
 _serve = getattr(cygrpc, _CALL, None)
-Handler = Callable[..., Coroutine[object, object, None]]
+Handler = Callable[..., Coroutine[object, object, object]]
 
 
 class HostCalls:

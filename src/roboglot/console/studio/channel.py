@@ -339,7 +339,7 @@ class Session:
         """Close the page; its actions continue."""
         self._leave()
         self._trial.close()
-        self._seat.leave()
+        self._seat.close()
 
 
 def _plain(problem: Problem) -> dict[str, object]:

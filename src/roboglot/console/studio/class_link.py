@@ -246,9 +246,15 @@ class LinkedSeat:
     def __init__(self, room: LinkedRoom, number: int, post: Tell) -> None:
         self._room, self.number, self.post = room, number, post
         self._robot = ""
+        self._gone = False
 
     async def take(self, request: Member, *, may_teach: bool) -> None:
-        """Pass a request on; ``post`` gets the result. Raises Refused if the classroom is out of reach."""
+        """Pass a request on, unless the page has gone; ``post`` gets the result.
+
+        Raises Refused if the classroom is out of reach.
+        """
+        if self._gone:
+            return
         self._room.send(At(self.number, self._robot), self)
         self._room.send(PageRequest(self.number, request, may_teach), self)
 
@@ -257,9 +263,11 @@ class LinkedSeat:
         self._robot = robot
 
     def draw(self, picture: str) -> None:
-        """Show teachers the robot's map, a PNG in base64. Raises Refused."""
-        self._room.send(Drawn(self.number, picture), self)
+        """Show teachers the robot's map, a PNG in base64, unless the page has gone. Raises Refused."""
+        if not self._gone:
+            self._room.send(Drawn(self.number, picture), self)
 
-    def leave(self) -> None:
+    def close(self) -> None:
         """Leave the classroom with the page."""
+        self._gone = True
         self._room.forget(self)

@@ -120,8 +120,8 @@ class SeatProtocol(Protocol):
     def draw(self, picture: str) -> None:
         """Show teachers the robot's map, a PNG in base64."""
 
-    def leave(self) -> None:
-        """Remove a page that goes, or goes elsewhere; the work of its pupil stays."""
+    def close(self) -> None:
+        """Remove a page that has gone; the work of its pupil stays."""
 
 
 class Room(Protocol):
@@ -262,6 +262,7 @@ class Seat:
     def __init__(self, room: Classroom, post: Tell, world: str) -> None:
         self._room, self.post, self._world = room, post, world
         self._robot = ""
+        self._gone = False
         self._class: Class | None = None
         self._pupil: Pupil | None = None
 
@@ -273,7 +274,9 @@ class Seat:
             self._class.notify_teachers()
 
     async def take(self, request: Member, *, may_teach: bool) -> None:
-        """Execute a page's request. Raises NotFound, Refused."""
+        """Execute a page's request, unless the page has gone. Raises NotFound, Refused."""
+        if self._gone:
+            return
         match request.do:
             case "open":
                 await self._open(request, may_teach)
@@ -299,6 +302,8 @@ class Seat:
         if not may_teach:
             raise Refused("opening a class needs the right admin on the robots")
         opened = self._room.find(request.code) if request.code else await self._room.begin(request.name.strip())
+        if self._gone:
+            return  # a class without a page in it gives way to others
         self.leave()
         self._class = opened
         opened.until = self._room.now() + OPEN_SECONDS
@@ -360,8 +365,13 @@ class Seat:
             raise Refused("only the teacher of the class may do that")
         return self._class
 
+    def close(self) -> None:
+        """Remove a page that has gone; requests of it that are under way take no place any more."""
+        self.leave()
+        self._gone = True
+
     def leave(self) -> None:
-        """Remove a page that goes, or goes elsewhere; the work of its pupil stays."""
+        """Leave the class; the work of the page's pupil stays."""
         if self._class is None:
             return
         if self._pupil is not None:
