@@ -13,6 +13,7 @@ import msgspec
 if TYPE_CHECKING:
     from yaml import SafeLoader
 
+TEXT_MAX = 16 << 20  # characters of a file
 T = TypeVar("T")
 
 
@@ -31,16 +32,31 @@ def in_bounds() -> Iterator[None]:
         raise
 
 
-def text_of(path: Path) -> str:
-    """Return the text of a file. Raises OSError, and ValueError without the file's name if it is not UTF-8."""
-    with in_bounds():
-        return path.read_text(encoding="utf-8")
+def text_of(path: Path, most: int = TEXT_MAX, encoding: str = "utf-8") -> str:
+    """Return the text of a file.
+
+    Raises OSError, and ValueError without the file's name if it is not UTF-8 or has more than ``most`` characters.
+    """
+    with in_bounds(), path.open(encoding=encoding) as file:
+        text = file.read(most + 1)
+    if len(text) > most:
+        raise ValueError(f"longer than {most} characters")
+    return text
 
 
-def named_text_of(path: Path) -> str:
-    """Return the text of a file. Raises OSError, and ValueError with the file's name if it is not UTF-8."""
+def bytes_of(path: Path, most: int) -> bytes:
+    """Return the bytes of a file. Raises OSError, and ValueError with the file's name beyond ``most`` of them."""
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"{path}: longer than {most} bytes")
+    return data
+
+
+def named_text_of(path: Path, most: int = TEXT_MAX, encoding: str = "utf-8") -> str:
+    """Return the text of a file as ``text_of`` does; the errors have the file's name."""
     try:
-        return text_of(path)
+        return text_of(path, most, encoding)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 

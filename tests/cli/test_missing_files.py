@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import typer
 
 from roboglot.cli import connect, mcp
 from roboglot.cli.fleet import _plan, _PlanOptions
+from roboglot.cli.programs import lesson
 from roboglot.config import load_config
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.folder_lock import lock_folder
@@ -67,6 +69,16 @@ def test_file_that_is_no_text_is_named(read: Callable[[Path], object], tmp_path:
     path = tmp_path / "map.bin"
     path.write_bytes(b"\xff\xfe")
     with pytest.raises(ValueError, match=rf"^{re.escape(str(path))}: not UTF-8 text \(invalid start byte\)$"):
+        read(path)
+
+
+@pytest.mark.parametrize("read", [*TOML, files.read, lesson._text])
+def test_file_that_is_too_long_is_named(read: Callable[[Path], object], tmp_path: Path) -> None:
+    """Only its beginning is read."""
+    path = tmp_path / "log.bin"
+    path.touch()
+    os.truncate(path, 32 << 20)
+    with pytest.raises(ValueError, match=rf"^{re.escape(str(path))}: longer than \d+ characters$"):
         read(path)
 
 

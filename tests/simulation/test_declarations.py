@@ -95,7 +95,7 @@ def test_files_that_are_none(write, tmp_path):
         load_world(tmp_path / "gone.toml")
     with pytest.raises(BadFile, match="not UTF-8"):
         load_world(write(b"name = '\xff'"))
-    with pytest.raises(BadFile, match="larger than"):
+    with pytest.raises(BadFile, match="longer than"):
         load_world(write(b"#" * (FILE_BYTES_MAX + 1)))
     with pytest.raises(BadFile, match="1 to 20 floors"):
         load_world(write("floors = []"))

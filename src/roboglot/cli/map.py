@@ -20,6 +20,7 @@ from roboglot.hosting.error_text import in_words
 from roboglot.model.maps import OccupancyGrid
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, composite_of, floors_of
 from roboglot.simulation.world.world_files import load_world, read_ros_grid
+from roboglot.text_files import bytes_of
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
 from roboglot.wire.slamware.chapters.slam.stcm import MAP_BYTES_MAX, decode_stcm, encode_stcm
 
@@ -102,7 +103,7 @@ def _import(source: Path, robot: str, file: Path | None, pose: str) -> None:
 
 
 def _export(robot: str, file: Path | None, target: Path) -> None:
-    data = file.read_bytes() if file else _call(robot, "GET", STCM)
+    data = bytes_of(file, MAP_BYTES_MAX) if file else _call(robot, "GET", STCM)
     if target.suffix == COMPOSITE:
         target.write_bytes(data)
     else:
@@ -114,7 +115,7 @@ def _read(path: Path) -> bytes:
     """Return a map file as a composite map. Raises BadMap, ValueError, OSError."""
     if path.suffix != COMPOSITE:
         return encode_stcm(composite_of(FloorMap(grid=read_ros_grid(path))))
-    data = path.read_bytes()
+    data = bytes_of(path, MAP_BYTES_MAX)
     floors_of(decode_stcm(data))
     return data
 
@@ -145,9 +146,12 @@ def _call(robot: str, method: str, path: str, body: bytes | None = None) -> byte
     request = urllib.request.Request(f"{robot.rstrip('/')}{path}", body, method=method)
     try:
         with urllib.request.urlopen(request, timeout=ANSWER_SECONDS_MAX) as answer:
-            return bytes(answer.read(MAP_BYTES_MAX + 1))
+            data = bytes(answer.read(MAP_BYTES_MAX + 1))
     except urllib.error.HTTPError as error:
         with error:
             raise ValueError(f"the robot answers {error.code} {error.reason}: {error.read(500).decode()}") from None
     except urllib.error.URLError as error:
         raise OSError(f"{robot} does not answer: {error.reason}") from None
+    if len(data) > MAP_BYTES_MAX:
+        raise BadMap(f"the robot's answer has more than {MAP_BYTES_MAX} bytes")
+    return data

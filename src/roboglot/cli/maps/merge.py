@@ -9,8 +9,9 @@ from uuid import NAMESPACE_OID, uuid5
 
 from roboglot.protocols.slamware.chapters.slam.composite import FloorMap, FloorName, composite_of, floors_of
 from roboglot.simulation.world.world_files import read_ros_grid
+from roboglot.text_files import bytes_of
 from roboglot.wire.slamware.chapters.slam.explore_map import BadMap
-from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap, Layer, decode_stcm, encode_stcm
+from roboglot.wire.slamware.chapters.slam.stcm import MAP_BYTES_MAX, CompositeMap, Layer, decode_stcm, encode_stcm
 
 FLOORS_MAX = 100
 LABELS = ("building", "floor", "order", "default")
@@ -49,7 +50,7 @@ def _floor_of(name: str, source: str, fetch: Callable[[str], bytes]) -> FloorMap
     """Return the only floor of a source, or the one of that name."""
     if source.endswith((".yaml", ".yml")):
         return FloorMap(grid=read_ros_grid(Path(source)))
-    data = fetch(source) if "://" in source else Path(source).read_bytes()
+    data = fetch(source) if "://" in source else bytes_of(Path(source), MAP_BYTES_MAX)
     floors = [floor for floor in floors_of(decode_stcm(data)) if floor.grid is not None and floor.grid.width]
     if not floors:
         raise BadMap(f"the map of {source} is empty")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboglot.hosting.escaping import visible
+from roboglot.text_files import named_text_of
 
 if TYPE_CHECKING:
     from roboglot.console.studio.lessons import Grade, Lesson
@@ -46,13 +47,9 @@ def _lesson(path: Path) -> Lesson:
 
 def _text(path: Path) -> str:
     try:
-        if path.stat().st_size > FILE_MAX:
-            raise ValueError(f"{path} has more than {FILE_MAX} bytes")
-        return path.read_text("utf-8")
+        return named_text_of(path, FILE_MAX)
     except OSError as error:
         raise ValueError(f"cannot read {path}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise ValueError(f"{path} is not UTF-8 text") from None
 
 
 async def _play_all(lessons: list[tuple[str, Lesson]], own: str | None, chinese: bool) -> bool:

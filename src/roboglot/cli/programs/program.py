@@ -24,6 +24,7 @@ from roboglot.config import RobotConfig
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import visible
 from roboglot.protocols.visual.config import VisualConfig
+from roboglot.text_files import named_text_of
 from roboglot.values import dataclass
 
 ROBOT = "ws://127.0.0.1:50053"
@@ -93,11 +94,9 @@ def command(
     source = ""
     try:
         if file is not None and what in READING:
-            source = file.read_text(encoding="utf-8-sig")
-    except OSError as error:
+            source = named_text_of(file, encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
         sys.exit(f"roboglot program: {in_words(error)}")
-    except UnicodeDecodeError:
-        sys.exit(f"roboglot program: {file} is not UTF-8 text")
     task = id or re.sub(r"\W", "_", file.stem if file else "", flags=re.ASCII)
     saving = {"mode": "cycle" if cycle else "single", "condition": when, "body": source}
     if interface:

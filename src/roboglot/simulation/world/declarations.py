@@ -38,15 +38,13 @@ def read_toml(path: Path, structure: type[T]) -> T:
 
 
 def text_below(path: Path, most: int) -> str:
-    """Return the text of a file of at most so many bytes. Raises BadFile."""
+    """Return the text of a file of at most so many characters. Raises BadFile."""
     try:
-        if path.stat().st_size <= most:
-            return text_of(path)
+        return text_of(path, most)
     except OSError as error:
         raise BadFile(f"{path}: {error.strerror}") from None
     except ValueError as error:
         raise BadFile(f"{path}: {error}") from None
-    raise BadFile(f"{path}: larger than {most} bytes")
 
 
 @lru_cache(maxsize=DECODED_MAX)

@@ -13,7 +13,7 @@ import msgspec
 
 from roboglot.spelling import instead
 from roboglot.testing.requirements import SPEED, Wanted, WantedFault
-from roboglot.text_files import in_bounds
+from roboglot.text_files import in_bounds, text_of
 from roboglot.validation import why_invalid
 from roboglot.values import dataclass
 
@@ -209,10 +209,8 @@ def read(path: Path) -> Found:
     from roboglot.testing.scenarios.strict_yaml import read_yaml
 
     try:
-        if path.stat().st_size > BYTES_MAX:
-            raise BadScenario(f"longer than {BYTES_MAX} bytes")
         with in_bounds():
-            values = read_yaml(path.read_text(encoding="utf-8"))
+            values = read_yaml(text_of(path, BYTES_MAX))
         if isinstance(values, dict):
             values.pop("$schema", None)
         scenario = msgspec.convert(values, Scenario)

@@ -20,6 +20,7 @@ from roboglot.testing.programs import ProgramFailed
 from roboglot.testing.scenarios.checks import Checker
 from roboglot.testing.scenarios.files import STEPS, BadScenario, Step, fault_of, verb_of
 from roboglot.testing.server import NotInTime, RobotServer
+from roboglot.text_files import text_of
 
 OUTPUT_MAX = 1 << 20  # characters kept of a command's output
 SHOWN_MAX = 2000  # characters of its end shown after a failure
@@ -119,7 +120,7 @@ class Steps:
             raise StepFailed(f"{step.dog} was answered {answers}, not {step.answer}")
 
     def _program(self, step: Step) -> None:
-        source = (self._folder / (step.program or "")).read_text(encoding="utf-8")
+        source = text_of(self._folder / (step.program or ""))
         run = self._client("program", step.robot).run(source, within=step.within)
         self._checker.printed += run.printed
 
