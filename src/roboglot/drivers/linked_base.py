@@ -13,6 +13,13 @@ LATENCY_SMOOTHING = 0.2  # share of a new latency in the mean
 OFF_DOCK = 0.6  # m straight ahead of a dock: off its contacts, with room to turn
 
 
+def limits_refusal(skills: int) -> Refused | None:
+    """Return why limits cannot change while so many ``skills`` of the robot's own move it; None for no skill."""
+    if not skills:
+        return None
+    return Refused("the robot moves by a skill of its own now, which keeps the speed that it began with")
+
+
 class LinkedBase(Base):
     """Accepts velocities only; drivers of robots with controllable wheels override ``set_wheel_speeds``."""
 

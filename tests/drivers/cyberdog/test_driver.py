@@ -48,6 +48,7 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols.cyberdog.certificates import export_client
 from roboglot.protocols.cyberdog.config import CyberDogConfig
 from roboglot.protocols.cyberdog.server import CyberDogDoor
+from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 from roboglot.testing.addresses import free_port
@@ -175,6 +176,26 @@ async def test_it_navigates_and_reports_map_and_pose(driven: Robot, robot: Robot
         driven[Localization].set_pose(Pose())
     with pytest.raises(Refused, match="cannot drive by itself"):  # it was ignored
         driven[Localization].relocalize(may_move=True)
+
+
+async def test_own_skills_keep_no_lower_limit(driven: Robot, robot: Robot, until: Until) -> None:
+    """The dog's requests have no field for a speed."""
+    limits = SpeedLimits(driven)
+    goal = [Point(6.0, 0.0)]
+    with pytest.raises(Refused, match="at its own speed"):
+        driven[Navigation].navigate_to(goal, NavigationOptions(speed_ratio=0.5), source="test")
+    limits.set(speed=0.2)
+    for skill in (lambda: driven[Navigation].navigate_to(goal, NavigationOptions()), driven[Docking].dock):
+        with pytest.raises(Refused, match=r"keep no speed limit below 0\.6 m/s and 1\.3 rad/s"):
+            skill()
+    limits.set(speed=0.6)
+    going = driven[Navigation].navigate_to(goal, NavigationOptions(), source="test")
+    await until(lambda: robot[Base].velocity.x > 0.1)
+    with pytest.raises(Refused, match="keeps the speed that it began with"):
+        limits.set(speed=0.2)
+    going.cancel()
+    await until(lambda: going.status.ended)
+    limits.set(speed=0.2)
 
 
 async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Robot, until: Until, world: World) -> None:

@@ -41,6 +41,7 @@ from roboglot.model.events import LinkChanged
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import LaserScan
+from roboglot.protocols.slamware.chapters.motion.speed_limits import SpeedLimits
 from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.storage.database import Database
@@ -147,12 +148,18 @@ async def test_lower_limit_of_client_holds_for_robot(driven: Robot, robot: Robot
     assert robot[Base].velocity.x == pytest.approx(0.2, abs=0.03)
     action.cancel()
     await forward(seconds=2)
-    driven[Navigation].navigate_to([Point(3.0, 0.0)], NavigationOptions(), source="test")
+    going = driven[Navigation].navigate_to([Point(3.0, 0.0)], NavigationOptions(), source="test")
     speeds = []
     for _ in range(12):
         await forward(seconds=0.5)
         speeds.append(robot[Base].velocity.x)
     assert 0.05 < max(speeds) < 0.22  # it drives to goals at a share of its limit
+    limits = SpeedLimits(driven)
+    with pytest.raises(Refused, match="keeps the speed that it began with"):
+        limits.set(speed=0.1)
+    going.cancel()
+    await forward(seconds=2)
+    limits.set(speed=0.1)
 
 
 async def test_limit_of_killed_program_is_restored_next_time(

@@ -92,7 +92,7 @@ class CyberDogDriver(Driver):
         self._ours_at = -math.inf  # when an action of ours last moved the dog
         self._skills = Skills(robot, self._client, self.link, reported)
         self.link.stop_others_by(self._stop_others)
-        self._base = CyberDogBase(self._client, robot.clock, self.link, reported)
+        self._base = CyberDogBase(self._client, robot.clock, self.link, reported, self._skills)
         robot.add(Base, self._base)
         robot.add(Legs, CyberDogLegs(robot, self._client, self.supervisor, self._base))
         robot.add(Odometry, ReportedOdometry(lambda: reported.advance_to(robot.clock.time()), "cyberdog"))

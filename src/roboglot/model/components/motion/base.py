@@ -56,6 +56,11 @@ class Base(Component):
         """Return the reason why the base would refuse to drive now (a button, a cable), or None."""
         return None
 
+    @property
+    def limits_refusal(self) -> Refused | None:
+        """Return the reason why other limits would not hold now, or None: a real robot's own skill moves it."""
+        return None
+
     def check_free(self, command: Twist | WheelSpeeds) -> None:
         """Raise the error that would abort ``command``: Collided if the hull touches something on that side."""
         return

@@ -23,6 +23,8 @@ class CyberDogNavigation(Navigation):
 
     def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:
         check_goals(goals, options, most=GOALS_MAX)
+        if options.speed_ratio < 1.0:
+            raise Refused("this dog walks to goals at its own speed, not at a share of it")
         yaws = [None] * (len(goals) - 1) + [options.yaw]
 
         def begin(goal: Point, yaw: float | None) -> Begin:

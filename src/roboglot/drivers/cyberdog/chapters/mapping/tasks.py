@@ -11,10 +11,11 @@ from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.state import ReportedState
 from roboglot.drivers.cyberdog.vocabulary import robot_errors
 from roboglot.model.actions import Action
+from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.navigation import NavigationFeedback
 from roboglot.model.components.system.link import Link
-from roboglot.model.errors import Unconnected
+from roboglot.model.errors import Refused, Unconnected
 from roboglot.model.robot import Robot
 from roboglot.wire.cyberdog.codes import TaskState, TaskType
 
@@ -23,6 +24,7 @@ LOCALIZED = (TaskState.LOCALIZED, TaskState.OUTDOOR_LOCALIZED)
 
 log = logging.getLogger(__name__)
 Begin = Callable[[], Awaitable[RunningTask]]
+Run = Callable[[Action], Awaitable[None]]
 Afterwards = Callable[[RunningTask], Awaitable[None]]
 
 
@@ -31,24 +33,26 @@ class Skills:
 
     def __init__(self, robot: Robot, client: CyberDogClient, link: Link, reported: ReportedState) -> None:
         self.robot, self.client, self.link, self.reported = robot, client, link, reported
+        self.moving = 0  # our actions by which the dog moves itself
         self._orphan: TaskType | None = None  # still running since the link was lost
 
     def start(self, name: str, begins: Sequence[Begin], *, goal: object, source: str, resource: str = BASE) -> Action:
         """Start an action that runs one task after the other."""
-        self.link.require_free()
 
         async def run(action: Action) -> None:
             for begin in begins:
                 with robot_errors():
                     await self._follow(action, await begin())
 
+        if resource == BASE:
+            return self._start_moving(name, run, goal, source)
+        self.link.require_free()
         return self.robot.actions.start(name, run, resources={resource}, goal=goal, source=source)
 
     def start_from_idle(
         self, name: str, begin: Begin, *, goal: object, source: str, then: Afterwards | None = None
     ) -> Action:
         """Start a task that the dog accepts only while not localized; relocalize afterwards."""
-        self.link.require_free()
 
         async def run(action: Action) -> None:
             with robot_errors():
@@ -59,7 +63,24 @@ class Skills:
                     if localized:
                         await self._localize()
 
-        return self.robot.actions.start(name, run, resources={BASE}, goal=goal, source=source)
+        return self._start_moving(name, run, goal, source)
+
+    def _start_moving(self, name: str, run: Run, goal: object, source: str) -> Action:
+        """Start an action by which the dog moves itself. Raises Refused if it is to be slower than it then is."""
+        self.link.require_free()
+        base = self.robot[Base]
+        built = base.built.twist
+        if base.limits.twist != built:
+            raise Refused(f"this dog's own skills keep no speed limit below {built.x:g} m/s and {built.yaw:g} rad/s")
+
+        async def counted(action: Action) -> None:
+            self.moving += 1
+            try:
+                await run(action)
+            finally:
+                self.moving -= 1
+
+        return self.robot.actions.start(name, counted, resources={BASE}, goal=goal, source=source)
 
     @property
     def localized(self) -> bool:

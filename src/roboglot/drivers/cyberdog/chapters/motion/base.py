@@ -9,11 +9,13 @@ from collections.abc import Callable
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.clients.cyberdog.chapters.motion import STEP
 from roboglot.clients.errors import ClientError
+from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
 from roboglot.drivers.cyberdog.state import ReportedState
-from roboglot.drivers.linked_base import LinkedBase
+from roboglot.drivers.linked_base import LinkedBase, limits_refusal
 from roboglot.model.clock import Clock
 from roboglot.model.components.motion.base import BaseLimits
 from roboglot.model.components.system.link import US, Link
+from roboglot.model.errors import Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.wire.cyberdog.chapters.motion.motion import Motion
 
@@ -27,9 +29,11 @@ class CyberDogBase(LinkedBase):
 
     wheels = "a dog has no wheels"
 
-    def __init__(self, client: CyberDogClient, clock: Clock, link: Link, reported: ReportedState) -> None:
+    def __init__(
+        self, client: CyberDogClient, clock: Clock, link: Link, reported: ReportedState, skills: Skills
+    ) -> None:
         super().__init__(link)
-        self._client, self._clock, self._reported = client, clock, reported
+        self._client, self._clock, self._reported, self._skills = client, clock, reported, skills
         self.built = self.limits = BaseLimits(
             twist=Twist(SPEED, SIDE_SPEED, YAW_SPEED),
             linear_acceleration=ACCELERATION,
@@ -55,6 +59,10 @@ class CyberDogBase(LinkedBase):
         self._changed.set()
         if self._sending is None:
             self._sending = asyncio.get_running_loop().create_task(self._send(), name="servo frames to a CyberDog")
+
+    @property
+    def limits_refusal(self) -> Refused | None:
+        return limits_refusal(self._skills.moving)
 
     @property
     def velocity(self) -> Twist:

@@ -44,6 +44,7 @@ class ActionRunner:
         self._robot, self._client, self._link = robot, client, link
         self._ours: list[int] = []  # the robot's ids of our actions, the latest last
         self.beginning = 0  # our actions that still lack an id
+        self.moving = 0  # our actions by which the robot moves itself
         self._orphan: RunningAction | None = None
         self._unanswered = ""  # the name of an action whose reply was lost: it may have begun
 
@@ -88,13 +89,20 @@ class ActionRunner:
     ) -> Action:
         """Start an action. Raises Unconnected without a link, Busy while another client moves the robot."""
         self._link.require_free()
+        held = {*resources}
 
         async def run(action: Action) -> None:
-            with robot_errors():
-                while not await self._follow(action, await self.begin(wanted.name, wanted.options), wanted.feedback):
-                    await action.hold(lambda: None)  # paused: start again on resume
+            self.moving += BASE in held
+            try:
+                with robot_errors():
+                    while not await self._follow(
+                        action, await self.begin(wanted.name, wanted.options), wanted.feedback
+                    ):
+                        await action.hold(lambda: None)  # paused: start again on resume
+            finally:
+                self.moving -= BASE in held
 
-        return self._robot.actions.start(name, run, resources=resources, goal=goal, source=source)
+        return self._robot.actions.start(name, run, resources=held, goal=goal, source=source)
 
     async def _follow(self, action: Action, running: RunningAction, feedback: Feedback) -> bool:
         """Follow the action; return True when it has ended, False when it is paused."""

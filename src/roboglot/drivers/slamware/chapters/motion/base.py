@@ -13,14 +13,14 @@ from typing import Final
 
 from roboglot.clients.errors import ClientError
 from roboglot.clients.slamware import RunningAction, SlamwareClient, SlamwareRefused
-from roboglot.drivers.linked_base import LinkedBase
+from roboglot.drivers.linked_base import LinkedBase, limits_refusal
 from roboglot.drivers.slamware.chapters.motion.actions import ActionRunner
 from roboglot.drivers.slamware.chapters.motion.arcs import ArcSplitter
 from roboglot.drivers.slamware.chapters.motion.speed_limit_restore import PARAMETER, SpeedLimitRestore
 from roboglot.drivers.slamware.state import ReportedState
 from roboglot.model.components.motion.base import BaseLimits
 from roboglot.model.components.system.link import Link
-from roboglot.model.errors import Busy
+from roboglot.model.errors import Busy, Refused
 from roboglot.model.geometry import STILL, Twist
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.chapters.motion import Direction, MoveByOptions
@@ -68,6 +68,10 @@ class SlamwareBase(LinkedBase):
     @property
     def velocity(self) -> Twist:
         return self._reported.twist
+
+    @property
+    def limits_refusal(self) -> Refused | None:
+        return limits_refusal(self._runner.moving)
 
     @property
     def share(self) -> float:

@@ -53,15 +53,17 @@ class SpeedLimits:
         return speed, turning
 
     def check(self, speed: float | None, turning: float | None) -> None:
-        """Raise InvalidGoal for limits beyond those of the drive."""
+        """Raise InvalidGoal for limits beyond those of the drive, Refused if no other ones would hold now."""
         base = self._robot[Base]
+        if (refused := base.limits_refusal) is not None:
+            raise refused
         x, yaw = base.limits.twist.x if speed is None else speed, base.limits.twist.yaw if turning is None else turning
         built = base.built.twist
         if not (SPEED_MIN <= x <= built.x and SPEED_MIN <= yaw <= built.yaw):
             raise InvalidGoal(f"{SPEED_MIN:g} to {built.x:g} m/s and {SPEED_MIN:g} to {built.yaw:g} rad/s are possible")
 
     def set(self, *, speed: float | None = None, turning: float | None = None) -> None:
-        """Set the limits: ``speed`` m/s, ``turning`` rad/s. Raises InvalidGoal beyond those of the drive."""
+        """Set the limits: ``speed`` m/s, ``turning`` rad/s. Raises what ``check`` does."""
         self.check(speed, turning)
         now = self._robot[Base].limits.twist
         self._limit(Twist(now.x if speed is None else speed, now.y, now.yaw if turning is None else turning))
