@@ -288,11 +288,14 @@ def main(descriptor: int) -> None:
     """Load everything, then serve."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from roboglot import cli
+    from roboglot.cli.warm.parent import MODULES
     from roboglot.shards.warm_up import ENVIRONMENT, refuse_threads, warm
 
     for module in pkgutil.walk_packages(cli.__path__, f"{cli.__name__}."):
         importlib.import_module(module.name)
-    for name in OF_TESTS:
+    for command in cli.COMMANDS:
+        cli.built(command)
+    for name in (*MODULES, *OF_TESTS):
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
     warm()
