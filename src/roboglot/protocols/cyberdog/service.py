@@ -36,6 +36,7 @@ CHARACTERS_MAX = (MESSAGE_MAX - FRAME) // 4  # that fit into a message, whatever
 LOST = "\0"  # in place of a client that lost a right
 CALLERS_MAX = 1024  # whose names are kept
 CALLS_MAX = 512  # at the same time, over all connections
+CHUNK_SECONDS_MAX = 60.0  # s of real time for a client to take a chunk of a file, up to 4 MB
 WRITE_MAX = 10.0  # s of real time for a client to take a message after its call has ended
 HOST_CALLS_MAX = CALLS_MAX * 3 // 4  # of one host, so that others still reach the robot
 
@@ -146,19 +147,33 @@ class Service:
             fields = read_params(request.params)
         except NotJson:
             fields = {}
-        async with contextlib.aclosing(get_file(self._context, request.nameCode, fields, request.params)) as chunks:
+        found = get_file(self._context, host_of(peer), request.nameCode, fields, request.params)
+        async with contextlib.aclosing(found) as chunks:
             async for chunk in chunks:
                 if not self._context.robot.admission.may(Right.SEE):  # lost while the file was sent
                     await self._write(rpc, pb.FileChunk(error_code=FileError.CAMERA_SILENT))
                     return
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
-                await self._write(rpc, chunk)
+                if not await self._written(rpc, chunk):
+                    log.info("gave up a file transfer: %s reads too slowly", host_of(peer))
+                    return
                 await self._count(peer, len(chunk.buffer))
 
     def _note_end(self, peer: str, code: int, asked: float | None) -> None:
         inputs = self._context.robot.inputs
         inputs.note_client(CALLED_OFF, "cyberdog", peer, operation=str(int(code)), asked=asked)
+
+    async def _written(self, rpc: grpc.aio.ServicerContext, chunk: object) -> bool:
+        """Write a chunk of a file; return False if the client has not taken it in time."""
+        writing = asyncio.ensure_future(self._write(rpc, chunk))
+        try:
+            await asyncio.wait([writing], timeout=CHUNK_SECONDS_MAX)
+        finally:
+            done = writing.done() or not writing.cancel()
+        if done:
+            await writing
+        return done
 
     async def _write(self, rpc: grpc.aio.ServicerContext, message: object) -> None:
         """Write to a client; the time that this takes is not robot time.

@@ -18,9 +18,10 @@ from roboglot.media.recorder import Recorder
 from roboglot.media.stills import jpeg
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.system.disk import Disk
+from roboglot.protocols.cyberdog import service
 from roboglot.protocols.cyberdog.chapters.camera import camera_files, transfers
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
-from tests.protocols.cyberdog.phone import ADDRESS, App, Client, until
+from tests.protocols.cyberdog.phone import ADDRESS, PATIENCE, App, Client, until
 
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
@@ -232,3 +233,43 @@ async def test_more_than_six_at_once_are_refused(client, robot, folder, monkeypa
     assert [chunk.error_code for chunk in await client.file(4002, {"command": 1})] == [10]
     for call in calls:
         call.cancel()
+
+
+async def test_files_nobody_reads_leave_room_for_others(
+    client, robot, folder, pems, messages, door, monkeypatch
+) -> None:
+    """gRPC takes some chunks for a client that reads nothing, and then no more."""
+    monkeypatch.setattr(transfers, "HOST_TRANSFERS_MAX", 1)
+    monkeypatch.setattr(service, "CHUNK_SECONDS_MAX", 0.05)
+    monkeypatch.setattr(service, "WRITE_MAX", 0.05)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "large.jpg").write_bytes(bytes(16_000_000))
+    hung = client.fetch(4004, {"file_name": "large.jpg"})
+    assert (await hung.read()).error_code == 0
+    async with pems.channel(door.port) as channel:
+        other = Client(channel, messages)
+        answers = list[int]()
+        async with asyncio.timeout(PATIENCE):
+            while answers != [0]:
+                answers = [chunk.error_code for chunk in await other.file(4002, {"command": 1})]
+    hung.cancel()
+
+
+async def test_files_of_one_host_leave_room_for_others(client, door, monkeypatch) -> None:
+    async def never() -> Path:
+        await asyncio.Event().wait()
+        raise AssertionError
+
+    sending = door._context.transfers
+    monkeypatch.setattr(transfers, "TRANSFERS_MAX", transfers.HOST_TRANSFERS_MAX + 1)
+    waiting = [asyncio.ensure_future(anext(sending.send("a", never))) for _ in range(transfers.HOST_TRANSFERS_MAX)]
+    await asyncio.sleep(0)
+    assert (await anext(sending.send("a", never))).error_code == 10
+    waiting.append(asyncio.ensure_future(anext(sending.send("b", never))))
+    await asyncio.sleep(0)
+    assert not waiting[-1].done()
+    assert (await anext(sending.send("c", never))).error_code == 10
+    for call in waiting:
+        call.cancel()
+    await asyncio.gather(*waiting, return_exceptions=True)
+    assert not sending._under_way

@@ -30,9 +30,9 @@ files.add(Code.SAVED_FILE)
 
 
 def get_file(
-    context: Context, code: int, fields: Mapping[str, object], params: str = ""
+    context: Context, host: str, code: int, fields: Mapping[str, object], params: str = ""
 ) -> AsyncGenerator[pb.FileChunk, None]:
-    """Yield the chunks that answer a ``getFile``; ``params``: the text that ``fields`` were read from."""
+    """Yield the chunks that answer a ``getFile`` of ``host``; ``params``: the text that ``fields`` were read from."""
     if (stand_in := context.robot.stand_in) is not None:
         return _played(context, stand_in, code, params)
     if Camera not in context.robot or Recorder not in context.robot:
@@ -43,11 +43,11 @@ def get_file(
     command = fields.get("command")
     match code, None if isinstance(command, bool) else command:
         case Code.SAVED_FILE, _:
-            return context.transfers.send(lambda: _saved(camera_files, str(fields.get("file_name", ""))))
+            return context.transfers.send(host, lambda: _saved(camera_files, str(fields.get("file_name", ""))))
         case Code.CAMERA, 1:
-            return context.transfers.send(camera_files.photograph)
+            return context.transfers.send(host, camera_files.photograph)
         case Code.CAMERA, 3:
-            return context.transfers.send(camera_files.stop)
+            return context.transfers.send(host, camera_files.stop)
         case Code.CAMERA, _:
             return _refused(FileError.ARGUMENTS)
     return _refused(FileError.WRONG_CODE)

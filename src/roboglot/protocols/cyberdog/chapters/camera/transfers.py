@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import Counter
 from collections.abc import AsyncGenerator, Awaitable, Callable
 from pathlib import Path
 
@@ -22,7 +23,8 @@ log = logging.getLogger(__name__)
 LEFT_FILES = push(Code.LEFT_FILES)
 DISK_LOW = push(Code.DISK_LOW)
 CHUNK = 4_000_000  # bytes: with the other fields still a message that every client accepts
-TRANSFERS_MAX = 6
+HOST_TRANSFERS_MAX = 6
+TRANSFERS_MAX = 12  # of all hosts, so that one leaves some to others
 OFFER_AFTER = 2.75  # s of uninterrupted heartbeats before unfetched files are offered: the sixth
 ERRORS: tuple[tuple[type[RobotError], FileError], ...] = (
     (Busy, FileError.BUSY),
@@ -41,7 +43,7 @@ class Transfers:
 
     def __init__(self, robot: Robot, files: CameraFiles, app: AppLink) -> None:
         self._robot, self._files, self._app = robot, files, app
-        self._under_way = 0
+        self._under_way = Counter[str]()  # by host
         self._offering: asyncio.Task[None] | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._proving: set[asyncio.Task[None]] = set()
@@ -49,12 +51,12 @@ class Transfers:
         app.on_found.append(self._found)
         app.on_lost.append(self._lost)
 
-    async def send(self, command: Callable[[], Awaitable[Path]]) -> AsyncGenerator[pb.FileChunk, None]:
-        """Yield the chunks of the file of ``command``, or one chunk with the error."""
-        if self._under_way >= TRANSFERS_MAX:
+    async def send(self, host: str, command: Callable[[], Awaitable[Path]]) -> AsyncGenerator[pb.FileChunk, None]:
+        """Yield to ``host`` the chunks of the file of ``command``, or one chunk with the error."""
+        if self._under_way[host] >= HOST_TRANSFERS_MAX or self._under_way.total() >= TRANSFERS_MAX:
             yield pb.FileChunk(error_code=FileError.TOO_MANY)
             return
-        self._under_way += 1
+        self._under_way[host] += 1
         try:
             path = await command()
             size = path.stat().st_size
@@ -71,7 +73,8 @@ class Transfers:
             log.info("cannot send a file: %s", error)
             yield pb.FileChunk(error_code=error_of(error))
         finally:
-            self._under_way -= 1
+            self._under_way[host] -= 1
+            self._under_way += Counter()  # without hosts that have none
 
     async def _remove_if_there(self, path: Path) -> None:
         if await self._app.alive():
