@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from contextvars import ContextVar, Token
 from typing import Self
 
@@ -47,6 +49,14 @@ class Confirmation:
 
 
 _confirmation: ContextVar[Confirmation | None] = ContextVar("confirmation", default=None)
+
+
+@asynccontextmanager
+async def confirmed() -> AsyncIterator[None]:
+    """Context at whose end the commands sent inside were answered. Raises the error of a refused one."""
+    with Confirmation() as confirmation:
+        yield
+    await confirmation.wait()
 
 
 def confirm(command: Sent) -> None:

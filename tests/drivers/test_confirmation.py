@@ -10,10 +10,16 @@ from roboglot.clients.slamware import SlamwareRefused
 from roboglot.confirmation import Confirmation, confirm
 from roboglot.model.components.interaction.light import Light
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.mapping import Mapping
+from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.errors import Refused
+from roboglot.model.geometry import Pose
+from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
-from roboglot.wire.slamware.geometry import Pose3D
+from roboglot.wire.slamware.chapters.slam.localization import NewOrigin
+from roboglot.wire.slamware.chapters.slam.stcm import CompositeMap
+from roboglot.wire.slamware.geometry import Point, Pose3D
 from tests.drivers.bad_link import Connect
 from tests.drivers.clients import Open, OpenRest
 from tests.drivers.rig import Rig
@@ -39,6 +45,28 @@ async def test_refused_pose_is_refused_in_front(
     monkeypatch.setattr(robot[Localization], "set_pose", refuse)
     with pytest.raises(SlamwareRefused, match="not now"):
         await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
+
+
+@pytest.mark.world("empty", body="hermes")
+@pytest.mark.parametrize("change", ["clear", "move_origin", "load"])
+async def test_drawings_stay_where_map_is_kept(
+    driven: Robot, robot: Robot, rest: OpenRest, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    front = await rest(driven)
+    await front.set_pose(Pose3D(1.0, 0.5, 0.0, 0.0))
+    await driven[Places].put(PointOfInterest("gate", Pose(2.0, 1.0, 0.0), {}))
+    whole = await front.get_composite_map()
+    monkeypatch.setattr(robot[Mapping], change, refuse)
+    before = driven[Places].all()
+    requests = {
+        "clear": front.clear_map,
+        "move_origin": lambda: front.move_origin_point(NewOrigin(Point(1.0, 0.5))),
+        "load": lambda: front.set_composite_map(CompositeMap(whole.layers[:1])),
+    }
+    with pytest.raises(SlamwareRefused, match="not now"):
+        await requests[change]()
+    assert driven[Places].all() == before
+    assert [place.pose.x for place in before] == [2.0]
 
 
 @pytest.mark.world("empty", body="robomaster_ep")

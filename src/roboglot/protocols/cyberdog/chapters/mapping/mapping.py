@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from roboglot.confirmation import confirmed
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.errors import Refused, RobotError
@@ -26,8 +27,9 @@ async def build_map(context: Context, task: Task, *, outdoor: bool) -> TaskResul
     """
     robot, mapping, survey = context.robot, context.robot[Mapping], Survey(outdoor)
     enabled = mapping.enabled
-    mapping.clear()
-    mapping.enable(True)
+    async with confirmed():
+        mapping.clear()
+        mapping.enable(True)
     context.stored_map, context.survey = "", survey
     task.feedback(Feedback.MAPPING_STARTED)
 

@@ -13,6 +13,7 @@ import logging
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import replace
 
+from roboglot.confirmation import confirmed
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.mapping.annotations import MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
@@ -256,7 +257,8 @@ class MapKeeper:
             if floor.grid is None:
                 raise InvalidGoal(NO_GRID)
             with exchange(self._robot):
-                self._robot[Mapping].load(floor.grid, pose or ORIGIN)
+                async with confirmed():
+                    self._robot[Mapping].load(floor.grid, pose or ORIGIN)
                 await draw
         finally:
             draw.close()
@@ -275,8 +277,9 @@ class MapKeeper:
         """Clear the map and begin a new one where the robot is; return once the drawings are on it."""
         origin, memory = self._robot[Localization].pose, self._robot[MapMemory]
         with memory.exchange():
-            with memory.left_to_caller():
-                self._robot[Mapping].clear()
+            async with confirmed():  # the drawings stay where a real robot refuses
+                with memory.left_to_caller():
+                    self._robot[Mapping].clear()
             await self._on_map_cleared(origin)
 
     async def _on_origin_moved(self, origin: Pose) -> None:
@@ -310,8 +313,9 @@ class MapKeeper:
         """Move the origin of the map in memory to ``point``, by whole cells; drawings keep their places."""
         memory = self._robot[MapMemory]
         with memory.exchange():
-            with memory.left_to_caller():
-                origin = self._robot[Mapping].move_origin(point)
+            async with confirmed():
+                with memory.left_to_caller():
+                    origin = self._robot[Mapping].move_origin(point)
             await self._shift(Pose(origin.x, origin.y))
 
     async def _shift(self, origin: Pose) -> None:
