@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 import pytest
 
 from roboglot.clients.slamware import SlamwareRefused
-from roboglot.confirmation import Confirmation, confirm
-from roboglot.model.components.interaction.light import Light
+from roboglot.confirmation import Confirmation, confirm, confirmed
+from roboglot.model.components.interaction.armor import Armor
+from roboglot.model.components.interaction.blaster import Blaster
+from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.mapping.places import Places
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
-from roboglot.model.errors import Refused
+from roboglot.model.components.system.pwm import PwmPorts
+from roboglot.model.errors import Refused, RobotError
 from roboglot.model.geometry import Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.model.robot import Robot
@@ -105,6 +109,41 @@ async def test_refused_light_stays_as_it_was(
     monkeypatch.setattr(robot[Light], "shine", refuse)
     assert await client.ask("led control comp all r 0 g 9 b 0 effect solid;") == "fail"
     assert {zone: light.lamps(zone) for zone in light.zones} == before
+
+
+SETTINGS: dict[str, Callable[[Robot, int], object]] = {
+    "shine": lambda robot, number: robot[Light].shine("front", Colour(9 + number, 0, 0)),
+    "set_mode": lambda robot, number: robot[Gimbal].set_mode([FollowMode.FREE, FollowMode.GIMBAL_LEAD][number]),
+    "set_sensitivity": lambda robot, number: robot[Armor].set_sensitivity(7 + number),
+    "set_beads": lambda robot, number: robot[Blaster].set_beads(3 + number),
+    "set_duty": lambda robot, number: robot[PwmPorts].set_duty(1, 0.3 + number / 10),
+}
+
+
+def shown(robot: Robot) -> tuple[object, ...]:
+    light, gimbal, pwm = robot[Light], robot[Gimbal], robot[PwmPorts]
+    return light.lamps("front"), gimbal.mode, robot[Armor].sensitivity, robot[Blaster].beads, pwm.signal(1).duty
+
+
+@pytest.mark.world("empty", body="robomaster_ep")
+@pytest.mark.parametrize("method", SETTINGS)
+async def test_two_refused_settings_leave_the_first(
+    driven_ep: Robot, robot: Robot, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    before = shown(driven_ep)
+    for part in (Light, Gimbal, Armor, Blaster, PwmPorts):
+        if hasattr(part, method):
+            monkeypatch.setattr(robot[part], method, refuse)
+
+    async def set_twice() -> None:
+        async with confirmed():
+            SETTINGS[method](driven_ep, 0)
+            SETTINGS[method](driven_ep, 1)
+            assert shown(driven_ep) != before
+
+    with pytest.raises(RobotError):
+        await set_twice()
+    assert shown(driven_ep) == before
 
 
 async def test_commands_of_other_tasks_are_not_awaited() -> None:

@@ -22,6 +22,7 @@ class ReportedLight(ShownLight):
     def __init__(self, zones: Mapping[str, int], clock: Clock, supervisor: Supervisor) -> None:
         super().__init__(zones, clock)
         self._supervisor = supervisor
+        self._confirmed: dict[str, list[ZoneState]] = {}  # by zone: of each lamp, and the last command
 
     @abstractmethod
     async def send_zone(self, zone: str, state: ZoneState, lamp: int | None) -> None:
@@ -58,12 +59,21 @@ class ReportedLight(ShownLight):
         if effect not in self.effects:
             raise InvalidGoal(f"this robot's lamps do not know {effect}; they know {', '.join(self.effects)}")
         self._supervisor.require()
-        lamps, last = list(self._lamps(zone)), self.state(zone)
+        confirmed = self._confirmed.setdefault(zone, [*self._lamps(zone), self.state(zone)])
         super().shine(zone, colour, effect, frequency=frequency, lamp=lamp)
-        sent = self.state(zone)
+        sent, lamps = self.state(zone), self._lamps(zone)
+        changed = range(len(lamps)) if lamp is None else (lamp,)
+
+        async def send() -> None:
+            await self.send_zone(zone, sent, lamp)
+            for index in (*changed, -1):
+                confirmed[index] = sent
 
         def undo() -> None:
-            if self.state(zone) is sent:  # else a later command replaced it
-                self._commanded[zone], self._last[zone] = lamps, last
+            for index in changed:
+                if lamps[index] is sent:  # else a later command replaced it
+                    lamps[index] = confirmed[index]
+            if self.state(zone) is sent:
+                self._last[zone] = confirmed[-1]
 
-        self._supervisor.send_setting(f"the light {zone}", lambda: self.send_zone(zone, sent, lamp), undo)
+        self._supervisor.send_setting(f"the light {zone}", send, undo)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from roboglot.confirmation import confirmed
 from roboglot.media.video import VideoStream
 from roboglot.model.actions import ActionStatus
 from roboglot.model.components.energy.battery import Battery
@@ -169,6 +170,28 @@ async def test_labels_of_its_map_are_places_here(labelled: Robot, driven: Robot)
     await near.remove("hall-1")  # an id of ours, which a label has not
     await labels_are()
     assert list(near.all()) == []
+
+
+async def test_refused_skin_stays_as_it_was(driven: Robot, robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    near, far = driven[ElectronicSkin], robot[ElectronicSkin]
+    async with confirmed():
+        near.show(SkinPattern.REARWARD, cycle=1.5)
+    before = near.state
+    assert far.state.pattern is SkinPattern.REARWARD
+
+    def refuse(*_: object, **__: object) -> None:
+        raise Refused("not now")
+
+    monkeypatch.setattr(far, "show", refuse)
+
+    async def show_twice() -> None:
+        async with confirmed():
+            near.show(SkinPattern.FLASH)
+            near.show(SkinPattern.LIGHT)
+
+    with pytest.raises(Refused):
+        await show_twice()
+    assert near.state == before
 
 
 async def test_its_skin_shows_what_it_is_given(driven: Robot, robot: Robot) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.setting import Setting
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.interaction.armor import Armor, PlatePlace, check_sensitivity
 
@@ -16,28 +17,21 @@ class RoboMasterArmor(Armor):
     """Sensitivity and plates. Hits arrive on the event port; the TelemetryListener publishes them."""
 
     def __init__(self, client: RoboMasterClient, supervisor: Supervisor) -> None:
-        self._client, self._supervisor = client, supervisor
+        self._client = client
         self.plates = AROUND
-        self._sensitivity = 5
+        self._sensitivity = Setting(supervisor, 5)
 
     async def probe(self, *, gimbal: bool) -> None:
         """Poll the sensitivity and subscribe to hits."""
-        self._sensitivity = await self._client.armor.get_sensitivity()
+        self._sensitivity.read(await self._client.armor.get_sensitivity())
         await self._client.armor.event(True)
         self.plates = (*AROUND, *AT_GIMBAL) if gimbal else AROUND
 
     @property
     def sensitivity(self) -> int:
-        return self._sensitivity
+        return self._sensitivity.value
 
     def set_sensitivity(self, sensitivity: int) -> None:
         check_sensitivity(sensitivity)
-
-        def set_(value: int) -> None:
-            self._sensitivity = value
-
-        undo = partial(set_, self._sensitivity)
-        self._supervisor.send_setting(
-            "setting the sensitivity", lambda: self._client.armor.sensitivity(sensitivity), undo
-        )
-        set_(sensitivity)
+        command = partial(self._client.armor.sensitivity, sensitivity)
+        self._sensitivity.send("setting the sensitivity", sensitivity, command)

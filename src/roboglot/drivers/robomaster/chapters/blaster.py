@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.setting import Setting
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.clock import Clock
 from roboglot.model.components.interaction.blaster import Blaster, check_beads
@@ -18,25 +17,19 @@ class RoboMasterBlaster(Blaster):
 
     def __init__(self, clock: Clock, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._clock, self._client, self._supervisor = clock, client, supervisor
-        self._beads, self._until = 1, -1.0
+        self._beads, self._until = Setting(supervisor, 1), -1.0
 
     async def probe(self) -> None:
         """Poll the number of beads per shot."""
-        self._beads = await self._client.blaster.get_bead()
+        self._beads.read(await self._client.blaster.get_bead())
 
     @property
     def beads(self) -> int:
-        return self._beads
+        return self._beads.value
 
     def set_beads(self, beads: int) -> None:
         check_beads(beads)
-
-        def set_(value: int) -> None:
-            self._beads = value
-
-        undo = partial(set_, self._beads)
-        self._supervisor.send_setting("setting the beads of a shot", lambda: self._client.blaster.bead(beads), undo)
-        set_(beads)
+        self._beads.send("setting the beads of a shot", beads, lambda: self._client.blaster.bead(beads))
 
     @property
     def ammo(self) -> int:
@@ -50,8 +43,8 @@ class RoboMasterBlaster(Blaster):
         if self.firing:
             raise Busy("the last shot is still being fired")
         self._supervisor.send("firing", self._client.blaster.fire())
-        self._until = self._clock.time() + self._beads / self.rate
-        return self._beads
+        self._until = self._clock.time() + self.beads / self.rate
+        return self.beads
 
     def cease(self) -> None:
         """Do nothing: a shot of an EP cannot be cancelled."""

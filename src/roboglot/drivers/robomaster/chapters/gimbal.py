@@ -5,11 +5,11 @@ report the angles.
 from __future__ import annotations
 
 import math
-from functools import partial
 
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.robomaster import motion
 from roboglot.drivers.robomaster.state import ReportedState
+from roboglot.drivers.setting import Setting
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.gimbal import GIMBAL, FollowMode, Gimbal, GimbalAngles, GimbalFrame, GimbalLimits
@@ -34,13 +34,13 @@ class RoboMasterGimbal(Gimbal):
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor, reported: ReportedState) -> None:
         self._robot, self._client, self._supervisor, self._reported = robot, client, supervisor, reported
         self._motions = motion.Motions(robot, supervisor)
-        self._mode, self._suspended = FollowMode.CHASSIS_LEAD, False
+        self._mode, self._suspended = Setting(supervisor, FollowMode.CHASSIS_LEAD), Setting(supervisor, False)
 
     async def probe(self) -> None:
         """Poll attitude and mode. Raises RefusedByRobot without a gimbal; only the attitude shows that."""
         await self._client.gimbal.get_attitude()
         words = await self._client.robot.get_mode()
-        self._mode = next((mode for mode in FollowMode if mode == words), FollowMode.CHASSIS_LEAD)
+        self._mode.read(next((mode for mode in FollowMode if mode == words), FollowMode.CHASSIS_LEAD))
 
     @property
     def angles(self) -> GimbalAngles:
@@ -54,19 +54,14 @@ class RoboMasterGimbal(Gimbal):
 
     @property
     def mode(self) -> FollowMode:
-        return self._mode
+        return self._mode.value
 
     def set_mode(self, mode: FollowMode) -> None:
-        def set_(value: FollowMode) -> None:
-            self._mode = value
-
-        undo = partial(set_, self._mode)
-        self._supervisor.send_setting("setting the mode", lambda: self._client.robot.mode(mode.value), undo)
-        set_(mode)
+        self._mode.send("setting the mode", mode, lambda: self._client.robot.mode(mode.value))
 
     @property
     def suspended(self) -> bool:
-        return self._suspended
+        return self._suspended.value
 
     def suspend(self) -> None:
         for action in self._robot.actions.running(GIMBAL):
@@ -77,12 +72,8 @@ class RoboMasterGimbal(Gimbal):
         self._suspend(False)
 
     def _suspend(self, on: bool) -> None:
-        def set_(value: bool) -> None:
-            self._suspended = value
-
         command = self._client.gimbal.suspend if on else self._client.gimbal.resume
-        self._supervisor.send_setting("suspending or waking the gimbal", command, partial(set_, self._suspended))
-        set_(on)
+        self._suspended.send("suspending or waking the gimbal", on, command)
 
     def set_speed(self, pitch: float, yaw: float, *, source: str = "") -> Action:
         if not (math.isfinite(pitch) and math.isfinite(yaw)):
@@ -154,7 +145,7 @@ class RoboMasterGimbal(Gimbal):
         return self._start("gimbal recenter", turn, None, source)
 
     def _start(self, name: str, turn: motion.Run, goal: object, source: str) -> Action:
-        if self._suspended:
+        if self.suspended:
             raise Refused("the gimbal is suspended")
         return self._motions.start(name, turn, self._halt, resource=GIMBAL, goal=goal, source=source)
 
@@ -171,12 +162,12 @@ class RoboMasterGimbal(Gimbal):
 
     def _far_yaw(self, joint: float | None) -> float | None:
         """Return the target of ``_arrive``: the joint angle, or the world heading if the chassis follows the gimbal."""
-        follows = joint is not None and self._mode is FollowMode.GIMBAL_LEAD
+        follows = joint is not None and self.mode is FollowMode.GIMBAL_LEAD
         return joint + self._reported.imu.orientation.yaw if joint is not None and follows else joint
 
     async def _arrive(self, pitch: float | None, yaw: float | None) -> None:
         """Wait until pushes report the target. Raises Blocked at a limit or in a mode without yaw."""
-        follows = self._mode is FollowMode.GIMBAL_LEAD
+        follows = self.mode is FollowMode.GIMBAL_LEAD
 
         async def left() -> float:
             now = self._reported.gimbal

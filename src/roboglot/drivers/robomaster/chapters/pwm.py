@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roboglot.clients.robomaster.client import RoboMasterClient
+from roboglot.drivers.setting import Setting
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.model.components.system.pwm import FREQUENCY_MAX, PwmPorts, PwmSignal
 from roboglot.model.errors import InvalidGoal, NotFound
@@ -18,18 +19,19 @@ class RoboMasterPwm(PwmPorts):
 
     def __init__(self, client: RoboMasterClient, supervisor: Supervisor) -> None:
         self._client, self._supervisor = client, supervisor
-        self._commanded: dict[int, PwmSignal] = {}
+        self._commanded: dict[int, Setting[PwmSignal]] = {}
 
     async def probe(self) -> None:
         """Send the signals again. Raises RefusedByRobot if there are no outputs."""
         await self._client.pwm.freq((1 << COUNT) - 1, round(AT_REST.frequency))  # changes nothing on a robot at rest
-        for port, signal in self._commanded.items():
-            await self._send(port, signal)
+        for port, setting in self._commanded.items():
+            await self._send(port, signal := setting.value)
+            setting.read(signal)
 
     def signal(self, port: int) -> PwmSignal:
         if not 1 <= port <= COUNT:
             raise NotFound(f"there is no PWM output {port}; there are 1 to {COUNT}")
-        return self._commanded.get(port, AT_REST)
+        return self._commanded[port].value if port in self._commanded else AT_REST
 
     def set_duty(self, port: int, duty: float) -> None:
         if not 0.0 <= duty <= 1.0:
@@ -46,13 +48,8 @@ class RoboMasterPwm(PwmPorts):
             self._set(port, AT_REST)
 
     def _set(self, port: int, signal: PwmSignal) -> None:
-        before = self.signal(port)
-
-        def undo() -> None:
-            self._commanded[port] = before
-
-        self._supervisor.send_setting(f"PWM output {port}", lambda: self._send(port, signal), undo)
-        self._commanded[port] = signal
+        setting = self._commanded.setdefault(port, Setting(self._supervisor, AT_REST))
+        setting.send(f"PWM output {port}", signal, lambda: self._send(port, signal))
 
     async def _send(self, port: int, signal: PwmSignal) -> None:
         await self._client.pwm.value(1 << port - 1, round(signal.duty * 100, 3))

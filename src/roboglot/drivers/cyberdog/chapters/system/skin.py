@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from roboglot.clients.cyberdog import CyberDogClient
 from roboglot.drivers.supervisor import Supervisor
-from roboglot.model.components.interaction.skin import Shade, SkinPattern, SkinState
+from roboglot.model.components.interaction.skin import Shade, SkinPattern
 from roboglot.model.components.interaction.skin_effects import ShownSkin
 from roboglot.model.components.motion.feet import Foot, FootState
 from roboglot.model.robot import Robot
@@ -21,6 +21,7 @@ class CyberDogSkin(ShownSkin):
         super().__init__(robot.clock, robot.id)
         self._client, self._supervisor = client, supervisor
         self._sending = asyncio.Lock()  # the last state wins
+        self._confirmed = self._state
 
     @property
     def feet(self) -> Mapping[Foot, FootState]:
@@ -28,23 +29,21 @@ class CyberDogSkin(ShownSkin):
 
     def enable(self, on: bool) -> None:
         self._supervisor.require()
-        before = self._state
         super().enable(on)
-        self._send("switching the skin", before)
+        self._send("switching the skin")
 
     def show(self, pattern: SkinPattern, *, cycle: float = 1.0, standing: Shade = Shade.LIGHT) -> None:
         self._supervisor.require()
-        before = self._state
         super().show(pattern, cycle=cycle, standing=standing)
-        self._send("the skin's pattern", before)
+        self._send("the skin's pattern")
 
-    def _send(self, what: str, before: SkinState) -> None:
-        """Send the state; return to ``before`` if the dog refuses it and no later command replaced it."""
+    def _send(self, what: str) -> None:
+        """Send the state; if the dog refuses it and no later command replaced it, return to the last confirmed one."""
         sent = self._state
 
         def undo() -> None:
             if self._state is sent:
-                self._state = before
+                self._state = self._confirmed
 
         self._supervisor.send_setting(what, self.probe, undo)
 
@@ -57,3 +56,4 @@ class CyberDogSkin(ShownSkin):
                 by_feet = state.pattern is SkinPattern.FOOTFALLS
                 time = int(state.standing is Shade.DARK) if by_feet else round(1000 * state.cycle)
                 await self._client.set_skin(SkinMode[state.pattern.name], time)
+            self._confirmed = state
