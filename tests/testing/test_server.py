@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import pytest
 
 from roboglot.extras import MissingExtra
+from roboglot.model.geometry import Pose
 from roboglot.recording.reader import read_recording
 from roboglot.testing.server import RobotServer
 from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
@@ -94,7 +95,7 @@ class TestShared:
         assert rest.get_pose().x == pytest.approx(0.0, abs=0.05)
         assert not robot_server.stage.obstacles
         rest.begin("MoveToAction", MoveToOptions(Location(0.5, 0.0), MoveOptions())).wait()
-        robot_server.stage.add_obstacle(robot_server.pose().compose(robot_server.pose()))
+        robot_server.stage.add_obstacle(robot_server.pose().compose(Pose(1.0)))
 
 
 def run_pytest(folder: Path, source: str, *options: str) -> subprocess.CompletedProcess[str]:

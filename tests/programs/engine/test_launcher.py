@@ -18,9 +18,10 @@ from roboglot.programs.engine.engine import Engine
 from roboglot.programs.engine.launcher import Launcher
 from tests.warm_start import COLD, SOURCES
 
-# What a zygote starts with, in place of what it would do.
+# What a zygote starts with, in place of what it would do. socket.recv_fds, by which the warm one is asked, imports
+# array; a newer libffi keeps its own file open, and the warm one has closed it.
 REPORT = """
-import gc, json, os, signal, sys, threading
+import array, gc, json, os, signal, sys, threading
 gc.disable()
 sys.path.insert(0, sys.argv[1])
 from roboglot.programs.worker import zygote
@@ -35,7 +36,8 @@ def report(*given, **named):
         "names": sorted(name for name in globals() if "__" not in name),
         "order": list(set("these have an order".split())),
         "ignored": [n for n in range(1, 32) if signal.getsignal(n) == signal.SIG_IGN],
-        "descriptors": [n for n in range(100) if os.path.exists(f"/proc/self/fd/{n}")],
+        "descriptors": [n for n in range(100) if os.path.exists(link := f"/proc/self/fd/{n}")
+            and "/libffi.so" not in os.readlink(link)],
     }), flush=True)
 
 zygote.main = report
