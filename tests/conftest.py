@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("explore", deadline=None, max_examples=1000)  # scripts/test --hypothesis-profile explore
 settings.register_profile("quick", settings.get_profile("same"), max_examples=20)  # scripts/test --fast
-settings.register_profile("some", settings.get_profile("same"), max_examples=40)  # scripts/test; --slow: all
+settings.register_profile("some", settings.get_profile("same"), max_examples=25)  # scripts/test; --slow: all
 settings.load_profile("same")
 
 # httpx's pool tries to import it at every request: a third of a request's time was spent on a missing module.
