@@ -184,19 +184,21 @@ def _text(path: Path) -> str:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
-    """Share tests out by files, but give all those with a browser, or PostgreSQL, to one worker: others start none."""
+    """Share tests out by files, but have one worker start the browser, one PostgreSQL, and one parse all sources."""
     from xdist.scheduler import LoadFileScheduling
 
-    class OneServer(LoadFileScheduling):
+    class OneWorker(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return _server_of(nodeid.partition("::")[0]) or super()._split_scope(nodeid)
+            return _companion_of(nodeid.partition("::")[0]) or super()._split_scope(nodeid)
 
-    return OneServer(config, log) if config.getoption("dist") == "loadfile" else None
+    return OneWorker(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 @functools.cache
-def _server_of(file: str) -> str:
-    """Return the folder whose server a file of tests needs, or ""."""
+def _companion_of(file: str) -> str:
+    """Return the folder whose server a file of tests needs, or the file whose syntax trees; or ""."""
+    if file == "tests/console/test_server_words.py":
+        return "tests/test_house.py"
     for folder in ("tests/browser", "tests/storage"):
         if file.startswith(f"{folder}/"):
             return folder

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import ast
 import gc
+from functools import cache
 from pathlib import Path
 
 BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
 
 
+@cache
 def parsed(path: Path) -> ast.Module:
-    """Parse a file without looking for garbage, of which there is none among thousands of new nodes.
+    """Return a file's syntax tree, parsed once for all tests of a worker.
 
-    Nor is there later: they refer to each other in one direction only.
+    Without looking for garbage, of which there is none among thousands of new nodes. Nor is there later: they refer to
+    each other in one direction only.
     """
     looked_for = gc.isenabled()
     gc.disable()

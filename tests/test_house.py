@@ -52,15 +52,9 @@ PAGES = sorted(p for p in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")] i
 
 
 @cache
-def tree_of(path: Path) -> ast.Module:
-    """Return a file, parsed once for all tests."""
-    return parsed(path)
-
-
-@cache
 def statements_of(path: Path) -> list[ast.AST]:
     """Return a file's statements, found once for all tests."""
-    return statements(tree_of(path))
+    return statements(parsed(path))
 
 
 def functions(path: Path) -> Iterator[tuple[str, int]]:
@@ -261,7 +255,7 @@ def test_walk_in_docs_is_way_through_the_code(walk: list[tuple[str, str]]) -> No
     assert len(walk) > 5
     mentioned: set[str] = {walk[0][1]}
     for file, name in walk:
-        tree = tree_of(ROOT / "src" / "roboglot" / file)
+        tree = parsed(ROOT / "src" / "roboglot" / file)
         steps = defined(tree, name)
         assert steps, f"{file} has no {name}"
         registered = any(isinstance(mark, ast.Call) for step in steps for mark in getattr(step, "decorator_list", ()))
