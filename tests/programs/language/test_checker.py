@@ -203,3 +203,10 @@ def test_the_tables_agree() -> None:
     assert all(len(entry) == 3 for entry in _SYNTAX)
     assert not attribute_allowed("__class__")
     assert attribute_allowed("_private")
+
+
+@pytest.mark.parametrize("source", ["{}", "a.{}()", "cyberdog.{}", "__{}__", "def __{}__(): pass", "import {}"])
+def test_only_beginning_of_long_name_is_quoted(source: str) -> None:
+    (problem, *_) = check(source.format("x" * 30_000), NAMES)
+    assert len(problem.english) < 400
+    assert len(problem.chinese) < 400

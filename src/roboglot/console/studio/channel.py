@@ -58,7 +58,7 @@ Id = Annotated[str, msgspec.Meta(max_length=ID_MAX)]
 class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=True):
     """Robot that the page programs from now on, and the program shown; of others, only begin and end are reported."""
 
-    robot: str
+    robot: Id
     program: Id = ""  # in all messages
 
 

@@ -45,7 +45,7 @@ APPROXIMATIONS: dict[type[Component], str] = {
     DockContact: "charging without a wire",
     Localization: "five poses a second while the dog is localized; its pose cannot be set",
     Mapping: "the map as the app sees it, with three kinds of cells; it can be read alone",
-    Navigation: "by the dog's own skill, goal by goal, stopped only when a lost link is back; reports no plans",
+    Navigation: "by the dog's own skill and speed, goal by goal, stopped only after a lost link is back; no plans",
     Docking: "by the dog's own skill; the place of its dock is not reported",
     Following: "by the dog's own skill; people in sight are reported only while it runs, so the nearest is followed",
     StairAlignment: "by the dog's own skill; ends when the dog stands still; its result is not reported",
