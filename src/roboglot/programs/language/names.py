@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 from roboglot.programs.language.problems import Problem, ProblemKind
-from roboglot.spelling import nearest
+from roboglot.spelling import WORD_MAX, nearest
 from roboglot.values import dataclass
 
 MODULES = frozenset({"time", "math", "random", "numbers"})
@@ -149,6 +149,7 @@ def _unknown(node: ast.Name | ast.Attribute, name: str, owner: str, candidates: 
     near = nearest(name, candidates)
     hint = f" Did you mean '{near}'?" if near else ""
     hint_zh = f"是不是想写 '{near}'？" if near else ""
+    name, owner = name[:WORD_MAX], owner[:WORD_MAX]
     if owner:
         english, chinese = f"'{owner}' has no '{name}'.{hint}", f"'{owner}' 里没有 '{name}'。{hint_zh}"
     elif hasattr(builtins, name):

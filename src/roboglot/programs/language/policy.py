@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 from roboglot.programs.language.names import MODULES, words
 from roboglot.programs.language.problems import Problem, ProblemKind
+from roboglot.spelling import WORD_MAX
 
 _ALLOWED: tuple[type[ast.AST], ...] = (
     ast.Module, ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop,
@@ -84,6 +85,7 @@ def violations(tree: ast.Module) -> Iterator[Problem]:
             continue
         for name in _identifiers(node):
             if _reserved(name) and not (name == "__name__" and isinstance(getattr(node, "ctx", None), ast.Load)):
+                name = name[:WORD_MAX]
                 yield _problem(node, f"Names like '{name}' are reserved.", f"'{name}' 这样的名字是保留的。")
         yield from _special(node)
 
@@ -93,8 +95,10 @@ def _special(node: ast.AST) -> Iterator[Problem]:
         case ast.Attribute(attr=name) if not attribute_allowed(name) or (
             name in _READABLE and not isinstance(node.ctx, ast.Load)
         ):
+            name = name[:WORD_MAX]
             yield _problem(node, f"'.{name}' cannot be used in robot programs.", f"机器人程序不能使用 '.{name}'。")
         case ast.FunctionDef(name=name) if _reserved(name) and name not in _METHODS:
+            name = name[:WORD_MAX]
             yield _problem(node, f"A method '{name}' cannot be defined here.", f"不能定义方法 '{name}'。")
         case ast.ClassDef(keywords=[_, *_]):
             yield _problem(
@@ -123,8 +127,8 @@ def _import(node: ast.AST, module: str) -> Problem:
     allowed = ", ".join(sorted(MODULES))
     return _problem(
         node,
-        f"'{module[:64]}' cannot be imported in robot programs; these can: {allowed}.",
-        f"机器人程序不能导入 '{module[:64]}'；可以导入：{allowed}。",
+        f"'{module[:WORD_MAX]}' cannot be imported in robot programs; these can: {allowed}.",
+        f"机器人程序不能导入 '{module[:WORD_MAX]}'；可以导入：{allowed}。",
     )
 
 
