@@ -76,11 +76,11 @@ async def _end(
 ) -> None:
     """Run a streaming handler and end its call; gRPC calls it in place of its own function."""
     ended: _Ended | None = getattr(handler, "ended", None)
-    if ended is None:
-        await _end_stream(state, handler, request, rpc, loop)
-        return
     try:
-        await _end_together(state, ended, request, rpc, loop)
+        if ended is None:
+            await _end_stream(state, handler, request, rpc, loop)
+        else:
+            await _end_together(state, ended, request, rpc, loop)
     except cygrpc.ExecuteBatchError:
         log.debug("%s left before its answer was sent", rpc.peer())
 

@@ -185,9 +185,8 @@ class Service:
             try:
                 await asyncio.shield(writing)
             except asyncio.CancelledError:
-                done, _ = await asyncio.wait([writing], timeout=WRITE_MAX)
-                for written in done:
-                    _ = written.cancelled() or written.exception()  # the client may be gone
+                writing.add_done_callback(lambda written: written.cancelled() or written.exception())  # it may be gone
+                await asyncio.wait([writing], timeout=WRITE_MAX)
                 raise
 
     async def _count(self, peer: str, size: int) -> None:

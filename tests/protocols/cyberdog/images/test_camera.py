@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import io
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -236,7 +237,7 @@ async def test_more_than_six_at_once_are_refused(client, robot, folder, monkeypa
 
 
 async def test_files_nobody_reads_leave_room_for_others(
-    client, robot, folder, pems, messages, door, monkeypatch
+    client, robot, folder, pems, messages, door, monkeypatch, caplog
 ) -> None:
     """gRPC takes some chunks for a client that reads nothing, and then no more."""
     monkeypatch.setattr(transfers, "HOST_TRANSFERS_MAX", 1)
@@ -252,7 +253,10 @@ async def test_files_nobody_reads_leave_room_for_others(
         async with asyncio.timeout(PATIENCE):
             while answers != [0]:
                 answers = [chunk.error_code for chunk in await other.file(4002, {"command": 1})]
-    hung.cancel()
+        hung.cancel()
+        await until(lambda: not door._calls._open)
+        gc.collect()
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
 async def test_files_of_one_host_leave_room_for_others(client, door, monkeypatch) -> None:
