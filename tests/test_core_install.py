@@ -102,6 +102,13 @@ def test_pages_in_a_wheel_equal_the_sources(core: Path) -> None:
     assert json.loads(done.stdout) == {path: asset.tag for path, asset in Assets().all()}
 
 
+def test_labels_in_a_wheel_equal_the_sources(core: Path) -> None:
+    code = "from roboglot.console.assets import content_of; from roboglot.console import studio"
+    read = "sys.stdout.buffer.write(content_of(Path(studio.__file__).with_name('labels.toml')))"
+    done = run(core, "-c", f"import sys; from pathlib import Path; {code}; {read}")
+    assert done.stdout == (ROOT / "src/roboglot/console/studio/labels.toml").read_text("utf-8"), done.stderr
+
+
 def test_the_start_screen_names_an_installed_file(core: Path) -> None:
     (proto,) = core.parent.parent.glob("lib/python*/site-packages/roboglot/wire/cyberdog/proto/cyberdog_app.proto")
     assert "service GrpcApp" in proto.read_text()  # grpcurl reads it, as the CyberDog door suggests

@@ -6,16 +6,17 @@ Made from the functions' declarations, so that an editor has a block for each fu
 from __future__ import annotations
 
 import hashlib
-import importlib.resources
 import inspect
 import re
 import tomllib
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from roboglot.console.assets import content_of
 from roboglot.console.studio.ranges import choices_of, limit_of
 from roboglot.operations import Operation
 from roboglot.programs.functions.enums import ENUMS
@@ -25,6 +26,7 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.language.names import BUILTINS, MODULES
 from roboglot.values import dataclass
 
+LABELS = Path(__file__).with_name("labels.toml")
 DANCE = "dance"  # the group of the choreographer and the dancer
 
 
@@ -75,8 +77,7 @@ def _rank(key: str, first: list[str], last: list[str]) -> int:
 
 @cache
 def _labels() -> dict[str, Any]:
-    text = importlib.resources.files(__package__).joinpath("labels.toml").read_text("utf-8")
-    return tomllib.loads(text)
+    return tomllib.loads(content_of(LABELS).decode())
 
 
 def label_of(key: str) -> dict[str, str]:
