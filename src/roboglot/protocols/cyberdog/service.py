@@ -156,7 +156,9 @@ class Service:
                 if tap.watched:
                     tap.reply("cyberdog", str(int(request.nameCode)), chunk.SerializeToString(), "ok", began=began)
                 if not await self._written(rpc, chunk):
-                    log.info("gave up a file transfer: %s reads too slowly", host_of(peer))
+                    log.info("ended a file transfer: %s reads too slowly", host_of(peer))
+                    rpc.set_code(grpc.StatusCode.DEADLINE_EXCEEDED)  # rpc.abort would wait for the client
+                    rpc.set_details("the file was not read in time")
                     return
                 await self._count(peer, len(chunk.buffer))
 

@@ -236,8 +236,14 @@ async def test_more_than_six_at_once_are_refused(client, robot, folder, monkeypa
         call.cancel()
 
 
+async def read_to_end(call: grpc.aio.UnaryStreamCall) -> None:
+    while await call.read() is not grpc.aio.EOF:
+        pass
+
+
+@pytest.mark.parametrize("leaves", [True, False])
 async def test_files_nobody_reads_leave_room_for_others(
-    client, robot, folder, pems, messages, door, monkeypatch, caplog
+    client, robot, folder, pems, messages, door, monkeypatch, caplog, leaves
 ) -> None:
     """gRPC takes some chunks for a client that reads nothing, and then no more."""
     monkeypatch.setattr(transfers, "HOST_TRANSFERS_MAX", 1)
@@ -253,7 +259,11 @@ async def test_files_nobody_reads_leave_room_for_others(
         async with asyncio.timeout(PATIENCE):
             while answers != [0]:
                 answers = [chunk.error_code for chunk in await other.file(4002, {"command": 1})]
-        hung.cancel()
+        if leaves:
+            hung.cancel()
+        else:  # the file is incomplete, and the status says so
+            with pytest.raises(grpc.aio.AioRpcError, match="DEADLINE_EXCEEDED"):
+                await asyncio.wait_for(read_to_end(hung), PATIENCE)
         await until(lambda: not door._calls._open)
         gc.collect()
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
