@@ -185,7 +185,12 @@ async def test_own_skills_keep_no_lower_limit(driven: Robot, robot: Robot, until
     with pytest.raises(Refused, match="at its own speed"):
         driven[Navigation].navigate_to(goal, NavigationOptions(speed_ratio=0.5), source="test")
     limits.set(speed=0.2)
-    for skill in (lambda: driven[Navigation].navigate_to(goal, NavigationOptions()), driven[Docking].dock):
+    for skill in (
+        lambda: driven[Navigation].navigate_to(goal, NavigationOptions()),
+        driven[Docking].dock,
+        driven[Following].follow,
+        lambda: driven[StairAlignment].align(StairDirection.UP),
+    ):
         with pytest.raises(Refused, match=r"keep no speed limit below 0\.6 m/s and 1\.3 rad/s"):
             skill()
     limits.set(speed=0.6)

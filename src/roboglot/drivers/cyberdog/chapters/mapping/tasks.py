@@ -45,7 +45,7 @@ class Skills:
                     await self._follow(action, await begin())
 
         if resource == BASE:
-            return self._start_moving(name, run, goal, source)
+            return self.start_moving(name, run, goal, source)
         self.link.require_free()
         return self.robot.actions.start(name, run, resources={resource}, goal=goal, source=source)
 
@@ -63,9 +63,9 @@ class Skills:
                     if localized:
                         await self._localize()
 
-        return self._start_moving(name, run, goal, source)
+        return self.start_moving(name, run, goal, source)
 
-    def _start_moving(self, name: str, run: Run, goal: object, source: str) -> Action:
+    def start_moving(self, name: str, run: Run, goal: object, source: str) -> Action:
         """Start an action by which the dog moves itself. Raises Refused if it is to be slower than it then is."""
         self.link.require_free()
         base = self.robot[Base]

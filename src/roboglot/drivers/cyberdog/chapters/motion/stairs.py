@@ -6,7 +6,6 @@ from roboglot.clients.errors import ClientError
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Skills
 from roboglot.drivers.cyberdog.vocabulary import WALKS, robot_errors
 from roboglot.model.actions import Action
-from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.stair_alignment import (
     ALIGN_WITH_STAIRS,
     AlignmentStage,
@@ -29,7 +28,6 @@ class CyberDogStairAlignment(StairAlignment):
 
     def align(self, direction: StairDirection, *, source: str = "") -> Action:
         skills = self._skills
-        skills.link.require_free()
 
         async def run(action: Action) -> None:
             action.report(AlignmentStage.LOOKING)
@@ -44,7 +42,7 @@ class CyberDogStairAlignment(StairAlignment):
                 await self._call_off()
                 raise
 
-        return skills.robot.actions.start(ALIGN_WITH_STAIRS, run, resources={BASE}, goal=direction, source=source)
+        return skills.start_moving(ALIGN_WITH_STAIRS, run, direction, source)
 
     async def _until_it_stands(self) -> None:
         clock = self._skills.robot.clock
