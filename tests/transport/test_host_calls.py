@@ -1,4 +1,4 @@
-"""Test that one host's open calls leave room for other hosts, whatever these calls wait for."""
+"""One host's open calls leave room for other hosts: without a request, and without a reader of their answers."""
 
 from __future__ import annotations
 
