@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 import tracemalloc
 import zipfile
 
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboglot.wire.slamware.chapters.firmware.apk import Apk, parse_manifest, read_apk
-from roboglot.wire.slamware.chapters.firmware.packages import ENTRY_MAX, BadPackage, read_firmware
+from roboglot.wire.slamware.chapters.firmware.packages import DIRECTORY_MAX, ENTRY_MAX, BadPackage, read_firmware
 from tests.wire.slamware.manifest import archive, manifest
 
 
@@ -61,6 +62,56 @@ def test_bombs_of_other_methods_stay_packed(method: int) -> None:
         assert tracemalloc.get_traced_memory()[1] < ENTRY_MAX
     finally:
         tracemalloc.stop()
+
+
+def _end(size: int) -> bytes:
+    return b"PK\5\6" + bytes(8) + struct.pack("<IIH", size, 0, 0)
+
+
+def _zip64_end(size: int) -> bytes:
+    end = struct.pack("<4sQ12x4Q", b"PK\6\6", 44, size // 46, size // 46, size, 0)
+    return end + struct.pack("<4sIQI", b"PK\6\7", 0, size, 1)
+
+
+@pytest.mark.parametrize(("size", "zip64"), [(DIRECTORY_MAX, False), (4 * DIRECTORY_MAX, True)])
+def test_long_tables_take_little_memory(size: int, zip64: bool) -> None:
+    table = (b"PK\1\2" + bytes(42)) * (size // 46)
+    whole = table + (_zip64_end(len(table)) + _end(100) if zip64 else _end(len(table)))
+    package = io.BytesIO(whole)
+    tracemalloc.start()
+    try:
+        with pytest.raises(BadPackage):
+            read_firmware(package)
+        assert tracemalloc.get_traced_memory()[1] < 2 * DIRECTORY_MAX
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "why"),
+    [(-22 - 59 + 8, 1, "encrypted"), (-22 - 59 + 16, 0, "damaged"), (-22 - 59 + 24, 1, "damaged"), (0, 0, "damaged")],
+)
+def test_entries_are_what_the_table_says(place: int, value: int, why: str) -> None:
+    data = bytearray(archive(firmware__json=b'{"version": "1"}'))
+    data[place] = value
+    with pytest.raises(BadPackage, match=why):
+        read_firmware(io.BytesIO(data))
+
+
+def test_a_name_given_twice_is_refused() -> None:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as target:
+        target.writestr("firmware.json", b'{"version": "1"}')
+        with pytest.warns(UserWarning, match="Duplicate"):
+            target.writestr("firmware.json", b'{"version": "2"}')
+    with pytest.raises(BadPackage, match="two files"):
+        read_firmware(file)
+
+
+def test_manifests_after_endless_chunks_are_refused() -> None:
+    whole = manifest("com.example", "1")
+    with pytest.raises(BadPackage, match="no element"):
+        parse_manifest(whole[:8] + struct.pack("<HHI", 0, 8, 8) * 1000 + whole[8:])
 
 
 @given(st.binary(max_size=400), st.integers(0, 400))

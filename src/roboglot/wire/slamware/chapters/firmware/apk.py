@@ -18,6 +18,7 @@ UTF8 = 0x100  # flag of the strings
 VERSION_CODE, VERSION_NAME = 0x0101021B, 0x0101021C  # resource ids of the attributes
 TYPE_STRING, TYPES_INTEGER = 0x03, (0x10, 0x11)
 ATTRIBUTES_MAX, TEXT_MAX = 200, 200
+CHUNKS_MAX = 100  # before the first element, where build tools write four
 HEADER = struct.Struct("<HHI")
 
 
@@ -62,7 +63,9 @@ def _chunks(data: bytes) -> Iterator[tuple[int, bytes]]:
     if kind != XML:
         raise BadPackage("the manifest is not binary XML")
     at = header
-    while at < len(data):
+    for _ in range(CHUNKS_MAX):
+        if at >= len(data):
+            return
         kind, _, size = HEADER.unpack_from(data, at)
         if size < HEADER.size:
             raise BadPackage("a chunk of the manifest is too short")
