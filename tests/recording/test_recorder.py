@@ -103,6 +103,7 @@ async def test_recording_is_started_marked_and_ended_from_outside(tmp_path: Path
     assert "no recording is under way" in (await ask(desk, Request("stop"))).error
     refused = await ask(desk, Request("start", "/proc/nowhere/x.mcap"))
     assert "cannot be written" in refused.error
+    assert "null" in (await ask(desk, Request("start", f"{tmp_path}/\0"))).error
     assert (await ask(desk, Request("start", f"{tmp_path}/"))).on
     assert "under way" in (await ask(desk, Request("start", f"{tmp_path}/"))).error
     await advance(started, 1.0)

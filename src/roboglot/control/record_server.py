@@ -49,7 +49,7 @@ class RecordServer(LocalServer):
     async def _receive(self, line: bytes) -> bytes:
         try:
             answer = await self._grant(decode_json(line, Request))
-        except (msgspec.DecodeError, RobotError, OSError) as refused:
+        except (msgspec.DecodeError, RobotError, OSError, ValueError) as refused:
             answer = Answer(error=why_invalid(refused, "the request", wanted=Request) or type(refused).__name__)
         return msgspec.json.encode(answer)
 

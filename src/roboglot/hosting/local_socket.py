@@ -23,7 +23,7 @@ class LocalServer:
     def __init__(self, path: Path, name: str, answer: Callable[[bytes], Awaitable[bytes]]) -> None:
         self._path, self._name, self._answer_to = path, name, answer
         self._server: asyncio.Server | None = None
-        self._callers: set[asyncio.StreamWriter] = set()
+        self._callers: dict[asyncio.StreamWriter, bool] = {}  # True: being answered; the longest idle comes first
 
     async def open(self) -> None:
         """Listen. On failure, log a warning; the program runs on without the socket."""
@@ -49,18 +49,30 @@ class LocalServer:
         self._path.unlink(missing_ok=True)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._callers.add(writer)
+        self._callers[writer] = False
+        self._make_room()
         try:
-            while len(self._callers) <= CALLERS_MAX and (line := await reader.readline()):
-                writer.write(await self._answer_to(line) + b"\n")
+            while line := await reader.readline():
+                self._callers[writer] = True
+                answer = await self._answer_to(line)
+                del self._callers[writer]
+                self._callers[writer] = False
+                writer.write(answer + b"\n")
                 await writer.drain()
         except (ValueError, OSError):  # the line is too long; the caller has gone
             pass
         finally:
-            self._callers.discard(writer)
+            self._callers.pop(writer, None)
             writer.transport.abort()
             with contextlib.suppress(OSError):
                 await writer.wait_closed()
+
+    def _make_room(self) -> None:
+        """Hang up on the longest idle caller if there are too many: ``roboglot stop`` must get through."""
+        if len(self._callers) > CALLERS_MAX:
+            idle = next(caller for caller, answered in self._callers.items() if not answered)  # the new one, at least
+            del self._callers[idle]
+            idle.transport.abort()
 
 
 async def ask(path: Path, request: bytes, seconds: float) -> bytes:
