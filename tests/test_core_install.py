@@ -85,6 +85,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield address
 
 
+@pytest.mark.slow
 def test_the_core_is_small(core: Path) -> None:
     (site,) = core.parent.parent.glob("lib/python*/site-packages")
     files = [file for file in site.rglob("*") if file.is_file() and "__pycache__" not in file.parts]

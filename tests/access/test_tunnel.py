@@ -242,6 +242,7 @@ async def test_frames_of_strangers_end_the_connection(gateway: tuple[Runtime, st
         writer.close()
 
 
+@pytest.mark.slow
 async def test_streams_opened_and_closed_hold_up_nobody(gateway: tuple[Runtime, str], tmp_path: Path) -> None:
     runtime, token = gateway
     hello = encode(FrameKind.HELLO, 0, json.dumps({"robot": "a", "token": token}).encode())

@@ -78,6 +78,7 @@ def tools_of(console: str) -> Client:
     return Client(make_server(ConsoleClient(console)))
 
 
+@pytest.mark.slow
 async def test_over_standard_input(served: ServedConsole) -> None:
     from mcp import Client, StdioServerParameters
 
@@ -165,6 +166,7 @@ async def test_stop_ends_what_moves(served: ServedConsole) -> None:
         assert not served.robot.actions.running("base")
 
 
+@pytest.mark.slow
 async def test_map_and_camera_are_pictures(served: ServedConsole) -> None:
     from mcp.types import ImageContent
 

@@ -20,6 +20,7 @@ async def fleet(clock: LockstepClock) -> AsyncIterator[Fleet]:
         yield built
 
 
+@pytest.mark.slow
 async def test_sensors_are_masked_only_inside_the_area(tour: Tour) -> None:
     masks = tour.robot[SensorMasks]
     cliffs = {sensor.id for sensor in masks.sensors if sensor.kind is SensorKind.CLIFF}

@@ -69,6 +69,7 @@ def status_of(robot: Robot, order: Order) -> OrderStatus:
     return next(known.status for known in robot[Delivery].orders if known.id == order.id)
 
 
+@pytest.mark.slow
 async def test_orders_and_rules_survive_crash_and_go_on(tmp_path: Path) -> None:
     file, image = tmp_path / "robot.db", tmp_path / "crashed.db"
     policy = Policy(work_mode=WorkMode.MANUAL, hours=((0, 3600),), delivery_speed=0.8, words={"mode": 0})
@@ -166,6 +167,7 @@ def test_working_hours() -> None:
     assert at_work(office, sunday + 33 * hour)
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty", body="hermes")
 async def test_a_round_passes_its_stops_in_turn(robot: Robot, world: World, clock: LockstepClock) -> None:
     spots = {"a": (1.5, 1.5), "b": (1.5, -1.0), "home desk": (2.5, 0.5)}

@@ -38,6 +38,7 @@ async def fleet(clock: LockstepClock, request: pytest.FixtureRequest) -> AsyncIt
     database.close()
 
 
+@pytest.mark.slow
 async def test_each_has_its_turn(fleet: Fleet, clock: LockstepClock) -> None:
     seen = list[str]()
 
@@ -62,6 +63,7 @@ async def test_each_has_its_turn(fleet: Fleet, clock: LockstepClock) -> None:
     await asyncio.gather(rides[0], rides[2], again)
 
 
+@pytest.mark.slow
 async def test_queue_never_runs_out_of_tickets(
     fleet: Fleet, clock: LockstepClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -87,6 +89,7 @@ async def test_queue_never_runs_out_of_tickets(
     assert (most, rides) == (1, 12)
 
 
+@pytest.mark.slow
 async def test_robot_that_stands_still_loses_its_turn(
     fleet: Fleet, clock: LockstepClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:

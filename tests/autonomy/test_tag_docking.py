@@ -46,6 +46,7 @@ async def test_at_a_printed_tag(tour, backward):
     assert turned < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.world(WORLD, body="hermes")
 async def test_at_a_board_and_off_it(tour):
     await dock(tour, MarkGoal(mark=Mark.BOARD, start=start(tour, 6.8, 2.0, -90)))
@@ -59,6 +60,7 @@ async def test_at_a_board_and_off_it(tour):
     assert turned < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.world(WORLD, body="hermes")
 async def test_at_reflectors(tour):
     goal = MarkGoal(
@@ -70,6 +72,7 @@ async def test_at_reflectors(tour):
     assert turned < 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.world(WORLD, body="hermes")
 async def test_a_shelf_is_lifted_and_set_down(tour):
     (shelf,) = tour.world.building.shelves
@@ -95,6 +98,7 @@ async def test_a_part_of_the_hull_stays_outside(tour):
     assert off(tour, Pose(7.05 - 0.2 + 0.27, 6.0, 0.0))[0] < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.world(WORLD, body="hermes")
 async def test_no_mark_there(tour):
     for mark in (Mark.BOARD, Mark.SHELF, Mark.REFLECTORS, Mark.PRINTED):
@@ -103,6 +107,7 @@ async def test_no_mark_there(tour):
         assert isinstance(action.error, NotFound), mark
 
 
+@pytest.mark.slow
 @pytest.mark.world(WORLD, body="hermes")
 async def test_a_tag_of_another_number_is_not_taken(tour):
     goal = MarkGoal(mark=Mark.PRINTED, start=start(tour, 8.0, 4.0, 0), texts=frozenset({"13"}))
@@ -124,6 +129,7 @@ async def test_impossible_goals_are_refused(tour):
         docking.back_off(Mark.BOARD, distance=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.world(WORLD, body="hermes")
 async def test_held_before_the_mark(tour):
     action = tour.robot[TagDocking].dock_at(MarkGoal(mark=Mark.BOARD, start=start(tour, 7.0, 2.0, -90)))

@@ -94,6 +94,7 @@ async def test_quick_loading_draws_the_same_blocks(page: Any) -> None:
     assert all(found["connected"])
 
 
+@pytest.mark.slow
 async def test_each_block_of_the_language_runs(played: dict[str, Any], engine: Engine) -> None:
     assert len(played["language"]) > 70
     for kind, code in played["language"]:

@@ -26,6 +26,7 @@ HERE, SECOND = map(str, RANGE.hosts())
 POSE = "api/core/slam/v1/localization/pose"
 
 
+@pytest.mark.slow
 def test_robots_of_gateway_are_on_addresses_of_range(tmp_path: Path) -> None:
     data, config, known = tmp_path / "data", tmp_path / "robots.toml", tmp_path / "settings"
     store = open_store(data)

@@ -76,6 +76,7 @@ def test_photo_that_cannot_be_written_is_not_taken(run: Run, tmp_path: Path) -> 
         assert failed.stderr.startswith("roboglot cyberdog: cannot write ")
 
 
+@pytest.mark.slow
 def test_go_reports_arrival_and_map_saves(run: Run) -> None:
     went = run("go", "0.6", "0.0")
     assert "308 arrived" in went.stdout
@@ -103,6 +104,7 @@ def test_mistakes_are_reported_in_a_line(run: Run, words: list[str]) -> None:
     assert "Traceback" not in failed.stderr
 
 
+@pytest.mark.slow
 def test_certificates_of_another_robot_are_named(run: Run, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "roboglot", "certs", "--export", str(tmp_path), "--data", str(tmp_path / "other")]
     subprocess.run(command, check=True, capture_output=True, timeout=180)

@@ -121,6 +121,7 @@ async def test_check_needs_no_robot(shell: Shell) -> None:
     assert (await shell.call("check", shell.file("t.py", HELLO))).status == 0
 
 
+@pytest.mark.slow
 async def test_modules_and_lists_for_machines(shell: Shell) -> None:
     path = shell.file("greet.py", "print('hello', name)\n")
     assert (await shell.call("save", path, "--interface", "greet(name)")).out == "greet is saved\n"

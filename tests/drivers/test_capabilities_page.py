@@ -84,6 +84,7 @@ def untruths(
     return wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("back", "body"), KINDS)
 async def test_rest_answers_as_the_page_says(kind: tuple[Robot, RobotKind], monkeypatch: pytest.MonkeyPatch) -> None:
     robot, page = kind

@@ -91,6 +91,7 @@ CELLS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("back", "fault"), CELLS)
 async def test_stops_in_time_reports_truthfully_and_comes_back(
     back: str, fault: str, way: Rig, connect: Connect, world: World, rest: OpenRest, text_door: Open
@@ -126,6 +127,7 @@ async def test_stops_in_time_reports_truthfully_and_comes_back(
         await succeeds(driven)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", ["slamware", "cyberdog"])
 async def test_another_robot_is_not_taken_for_this_one(
     back: str, way: Rig, robot: Robot, connect: Connect, caplog: pytest.LogCaptureFixture
@@ -147,6 +149,7 @@ async def test_another_robot_is_not_taken_for_this_one(
         await until(clock, lambda: link.state is LinkState.UP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", ["cyberdog"])
 async def test_new_certificates_are_used_at_once(back: str, way: Rig, connect: Connect, world: World) -> None:
     async with connect() as driven:
@@ -300,6 +303,7 @@ async def test_releasing_a_silent_robot_ends_while_time_stands(
     # The fixtures close the rest while the clock stands still: it must not hang.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", ["robomaster"])
 async def test_blocked_pushes_name_port_and_are_tried_seldom(
     back: str, way: Rig, connect: Connect, caplog: pytest.LogCaptureFixture
@@ -314,6 +318,7 @@ async def test_blocked_pushes_name_port_and_are_tried_seldom(
         await until(driven.clock, lambda: driven[Link].state is LinkState.UP and driven[Link].age("position") < 0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", ["cyberdog"])
 async def test_dogs_reckoned_pose_stands_when_its_frames_do(
     back: str, way: Rig, connect: Connect, world: World
@@ -327,6 +332,7 @@ async def test_dogs_reckoned_pose_stands_when_its_frames_do(
         assert way_reported == pytest.approx(real.distance_to(world.truth.pose_of("a")), abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", ["cyberdog"])
 async def test_errors_for_clients_name_no_files(
     back: str, way: Rig, connect: Connect, rest: OpenRest, tmp_path: Path

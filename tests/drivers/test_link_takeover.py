@@ -83,6 +83,7 @@ async def test_task_begun_with_lost_answer_is_stopped_too(back: str, way: Rig, c
         await succeeds(driven)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", ["slamware"])
 async def test_another_client_takes_over_from_a_manual_driver(
     back: str, way: Rig, connect: Connect, robot: Robot, rest: OpenRest, text_door: Open, world: World
@@ -128,6 +129,7 @@ async def test_speed_limit_is_restored_with_the_link(
         assert driven[Base].limits.twist.x == pytest.approx(full)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", ["cyberdog"])
 async def test_dog_walked_by_another_app_is_left_alone(
     back: str, way: Rig, connect: Connect, world: World, text_door: Open

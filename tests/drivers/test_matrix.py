@@ -82,6 +82,7 @@ async def passing(forward: Forward, back: str, door: str) -> AsyncIterator[None]
         yield
 
 
+@pytest.mark.slow
 @pytest.mark.world("office")
 @pytest.mark.parametrize(("back", "door"), CELLS)
 async def test_a_cell(

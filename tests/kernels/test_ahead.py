@@ -68,6 +68,7 @@ async def test_compiled_kernels_are_remembered(cache: Path, names: tuple[str, ..
     await compile_beside(["linear"], lambda *_progress: pytest.fail("it is compiled already"))
 
 
+@pytest.mark.slow
 async def test_robots_share_one_compiler(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[object] = []
     begin = asyncio.create_subprocess_exec

@@ -121,6 +121,7 @@ def test_kernels_beside_read_only_sources_are_used(monkeypatch: pytest.MonkeyPat
         ahead.cache_folder.cache_clear()
 
 
+@pytest.mark.slow
 def test_cached_kernels_import_no_lowering_of_arrays() -> None:
     """Each names ``arrayobj`` as the place of its environments; it takes 6 MB."""
     compile_ahead()

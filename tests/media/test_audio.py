@@ -91,6 +91,7 @@ def test_rates_channels_and_widths(rate, channels, width):
     assert np.abs(sound.samples - expected)[:-10].max() < 600  # the last sample has no next one
 
 
+@pytest.mark.slow
 def test_too_long_recordings_are_refused():
     with pytest.raises(ValueError, match="more than"):
         read_wav(wav(bytes(int((SECONDS_MAX + 1) * 8000)), rate=8000, width=1))

@@ -82,6 +82,7 @@ async def meanwhile(asking: Awaitable[T], forward: Forward) -> T:
     return await asyncio.wait_for(asked, 60.0)
 
 
+@pytest.mark.slow
 @every_body
 async def test_the_doors_refuse_what_the_page_says(body: str, robot: Robot, forward: Forward, tmp_path: Path) -> None:
     kind = RobotKind(body, frozenset(robot.interfaces), {})

@@ -115,6 +115,7 @@ def test_absent_robots_and_differing_protocols_are_refused() -> None:
     assert missing.exit_code == 2
 
 
+@pytest.mark.slow
 async def test_robots_are_compared_by_their_urls(tmp_path: Path) -> None:
     values = {
         "data": str(tmp_path / "data"),

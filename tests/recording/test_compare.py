@@ -84,6 +84,7 @@ def _alter_push(chance: random.Random, exchanges: list[Exchange]) -> None:
     exchanges.sort(key=lambda exchange: exchange.stamp)
 
 
+@pytest.mark.slow
 def test_95_of_100_random_mutations_are_found() -> None:
     original, found = session(), 0
     for seed in range(MUTATIONS):

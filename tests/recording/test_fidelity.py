@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from roboglot.cli.recordings.fidelity import BODY, SessionRequest, _facts, page, published
 from roboglot.testing.addresses import free_addresses
 
 PAGE = Path(__file__).parents[2] / "docs" / "fidelity.md"
 
 
+@pytest.mark.slow
 async def test_the_page_is_up_to_date() -> None:
     shown = await page(free_addresses(len(set(BODY.values()))))
     assert PAGE.read_text(encoding="utf-8") == shown, "run: roboglot fidelity --write"

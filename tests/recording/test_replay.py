@@ -46,6 +46,7 @@ async def everything(address: str) -> None:
         await writer.wait_closed()
 
 
+@pytest.mark.slow
 async def test_three_protocol_recording_agrees_only_with_its_double(tmp_path: Path) -> None:
     file = tmp_path / "r.mcap"
     await run(tmp_path, "universal", str(file), everything)

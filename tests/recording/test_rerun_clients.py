@@ -44,6 +44,7 @@ def ways(recording: Recording) -> list[str]:
     return [f"{given.name} {given.kind}" for _, given in recording.inputs if given.kind in (CAME, GONE, CALLED_OFF)]
 
 
+@pytest.mark.slow
 async def test_a_text_client_hangs_up_while_it_drives(tmp_path: Path) -> None:
     async with begun(tmp_path) as session:
         reader, writer = await asyncio.open_connection(ADDRESS, 40923)
@@ -119,6 +120,7 @@ async def test_ros2_drives(tmp_path: Path) -> None:
     assert [e.status for e in recording.of(door="ros2") if e.direction is Direction.REPLY] == ["refused", "ok", "ok"]
 
 
+@pytest.mark.slow
 async def test_an_app_calls_off_what_it_asked(tmp_path: Path) -> None:
     async with begun(tmp_path) as session:
         session.dog = session.new_app()

@@ -188,6 +188,7 @@ def test_unknown_shards_are_refused_by_name(fleet: Fleet) -> None:
     assert "another roboglot uses" in second.stderr
 
 
+@pytest.mark.slow
 def test_logs_and_top_show_shards(fleet: Fleet) -> None:
     assert fleet.call("logs", "w1").returncode == 0
     table = fleet.call("top").stdout  # in a pipe: one table

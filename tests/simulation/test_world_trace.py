@@ -5,6 +5,8 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
+
 PROJECT = Path(__file__).parents[2]
 SECONDS = 12  # the lift that is called after three has arrived by then
 
@@ -29,6 +31,7 @@ async def digests(hash_seed: str, *worlds: str) -> list[list[bytes]]:
     return [line.split() for line in output.splitlines()]
 
 
+@pytest.mark.slow
 async def test_processes_sense_the_same_other_seeds_differ():
     long = f"7:{SECONDS}"
     (first, other), (second,) = await asyncio.gather(digests("1", long, "8:1"), digests("2", long))

@@ -244,6 +244,7 @@ async def test_exposed_database_is_logged(
     assert postgresql.EXPOSED in caplog.messages
 
 
+@pytest.mark.slow
 @needs_postgresql
 async def test_clients_see_no_host_of_the_database(
     db_server: PostgreSQLServer, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
@@ -280,6 +281,7 @@ async def test_a_robot_is_served_once(
     open_database(tmp_path / "unused", db_server.url, ["b", "c"]).close()
 
 
+@pytest.mark.slow
 @needs_postgresql
 async def test_start_waits_for_a_dying_programs_robots(
     db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

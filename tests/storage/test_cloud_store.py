@@ -75,6 +75,7 @@ async def test_many_at_once_lose_nothing(store: CloudStore) -> None:
     assert sorted(int(document) for _, document in await store.records("one", 100)) == list(range(60))
 
 
+@pytest.mark.slow
 @needs_postgresql
 async def test_a_restart_of_the_server_is_survived(db_server: PostgreSQLServer) -> None:
     database = PostgreSQL(db_server.url)

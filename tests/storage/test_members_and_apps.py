@@ -125,6 +125,7 @@ async def test_apps_that_are_refused(database: Database) -> None:
         await apps.install("one more", "1", io.BytesIO(b"x"))
 
 
+@pytest.mark.slow
 async def test_firmware_history_and_switches_survive(database: Database) -> None:
     clock = LockstepClock()
     robot = robot_of(database, clock)

@@ -166,6 +166,7 @@ async def test_robots_are_taken_at_once_all_or_none(database: Transactions, watc
     assert watch.now == began
 
 
+@pytest.mark.slow
 @needs_postgresql
 async def test_robots_stand_while_the_server_is_away(db_server: PostgreSQLServer, watch: Watch) -> None:
     database, lost = open_database(Path(), db_server.url), list[str]()

@@ -45,6 +45,7 @@ def test_job_starts_and_drives_a_robot_keeping_events(tmp_path: Path) -> None:
     assert (tmp_path / "ci/artifacts/log.txt").exists()
 
 
+@pytest.mark.slow
 def test_job_fails_with_the_reason_of_its_robot(tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="nowhere"):
         robot(tmp_path, "up", ARGUMENTS="--world nowhere")

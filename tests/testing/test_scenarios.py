@@ -93,6 +93,7 @@ then: [{refused: 0}]
 BROKEN = "name: no such world\ngiven: {world: nowhere}\nwhen: []\nthen: [{refused: 0}]\n"
 
 
+@pytest.mark.slow
 def test_scenarios_are_played_and_reported(tmp_path: Path) -> None:
     folder = tmp_path / "scenarios"
     folder.mkdir()

@@ -123,6 +123,7 @@ class TestCase(RobotTestCase):
 """
 
 
+@pytest.mark.slow
 def test_failed_tests_leave_recording_map_and_exchanges(tmp_path: Path) -> None:
     done = run_pytest(tmp_path, FAILING, "--junitxml", "junit.xml", "--roboglot-failures", "left")
     assert "2 failed, 1 passed" in done.stdout, done.stdout + done.stderr
@@ -141,6 +142,7 @@ def test_failed_tests_leave_recording_map_and_exchanges(tmp_path: Path) -> None:
     assert sorted(entry.attrib["value"] for entry in properties) == files
 
 
+@pytest.mark.slow
 def test_wrong_words_in_a_marker_are_errors(tmp_path: Path) -> None:
     tests = "def test_it(robot_server): pass\n@pytest.mark.world(robots=())\ndef test_robots(robot_server): pass\n"
     done = run_pytest(tmp_path, f"import pytest\n@pytest.mark.world(sede=1)\n{tests}")

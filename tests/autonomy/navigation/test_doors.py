@@ -22,6 +22,7 @@ WIDE = str(Path(__file__).parents[1] / "worlds" / "wide_door.toml")
 PERSON = (0.4, 0.4, 1.7)
 
 
+@pytest.mark.slow
 @pytest.mark.world(NARROW)
 async def test_robot_leaves_by_the_door_it_entered(tour: Tour) -> None:
     await tour.clock.advance(1.5)
@@ -56,6 +57,7 @@ async def test_too_narrow_gap_ends_drive_and_is_reported(tour: Tour) -> None:
     assert tour.clock.time() - begun < 45.0
 
 
+@pytest.mark.slow
 @pytest.mark.world(NARROW)
 async def test_gets_out_where_it_was_steered_by_hand(tour: Tour) -> None:
     tour.robot[Driving].drive(Twist(x=0.3), lifetime=19.0)
@@ -75,6 +77,7 @@ async def test_too_wide_robot_reports_the_door_width(tour: Tour) -> None:
     assert 0.45 <= width <= 0.64
 
 
+@pytest.mark.slow
 @pytest.mark.world(WIDE)
 async def test_person_in_the_only_door_is_waited_for(tour: Tour) -> None:
     person = tour.world.stage.add_obstacle(Pose(4.0, 3.0, 0.0), PERSON)
@@ -110,6 +113,7 @@ async def test_goal_off_the_map_is_refused_at_once(tour: Tour) -> None:
     assert tour.clock.time() - begun < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.world("office", body="cyberdog2")
 async def test_goal_in_wall_met_on_way_is_unreachable(tour: Tour) -> None:
     await tour.clock.advance(2.0)
@@ -137,6 +141,7 @@ async def test_a_search_through_unknown_floor_is_bounded(tour: Tour) -> None:
     assert "driving" in stages
 
 
+@pytest.mark.slow
 @pytest.mark.world("office", body="hermes")
 async def test_waits_for_a_known_way_that_closes_briefly(tour: Tour) -> None:
     """Rather than looking for a way through rooms that it never saw: robots in a corridor close it all the time."""

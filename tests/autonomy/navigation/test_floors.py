@@ -113,6 +113,7 @@ async def test_unreadable_or_unwritable_floor_on_disk_is_reported(tour: Tour, ca
     assert await storage.take(1) is None
 
 
+@pytest.mark.slow
 async def test_a_lift_out_of_service_is_not_boarded(tour: Tour) -> None:
     say_where_the_lift_is(tour)
     known(tour.world.building.lift).take_out_of_service(True)
@@ -130,6 +131,7 @@ async def leave_the_lift(tour: Tour) -> Action:
     return action
 
 
+@pytest.mark.slow
 async def test_ride_succeeds_outside_a_lift_that_has_failed(tour: Tour) -> None:
     action = await leave_the_lift(tour)
     await tour.until(lambda: tour.truth.x > 2.2)
@@ -302,6 +304,7 @@ async def test_ride_begins_where_the_car_stopped(
     assert (aboard.current, len(maps)) == (2, 2)  # first the floor of the stop, then the ride's
 
 
+@pytest.mark.slow
 async def test_covered_lidar_is_no_free_way(tour: Tour) -> None:
     """A covered lidar measures nothing, which was taken for an empty door."""
     action, lidar = await leave_the_lift(tour), tour.robot[Lidar]

@@ -118,6 +118,7 @@ def _milestones(action: Action) -> int:
     return len(action.feedback.milestones) if isinstance(action.feedback, NavigationFeedback) else -1
 
 
+@pytest.mark.slow
 @pytest.mark.world("tests/autonomy/worlds/corridor.toml")
 async def test_second_try_continues_at_the_next_goal(tour: Tour) -> None:
     action = tour.head_for((3.0, 1.2), (8.5, 1.2), retries=3)
@@ -145,6 +146,7 @@ async def test_goal_on_way_that_is_walled_in_fails(tour: Tour) -> None:
     assert isinstance(action.error, Blocked), (action.reason, track)
 
 
+@pytest.mark.slow
 @pytest.mark.world("office", body="hermes")
 async def test_a_middle_goal_at_the_dock_itself(tour: Tour) -> None:
     wanted = [Point(1.0, 0.0), Point(0.0, 0.0), Point(1.0, 0.3)]

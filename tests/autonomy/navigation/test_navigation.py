@@ -50,6 +50,7 @@ async def test_goals_are_reached_with_other_luck_too(tour: Tour) -> None:
     await visits_three_places(tour)
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty")
 async def test_several_goals_in_turn_are_all_passed(tour: Tour) -> None:
     spots = [(3.0, 5.0), (5.0, 7.0), (7.0, 5.0), (5.0, 3.0)]
@@ -97,6 +98,7 @@ async def test_brakes_before_new_obstacle_and_drives_around_it(tour: Tour) -> No
     assert tour.blocks[0].action is action
 
 
+@pytest.mark.slow
 @pytest.mark.world(CORRIDOR)
 async def test_waits_where_there_is_no_way_around(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2))
@@ -125,6 +127,7 @@ async def test_it_gives_up_after_half_a_minute(tour: Tour) -> None:
     assert not tour.bumps
 
 
+@pytest.mark.slow
 @pytest.mark.world(CORRIDOR)
 async def test_does_not_press_long_against_an_unseen_obstacle(tour: Tour) -> None:
     tour.world.stage.add_obstacle(Pose(5.0, 1.2, 0.0), (0.3, 2.3, 0.2))
@@ -139,6 +142,7 @@ async def test_does_not_press_long_against_an_unseen_obstacle(tour: Tour) -> Non
     assert tour.clock.time() - touched < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty", body="hermes")
 async def test_robot_leaves_what_only_its_bumper_feels(tour: Tour) -> None:
     box, goal = tour.start.compose(Pose(1.5, -0.52)), tour.start.compose(Pose(4.0, 0.0))
@@ -165,6 +169,7 @@ async def test_cancel_stops_within_the_braking_distance(tour: Tour) -> None:
     assert tour.truth.distance_to(after) < 0.002
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty")
 async def test_pause_holds_and_resume_goes_on(tour: Tour) -> None:
     action = tour.head_for((8.5, 5.0))
@@ -226,6 +231,7 @@ async def test_retries_try_again(tour: Tour) -> None:
     assert action.status is ActionStatus.SUCCEEDED, action.reason
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty")
 async def test_lost_robot_stops_and_goes_on_when_found(tour: Tour) -> None:
     await tour.clock.advance(3.0)

@@ -138,6 +138,7 @@ async def test_free_navigation_ignores_tracks(tour: Tour) -> None:
     assert max(abs(pose.y - 5.0) for pose in places) < 1.0
 
 
+@pytest.mark.slow
 async def test_waits_on_strict_tracks_reporting_after_three_minutes(
     tour: Tour, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -51,6 +51,7 @@ def test_a_map_that_is_too_large_is_refused(shape: tuple[int, int]) -> None:
         evidence_of(OccupancyGrid(cells, 0.05, Point()))
 
 
+@pytest.mark.slow
 async def test_loaded_map_is_driven_on_as_the_original(tour: Tour) -> None:
     await tour.go((22.5, 10.0))
     mapping, localization = tour.robot[Mapping], tour.robot[Localization]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
 
+@pytest.mark.slow
 @pytest.mark.world("office", seed=5)
 async def test_office_tour_keeps_within_3_cm_1_degree(tour: Tour) -> None:
     errors = []
@@ -130,6 +131,7 @@ async def test_without_correction_the_pose_is_odometry(tour: Tour) -> None:
     assert tour.error[0] < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty")
 async def test_spinning_wheels_do_not_carry_the_pose_away(tour: Tour) -> None:
     await tour.go((7.0, 5.0))

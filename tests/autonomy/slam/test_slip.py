@@ -18,6 +18,7 @@ from tests.autonomy.slam.test_loops import RING, short_sighted
 from tests.masking import mask_bumper
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("held", [True, False])
 async def test_pressing_against_hidden_obstacle_counts_as_no_motion(tmp_path: Path, held: bool) -> None:
     clock, database = LockstepClock(), Database(":memory:")

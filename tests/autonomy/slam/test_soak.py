@@ -71,6 +71,7 @@ async def test_ended_actions_keep_nothing(tour: Tour) -> None:
     assert sizes[-1] <= settled * GROWTH_MAX
 
 
+@pytest.mark.slow
 async def test_errors_asked_for_again_and_again_keep_nothing(tour: Tour) -> None:
     action = await tour.go((20.0, 5.0))
     for _ in range(5):

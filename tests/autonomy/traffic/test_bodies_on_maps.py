@@ -48,6 +48,7 @@ def test_given_floor_keeps_its_place_while_map_grows() -> None:
     assert ((grid.evidence < 0) == grid.given).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("body", "painted"), [("universal", False), ("cyberdog2", True)])
 async def test_announced_robots_are_not_mapped(body: str, painted: bool) -> None:
     """A dog has no radio: the map has it, as a piece of furniture."""

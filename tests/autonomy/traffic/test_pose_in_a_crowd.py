@@ -49,6 +49,7 @@ def announce_from(robot: Robot, poses: Sequence[Pose], clock: LockstepClock, pat
     patch.setattr(radio, "heard", heard)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("announced", "carried", "lost"),
     [
@@ -80,6 +81,7 @@ async def test_only_what_is_unknown_contradicts_a_pose(
             assert robot[Localization].pose.distance_to(HALL) < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.asyncio(loop_scope="module")
 async def test_map_loaded_in_a_crowd_is_confirmed(building: OccupancyGrid, monkeypatch: pytest.MonkeyPatch) -> None:
     """Announcements count while the robot itself is in doubt, and says nothing."""

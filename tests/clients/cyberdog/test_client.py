@@ -126,6 +126,7 @@ def asked(client: CyberDogClient, monkeypatch) -> set[int]:
     return codes
 
 
+@pytest.mark.slow
 async def test_every_code_of_the_contract_once(client, door: CyberDogDoor, robot, world, asked: set[int]) -> None:
     world.stage.place("a", Pose(9.0, 6.0))
     gadget = world.gadgets.get(BRACELET.mac)

@@ -116,6 +116,7 @@ async def test_two_robots_share_push_port_and_are_distinguished() -> None:
     PushPort("127.0.0.1", number).attach("127.0.0.31", partial(note, 31))()
 
 
+@pytest.mark.slow
 async def test_pictures(client, run, robot) -> None:
     await run(client.stream.on())
     units = client.video()
@@ -143,6 +144,7 @@ async def test_sound(client, run, forward) -> None:
     await packets.aclose()
 
 
+@pytest.mark.slow
 async def test_a_robot_that_no_one_holds_is_found(door, robot, run) -> None:
     port = door._config.broadcast_port
     assert await run(discover(30, first=True, clock=robot.clock, port=port)) == [ADDRESS]

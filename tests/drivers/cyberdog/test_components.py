@@ -103,6 +103,7 @@ async def test_its_pictures_and_photos_are_what_dog_sees(driven: Robot, robot: R
         camera.set_exposure(1.0)
 
 
+@pytest.mark.slow
 async def test_battery_motors_network_and_power_are_reported(driven: Robot, robot: Robot) -> None:
     near, far = driven[Battery].state, robot[Battery].state
     assert (near.voltage, near.capacity) == pytest.approx((far.voltage, far.capacity), rel=0.02)

@@ -119,6 +119,7 @@ async def test_it_drives_an_asymmetric_path(driven: Robot, until: Until, world: 
     assert_pose(driven[Localization].pose, x=here.x, y=here.y, deg=math.degrees(here.yaw), within=0.05, within_deg=2)
 
 
+@pytest.mark.slow
 @pytest.mark.world("stairs", body="cyberdog2")
 async def test_it_stands_square_before_stairs(
     driven: Robot, robot: Robot, until: Until, forward: Forward, world: World
@@ -146,6 +147,7 @@ async def test_it_stands_square_before_stairs(
     assert world.truth.pose_of("a").x < 3.44
 
 
+@pytest.mark.slow
 async def test_a_script_in_front_drives_and_stops_it(
     driven: Robot, robot: Robot, text_door: Open, until: Until, forward: Forward, world: World
 ) -> None:
@@ -203,6 +205,7 @@ async def test_own_skills_keep_no_lower_limit(driven: Robot, robot: Robot, until
     limits.set(speed=0.2)
 
 
+@pytest.mark.slow
 async def test_postures_figures_and_gaits_are_the_dogs(driven: Robot, robot: Robot, until: Until, world: World) -> None:
     await done(driven[Legs].lie_down(source="test"), until)
     assert robot[Legs].posture is Posture.LYING
@@ -256,6 +259,7 @@ async def test_follows_and_docks_by_own_skills_when_localized(
     await until(lambda: docking.status.ended)
 
 
+@pytest.mark.slow
 async def test_unowned_task_is_stopped_when_the_link_returns(
     driven: Robot, robot: Robot, until: Until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -282,6 +286,7 @@ async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     assert set(driven.interfaces) - kept_here == APPROXIMATIONS.keys()
 
 
+@pytest.mark.slow
 async def test_drivers_tap_equals_the_dogs_tap(driven: Robot, robot: Robot, until: Until) -> None:
     here: list[Exchange] = []
     there: list[Exchange] = []

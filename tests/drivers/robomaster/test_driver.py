@@ -64,6 +64,7 @@ async def test_rest_drives_an_asymmetric_path(driven_ep: Robot, rest: OpenRest, 
     assert (reported.x, reported.y, reported.yaw) == pytest.approx((here.x, here.y, here.yaw), abs=0.01)
 
 
+@pytest.mark.slow
 async def test_square_and_side_step_end_where_they_should(driven_ep: Robot, world: World, forward: Forward) -> None:
     start = world.truth.pose_of("a")
 
@@ -81,6 +82,7 @@ async def test_square_and_side_step_end_where_they_should(driven_ep: Robot, worl
     assert_pose(world.truth.pose_of("a").relative_to(start), x=0.2, y=0.4, deg=math.degrees(0.5))
 
 
+@pytest.mark.slow
 async def test_drifting_attitude_at_rest_bends_no_way(
     driven_ep: Robot, robot: Robot, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch
 ) -> None:

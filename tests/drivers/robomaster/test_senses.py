@@ -77,6 +77,7 @@ async def test_sensor_adapters_report_volts_levels_and_periods(
         adapters.voltage(7, 1)
 
 
+@pytest.mark.slow
 async def test_its_microphone_and_applause_reach_the_next_robot(
     driven_ep: Robot, world: World, until: Until, forward: Forward
 ) -> None:

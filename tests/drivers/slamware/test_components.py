@@ -38,6 +38,7 @@ async def ended(action: Action, until: Until) -> ActionStatus:
     return action.status
 
 
+@pytest.mark.slow
 async def test_boxes_open_close_and_report_their_contents(driven: Robot, robot: Robot, until: Until) -> None:
     far, near = robot[Cargo], driven[Cargo]
     assert isinstance(far, SimulatedCargo)
@@ -140,6 +141,7 @@ async def test_emergency_stop_holds_and_reaches_every_door(
     await until(lambda: driven[EmergencyStop].engaged, patience=1)
 
 
+@pytest.mark.slow
 async def test_it_sleeps_and_wakes(driven: Robot, robot: Robot, until: Until) -> None:
     assert await ended(driven[Power].sleep(source="test"), until) is ActionStatus.SUCCEEDED
     assert (robot[Power].mode, driven[Power].mode) == (PowerMode.ASLEEP, PowerMode.ASLEEP)
@@ -149,6 +151,7 @@ async def test_it_sleeps_and_wakes(driven: Robot, robot: Robot, until: Until) ->
         driven[Power].save()
 
 
+@pytest.mark.slow
 @pytest.mark.world("office", body="hermes")
 async def test_its_network_is_reported_and_set(driven: Robot, robot: Robot, until: Until) -> None:
     near, far = driven[Network], robot[Network]

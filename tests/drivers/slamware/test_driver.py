@@ -115,6 +115,7 @@ async def test_a_script_that_hangs_up_stops_the_robot(
     assert driven.actions.running() == []
 
 
+@pytest.mark.slow
 async def test_arc_is_driven_in_turns_with_its_mean(driven: Robot, world: World, forward: Forward) -> None:
     start = world.truth.pose_of("a")
     action = driven[Driving].drive(Twist(x=0.2, yaw=0.3), source="test")
@@ -139,6 +140,7 @@ async def test_the_robots_speed_limit_is_put_back(driven: Robot, slamware_door: 
         assert await other.get_system_parameter("base.max_moving_speed") == before
 
 
+@pytest.mark.slow
 async def test_lower_limit_of_client_holds_for_robot(driven: Robot, robot: Robot, forward: Forward) -> None:
     base = driven[Base]
     assert robot[Base].limits.twist.x > 0.5
@@ -203,6 +205,7 @@ async def test_it_navigates_by_the_robots_own_skill(driven: Robot, world: World,
     assert_pose(world.truth.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=math.degrees(-1.0))
 
 
+@pytest.mark.slow
 async def test_navigation_fails_in_model_words_stops_when_cancelled(
     driven: Robot, world: World, forward: Forward
 ) -> None:
@@ -219,6 +222,7 @@ async def test_navigation_fails_in_model_words_stops_when_cancelled(
     assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
+@pytest.mark.slow
 async def test_a_paused_way_goes_on(driven: Robot, world: World, forward: Forward) -> None:
     action = driven[Navigation].navigate_to([Point(1.5, 0.0)], NavigationOptions(), source="test")
     await forward(seconds=2)
@@ -249,6 +253,7 @@ async def test_readings_are_in_the_models_units(driven: Robot, robot: Robot, for
     assert driven[Link].age("battery") <= 1.0
 
 
+@pytest.mark.slow
 async def test_lease_names_the_client_that_moves_it(
     driven: Robot, slamware_door: SlamwareDoor, forward: Forward
 ) -> None:

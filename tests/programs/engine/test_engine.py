@@ -106,6 +106,7 @@ async def test_close_ends_though_the_zygote_is_silent(monkeypatch: pytest.Monkey
     assert process_state(run.pid) in {"", "Z"}  # Z: its new parent has not waited for it yet
 
 
+@pytest.mark.slow
 async def test_start_that_is_given_up_leaves_no_process() -> None:
     others = children_of(os.getpid())
     async with Engine() as engine:
@@ -218,6 +219,7 @@ async def test_workers_die_with_the_server() -> None:
         await until(partial(lambda pid: process_state(pid) in {"", "Z"}, pid))
 
 
+@pytest.mark.slow
 async def test_many_programs_at_once() -> None:
     async with Engine() as engine:
         played = await asyncio.gather(*(play(engine, f"print(cyberdog.echo({i}) + 1)") for i in range(60)))

@@ -92,6 +92,7 @@ async def test_large_arguments_are_slowed_down_too(engine: Engine) -> None:
     assert loop.time() - before >= 1.6 / 2.1 - 0.11  # MB, MB a second, and the burst
 
 
+@pytest.mark.slow
 async def test_too_many_values_are_refused_in_the_program(engine: Engine) -> None:
     source = """
 try:
@@ -179,6 +180,7 @@ class Ledger:
         self.first, self.more = Cost(), Cost()
 
 
+@pytest.mark.slow
 async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     """The server's thread keeps most of its time for others, no matter what programs send.
 
@@ -250,6 +252,7 @@ async def test_thousands_of_outputs_arrive_whole_and_joined(engine: Engine) -> N
     assert len(texts) < 2500
 
 
+@pytest.mark.slow
 async def test_a_slow_reader_makes_the_program_wait(engine: Engine) -> None:
     """Nothing piles up in the server: the socket fills and the program blocks in print."""
     run = await engine.start(

@@ -100,6 +100,7 @@ async def test_examples_of_motions(player: Player, part: int, monkeypatch: pytes
         await player.play(name, EXAMPLES[name])
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty", body="cyberdog2")
 @pytest.mark.parametrize("part", HALVES)
 async def test_examples_of_what_needs_no_one(player: Player, part: int) -> None:
@@ -110,6 +111,7 @@ async def test_examples_of_what_needs_no_one(player: Player, part: int) -> None:
         await player.play(name, EXAMPLES[name])
 
 
+@pytest.mark.slow
 @pytest.mark.world("playground", body="cyberdog2")
 @pytest.mark.parametrize("part", HALVES)
 async def test_examples_with_people(player: Player, world: World, part: int) -> None:

@@ -123,6 +123,7 @@ async def test_map_of_earlier_life_is_loaded_and_found(home: Caller, world: Worl
     assert localization.pose.distance_to(pose) < 0.1
 
 
+@pytest.mark.slow
 async def test_lost_robot_is_helped(home: Caller, monkeypatch: pytest.MonkeyPatch) -> None:
     localization, known = home.robot[Localization], []
     find = localization.relocalize

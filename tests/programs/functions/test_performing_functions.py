@@ -26,6 +26,7 @@ async def off_the_dock(caller: Caller) -> None:
     await caller.clock.advance(1.5)
 
 
+@pytest.mark.slow
 async def test_every_motion_of_the_table_is_performed(caller: Caller) -> None:
     legs = caller.robot[Legs]
     await off_the_dock(caller)

@@ -79,6 +79,7 @@ async def test_no_gesture_in_time_is_no_failure(caller: Caller, anna: Actor) -> 
     assert caller.robot[Vision].gestures.latest is None
 
 
+@pytest.mark.slow
 async def test_recognition_ends_by_itself(caller: Caller, anna: Actor) -> None:
     await caller("cyberdog.gesture.turn_on_recognition", 30)
     await caller.clock.advance(31.0)
@@ -170,6 +171,7 @@ async def test_counting_ends_when_asked_and_with_the_program(caller: Caller, ann
 # -- people ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 async def test_members_are_known_by_their_faces(caller: Caller, world: World, anna: Actor) -> None:
     members = caller.robot[Members]
     assert field(await caller("cyberdog.personnel.face_recognized", []), "state.code") == 1  # no face is known

@@ -157,6 +157,7 @@ def refused() -> list[tuple[Record, str]]:
     ]
 
 
+@pytest.mark.slow
 async def test_invalid_sequences_move_nothing(caller: Caller) -> None:
     for made, words in refused():
         result = await caller("cyberdog.motion.run_sequence", made)

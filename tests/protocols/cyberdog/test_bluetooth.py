@@ -103,6 +103,7 @@ async def test_absent_devices_cannot_be_connected(client, robot, gadget, forward
     assert await client.ask(8009) == {"success": False, "message": "no device is connected"}
 
 
+@pytest.mark.slow
 async def test_lost_and_found_and_its_update(client, app: App, robot, gadget, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: app.connected)
@@ -163,6 +164,7 @@ async def test_the_remote_control_s_gear(client, app, robot, gadget, passing, fo
     assert await client.ask(8013) == {"data": 2}
 
 
+@pytest.mark.slow
 async def test_anyone_who_wears_the_bracelet_is_followed(client, robot, world, gadget, passing, forward) -> None:
     none = Stream(client, 6004, {"type": 11})
     await passing(lambda: none.ended)

@@ -30,6 +30,7 @@ async def asked(client, clock: LockstepClock, code: int, **params: Any) -> Any:
     return await answer
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty", body="cyberdog2")
 async def test_words(client, world: World, clock: LockstepClock, forward: Forward) -> None:
     await forward(seconds=0.5)

@@ -150,6 +150,7 @@ async def test_push_to_a_lost_app_spares_later_ones(afar: Afar, robot: Robot) ->
     await afar.passing(lambda: afar.app.of(4005))
 
 
+@pytest.mark.slow
 async def test_silence_during_an_update(afar: Afar, robot: Robot) -> None:
     assert await afar.ask(5003, {"modules": [SMALL]}) == {"response": True, "code": 0}
     await afar.fall_silent()

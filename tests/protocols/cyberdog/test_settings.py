@@ -111,6 +111,7 @@ async def test_profile_of_real_robots_uses_their_wording(robot, data, pems, mess
     await door.close()
 
 
+@pytest.mark.slow
 async def test_enabled_wake_word_makes_it_listen_once(client, robot, anna, forward) -> None:
     anna.say(DEFAULT * 2 + "坐下")
     await forward(seconds=8)
@@ -187,6 +188,7 @@ async def test_a_voice_in_training_keeps_its_member(client, app, robot, anna, pa
     assert app.of(3013)[2] == {"code": 5001, "voiceprint_id": "v3"}
 
 
+@pytest.mark.slow
 async def test_voice_board_is_activated_by_token_that_holds(client, app, robot, forward, passing) -> None:
     asked = await client.ask(3001)
     assert asked.keys() == {"did", "sn"}

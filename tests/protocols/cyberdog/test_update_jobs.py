@@ -33,6 +33,7 @@ def work(client: Client, passing: PassTime) -> Callable[..., Awaitable[list[dict
     return run
 
 
+@pytest.mark.slow
 async def test_from_what_is_offered_to_what_runs(client, work, robot, forward, app, passing) -> None:
     firmware, gone = robot[Firmware], list[Rebooting]()
     robot.events.listen(Rebooting, gone.append)
@@ -93,6 +94,7 @@ async def test_download_is_discarded_and_reset_abandons_another(client, work, ro
     assert (robot[Disk].free, robot[Firmware].progress.state) == (free, FirmwareState.IDLE)
 
 
+@pytest.mark.slow
 async def test_goals_that_cannot_be_reached(client, work, robot) -> None:
     for wrong in ({}, {"operate": "format"}, {"operate": ["disk"]}, {"operate": "_run"}, "[]"):
         assert await client.ask(5010, wrong) == {"accepted": 2}

@@ -62,6 +62,7 @@ async def test_an_empty_battery_keeps_it_in_low_power(client, robot, forward) ->
     assert await answered(client, 10002, {}, forward) == {"success": False}
 
 
+@pytest.mark.slow
 async def test_lying_leads_to_low_power_if_enabled(client, app, robot, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: app.connected)  # the first app makes the dog stand up
@@ -83,6 +84,7 @@ async def test_calibration_releases_motors_and_powers_them_again(client, robot, 
     assert robot[Legs].posture is Posture.STANDING
 
 
+@pytest.mark.slow
 async def test_a_reboot_comes_after_the_answer(client, robot, forward) -> None:
     events: list[Any] = []
     for kind in (Rebooting, Rebooted):
@@ -105,6 +107,7 @@ async def test_it_switches_off_after_the_answer(client, robot, forward) -> None:
     assert (await client.ask(10001))["state_switch_status"]["state"] == 4
 
 
+@pytest.mark.slow
 async def test_an_update_from_download_to_reboot(client, app: App, robot, data, passing, forward, door) -> None:
     assert await client.ask(5001) == {"status": "idle", "code": 0}
     await passing(lambda: app.connected)

@@ -244,6 +244,7 @@ class Walk:
             assert off < OFF, f"{call} succeeded {off:.2f} m from its goal"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(1, 60))
 @pytest.mark.world("empty", body="cyberdog2")
 async def test_random_calls_end_at_rest(

@@ -126,6 +126,7 @@ def recorded(film: Path, topic: str, which: Callable[[int], bool] = lambda _: Tr
     return [(record.at, record.data) for record in read_messages(film, topic) if which(record.at)]
 
 
+@pytest.mark.slow
 async def test_says_what_there_is_and_begins(playing: Scene, film: Path) -> None:
     recording = await filmed(film)
     viewer = await playing.connect()

@@ -186,6 +186,7 @@ async def test_garbage_harms_no_one(client, connect) -> None:
     assert await client.ask("robot mode ?;") == "chassis_lead;"
 
 
+@pytest.mark.slow
 async def test_mutated_commands_get_one_answer_each(client, connect) -> None:
     """Every answer is one that the protocol knows, or numbers."""
     other = await connect()
@@ -213,6 +214,7 @@ async def test_a_megabyte_without_end_harms_no_one(client, connect) -> None:
     assert await other.ask("version;") == "version 00.00.00.70;"
 
 
+@pytest.mark.slow
 async def test_flood_behind_a_waiting_command_is_answered_whole(client, connect, door, robot, forward) -> None:
     client.send("chassis move x 1 wait_for_complete true;")
     await until(robot.actions.running)

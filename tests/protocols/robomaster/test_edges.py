@@ -145,6 +145,7 @@ async def play(client, robot, text: str) -> str:
     return await answer
 
 
+@pytest.mark.slow
 async def test_edges(client, robot) -> None:
     """Each from a fresh session, so that none depends on another."""
     wrong = {}

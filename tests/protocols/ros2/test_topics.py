@@ -75,6 +75,7 @@ async def test_stop_waits_for_no_other_client(opened: Opened) -> None:
     assert set(fairness.counted) == {"ros2 a:zenoh"}
 
 
+@pytest.mark.slow
 async def test_topics_come_with_the_robots_values(opened: Opened) -> None:
     scene = await opened()
     peer = scene.peer

@@ -108,6 +108,7 @@ async def test_the_jack(robot: Robot, client: httpx.AsyncClient, forward: Forwar
     assert (await client.post(jack, json="Sideways")).status_code == 400
 
 
+@pytest.mark.slow
 async def test_masks_and_depth(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     assert (await client.get(MASKS)).json() == []
     off = [{"id": 0, "isAlways": True, "isEnabled": False}, {"id": 1, "isAlways": False, "isEnabled": False}]
@@ -150,6 +151,7 @@ async def test_sleep_and_waking_up(robot: Robot, client: httpx.AsyncClient, forw
     assert await mode() == "awake"
 
 
+@pytest.mark.slow
 async def test_a_robot_that_is_off_does_not_answer(
     robot: Robot, door: SlamwareDoor, client: httpx.AsyncClient, forward: Forward
 ) -> None:

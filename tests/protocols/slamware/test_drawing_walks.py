@@ -223,6 +223,7 @@ async def shelf(clock: LockstepClock, tmp_path: Path) -> AsyncIterator[Shelf]:
     database.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(1, 8))
 async def test_requests_at_once_count_one_by_one(seed: int, shelf: Shelf) -> None:
     draw, diary, client = random.Random(seed), Diary(), shelf.client

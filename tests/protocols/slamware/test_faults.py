@@ -52,6 +52,7 @@ async def test_a_real_robot_that_is_not_reached(client: httpx.AsyncClient, robot
         assert health["hasSdpDisconnected"] == lost == bool(health["baseError"])
 
 
+@pytest.mark.slow
 @pytest.mark.world("office", body="hermes")
 async def test_a_robot_that_was_carried_off(
     client: httpx.AsyncClient, robot: Robot, world: World, forward: Forward

@@ -260,6 +260,7 @@ class Walk:
         await step()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(1, 40))
 @pytest.mark.world("empty", body="hermes")
 async def test_random_requests_end_at_rest(

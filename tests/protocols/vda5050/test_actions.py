@@ -129,6 +129,7 @@ async def test_message_to_stop_waits_for_no_other_client(yard: Opened) -> None:
     assert states(one)["s"][0] == "FINISHED"
 
 
+@pytest.mark.slow
 async def test_a_failed_action_waits_to_be_tried_again(yard: Opened) -> None:
     one = await yard(**robot_at(5.0, 5.0))
     made = here(action("pick", "p") | {"retriable": True})
@@ -146,6 +147,7 @@ async def test_a_failed_action_waits_to_be_tried_again(yard: Opened) -> None:
     assert "INVALID_INSTANT_ACTION" in one.control.errors
 
 
+@pytest.mark.slow
 async def test_object_is_found_and_a_mark_driven_to(yard: Opened) -> None:
     one = await yard(**robot_at(7.8, 4.2, "universal"))
     made = here(
@@ -223,6 +225,7 @@ async def test_wakes_up_by_itself_at_the_set_time(yard: Opened) -> None:
     assert states(one)["sleep"][0] == "FINISHED"
 
 
+@pytest.mark.slow
 async def test_earlier_wake_up_time_wakes_no_later_sleep(yard: Opened) -> None:
     one = await yard()
     control = one.control
@@ -242,6 +245,7 @@ async def test_earlier_wake_up_time_wakes_no_later_sleep(yard: Opened) -> None:
     assert connection() == "HIBERNATING"
 
 
+@pytest.mark.slow
 async def test_hibernation_ends_when_others_wake_the_robot(yard: Opened) -> None:
     one = await yard()
     control = one.control

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from roboglot.model.components.mapping.floors import Floors
 from roboglot.model.components.mapping.localization import Localization
@@ -91,6 +92,7 @@ async def test_no_map_is_changed_under_an_order(yard: Opened) -> None:
     assert (status, why) == ("FAILED", "order way is being driven in 'map'")
 
 
+@pytest.mark.slow
 async def test_map_without_the_robot_is_not_used(yard: Opened) -> None:
     one = await yard(**robot_at(5.0, 5.0))
     await keeping(one, "elsewhere", known=False)

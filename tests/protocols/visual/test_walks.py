@@ -97,6 +97,7 @@ class Walk:
             assert TaskState(said).alive == (id in runs and runs[id].alive), (id, said, runs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(1, 40))
 @pytest.mark.world("empty", body="cyberdog2")
 async def test_random_operations_end_at_rest(

@@ -345,6 +345,7 @@ async def started_printing(address: str) -> TextLink:
     return link
 
 
+@pytest.mark.slow
 async def test_program_waits_for_slow_reader_of_its_log(
     door: VisualDoor, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

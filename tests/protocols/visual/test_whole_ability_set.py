@@ -48,6 +48,7 @@ cyberdog.motion.go_straight(0.1, 0.3)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.world("playground", body="cyberdog2")
 async def test_a_show(connect: Connect, robot: Robot) -> None:
     app = await connect(robot)

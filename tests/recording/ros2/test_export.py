@@ -45,6 +45,7 @@ async def drive(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
     return path, x
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 async def test_a_bag_has_what_was_recorded(drive: tuple[Path, float], tmp_path: Path, storage: str) -> None:
     path, x = drive

@@ -35,6 +35,7 @@ async def carrier(simulate, tmp_path):
     return sim
 
 
+@pytest.mark.slow
 async def test_wall_stops_it_and_way_back_is_free(carrier):
     base, (shelf,) = carrier.robot[Base], carrier.world.building.shelves
     base.set_velocity(Twist(0.5))
@@ -49,6 +50,7 @@ async def test_wall_stops_it_and_way_back_is_free(carrier):
     assert carrier.pose.x < 6.5
 
 
+@pytest.mark.slow
 async def test_low_thing_stops_leg_and_passes_between_legs(carrier):
     base = carrier.robot[Base]
     base.set_velocity(Twist(yaw=0.5))

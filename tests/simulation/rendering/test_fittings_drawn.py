@@ -47,6 +47,7 @@ async def test_a_gimbal_turns(facing):
     assert (np.abs(await picture(facing) - before).max(axis=-1) > 40).sum() > 300
 
 
+@pytest.mark.slow
 async def test_beads_fly_through_the_picture(facing):
     facing.world.stage.place("b", Pose(6.0, 5.0, np.pi / 2))
     facing.world.stage.place("a", Pose(4.0, 5.3, 0.0))

@@ -37,6 +37,7 @@ async def test_tags_on_walls_docks_and_shelves():
         assert high - low == pytest.approx((box.width, box.height), rel=0.08)
 
 
+@pytest.mark.slow
 async def test_tags_that_hands_hang_up_and_move():
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(APRIL))
     with lab() as room:

@@ -124,6 +124,7 @@ def test_damaged_manifests(noise: bytes, at: int) -> None:
         return
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=200), st.integers(0, 600))
 def test_damaged_archives(noise: bytes, at: int) -> None:
     data = bytearray(archive(AndroidManifest__xml=manifest("com.example", "1")))

@@ -66,6 +66,7 @@ async def test_large_files_come_in_chunks(client, robot, folder, monkeypatch) ->
     assert Image.open(io.BytesIO(whole)).format == "JPEG"
 
 
+@pytest.mark.slow
 async def test_a_recording_is_an_mp4_of_its_length(client, robot, forward, folder, passing) -> None:
     assert await client.ask(4002, {"command": 2}) == {"result": 0}
     assert await client.ask(4002, {"command": 2}) == {"result": 4}
@@ -192,6 +193,7 @@ class Stalling:
                 await writer.drain()
 
 
+@pytest.mark.slow
 async def test_lost_app_ends_the_recording_and_keeps_it(client, app, robot, folder, passing, forward) -> None:
     robot[Camera].rate = 5.0  # six seconds of film in a sixth of the pictures
     await client.ask(4002, {"command": 2})

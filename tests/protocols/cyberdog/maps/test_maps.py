@@ -110,6 +110,7 @@ async def test_in_map_of_earlier_life_robot_is_searched(client, door, robot, wor
     assert believed.distance_to(there) < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.world("playground")
 async def test_the_dock_goes_with_the_map(client, door, robot, world, forward, passing: Passing) -> None:
     stream = Stream(client, 6004, {"type": 5})

@@ -105,6 +105,7 @@ async def shelf(
     database.close()
 
 
+@pytest.mark.slow
 async def test_map_changes_at_once_count_one_by_one(shelf: Shelf) -> None:
     changes = (
         shelf.deleted(0, "bed"),

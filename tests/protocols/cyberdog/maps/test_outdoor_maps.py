@@ -27,6 +27,7 @@ async def made(client: Client, robot, forward, passing, name: str) -> None:
     assert stream.answers[-1] == {"result": 0}
 
 
+@pytest.mark.slow
 async def test_from_the_map_to_the_goal(client: Client, robot, world, forward, passing, monkeypatch) -> None:
     world.stage.place("a", Pose(16.0, 10.0, 1.0))
     await made(client, robot, forward, passing, "yard")
@@ -74,6 +75,7 @@ async def test_from_the_map_to_the_goal(client: Client, robot, world, forward, p
     assert await state(client) == 101
 
 
+@pytest.mark.slow
 async def test_satellites_that_see_the_robot_elsewhere_confirm_nothing(
     client: Client, robot, world, forward, passing, monkeypatch
 ) -> None:

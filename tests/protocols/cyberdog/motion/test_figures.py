@@ -150,6 +150,7 @@ async def test_servo_frames_choose_gait_pose_and_the_lift(client, robot, forward
     assert (await client.ask(10001))["motion_status"]["motion_id"] == 305
 
 
+@pytest.mark.slow
 async def test_getting_up_for_a_servo_is_reported(client, app: App, robot, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: app.connected)

@@ -12,6 +12,7 @@ from tests.protocols.cyberdog.phone import App, Client, Stream, state, until
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
 
+@pytest.mark.slow
 async def test_the_person_chosen_is_followed(client: Client, app: App, robot, world, anna, passing, forward) -> None:
     nowhere = {"x_offset": 0, "y_offset": 0, "height": 10, "width": 10}
     assert await client.ask(6008, {"roi": nowhere}) == {"success": False}  # no task
@@ -66,6 +67,7 @@ async def test_choice_is_optional_but_side_must_be_known(client, app, robot, ann
     assert stream.answers[-1] == {"result": 5}
 
 
+@pytest.mark.slow
 async def test_thing_in_picture_is_followed_wherever_it_goes(
     client: Client, app: App, robot, world, anna, passing, forward
 ) -> None:

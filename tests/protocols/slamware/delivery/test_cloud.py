@@ -78,6 +78,7 @@ async def test_voice_packages(client: httpx.AsyncClient, world: World, forward: 
     assert (away["result"], away["msg"]) == (False, "the cloud is out of reach")
 
 
+@pytest.mark.slow
 async def test_a_task_of_a_cabinet(screen: Screen, robot: Robot, cloud: Path) -> None:
     await screen.prepare(cabinet=(1.5, 0.0, ""), R101=(3.0, 0.0, "ROOM"))
     await screen.client.put(f"{API}/admin/mode", json={"work_mode": "DISPATCH"})  # orders come only from the cloud
@@ -181,6 +182,7 @@ async def test_impossible_and_unknown_tasks_are_refused(
     assert Power in robot
 
 
+@pytest.mark.slow
 async def test_no_task_comes_without_internet(screen: Screen, world: World, cloud: Path) -> None:
     await screen.prepare(R101=(2.0, 0.0, "ROOM"))
     await screen.client.put("/api/core/system/v1/network/apn", json={"apn": "nonsense"})

@@ -82,6 +82,7 @@ async def test_unclaimed_parcel_goes_back_to_reception(screen: Screen, robot: Ro
     assert "COLLECT_NO_PICKUP" in await screen.events()
 
 
+@pytest.mark.slow
 async def test_people_at_the_screen_hold_the_robot(screen: Screen) -> None:
     await screen.prepare(R101=(3.0, 0.0, "ROOM"))
     execution = {"enable_task_execution": False}

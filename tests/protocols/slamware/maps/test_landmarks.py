@@ -37,6 +37,7 @@ async def go(client: httpx.AsyncClient, forward: Forward, goal: Pose) -> None:
     raise AssertionError("it did not arrive")
 
 
+@pytest.mark.slow
 @pytest.mark.world(STRIPS)
 async def test_found_switched_off_and_set(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward

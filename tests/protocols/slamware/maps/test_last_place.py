@@ -102,6 +102,7 @@ async def test_robot_continues_at_its_place(stored: Database) -> None:
         assert run.robot[Localization].pose.distance_to(run.truth) < 0.05
 
 
+@pytest.mark.slow
 async def test_robot_in_the_car_is_on_its_floor() -> None:
     """The car has brought it there while it was off; the robot was switched off on the first floor."""
     database, in_the_car = Database(":memory:"), StartConfig(x=1.0, y=10.0, yaw=math.pi, floor=0)
@@ -121,6 +122,7 @@ async def test_robot_on_its_dock_is_on_start_floor(stored: Database) -> None:
         assert run.robot[Localization].pose.distance_to(run.truth) < 0.05
 
 
+@pytest.mark.slow
 async def test_robot_on_another_floor_is_lost(stored: Database) -> None:
     async with running(stored, StartConfig(x=12.0, y=6.5, yaw=0.0, floor=0)) as run:
         await run.clock.advance(3.0)

@@ -311,6 +311,7 @@ async def test_a_cleared_map_is_forgotten_in_memory_only(
     assert len((await client.get(f"{ARTIFACT}/lines/walls")).json()) == 2
 
 
+@pytest.mark.slow
 async def test_a_restart_loses_what_memory_alone_holds(
     robot: Robot, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:

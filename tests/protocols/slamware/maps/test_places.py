@@ -65,6 +65,7 @@ async def test_places_are_ordered_by_the_ways_between_them(client: httpx.AsyncCl
     assert (await client.post(dispatch, json=["a", "far"])).status_code == 400  # off the known map
 
 
+@pytest.mark.slow
 @pytest.mark.world("empty")
 async def test_hundreds_of_places_are_ordered_within_a_second(
     robot: Robot, client: httpx.AsyncClient, forward: Forward

@@ -109,6 +109,7 @@ async def test_board_that_the_lidar_knows_by_its_shape(
     assert world.truth.pose_of("a").y == pytest.approx(1.42, abs=0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.world(MARKS, body="hermes")
 async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
     seen_from = Pose(6.8, 2.0, -math.pi / 2).relative_to(world.truth.pose_of("a"))
@@ -124,6 +125,7 @@ async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World,
     assert (await client.post(ACTIONS, json=body)).status_code == 400
 
 
+@pytest.mark.slow
 @pytest.mark.world(str(WORLD.with_name("shelf.toml")), body="hermes")
 async def test_under_a_shelf_nearby(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
     origin = world.truth.pose_of("a")
