@@ -32,17 +32,21 @@ from roboglot.console.studio.class_link import (
     Stop,
     Stopped,
     ToRoom,
-    line,
+    put,
 )
 from roboglot.console.studio.classroom import Classroom, Seat, World
 from roboglot.model.errors import Refused, RobotError
 from roboglot.shards.shard import CLASS_SOCKET
+from roboglot.transport.log_limiter import LogLimiter
 
 log = logging.getLogger(__name__)
+BROKEN = OSError, ValueError, msgspec.MsgspecError, RecursionError  # by what a console sends
 FOLDER = "classes"
 PENDING_MAX = 256  # requests of one world in progress
 SEATS_MAX = 200  # pages per world
-UNREAD_MAX = 32 << 20  # bytes unread by a world, which then counts as hung and is disconnected
+NAMELESS_MAX = 32  # connections that have not sent the name of their world
+NAMELESS_SECONDS = 10.0  # for it to arrive
+BUSY = "too much is being answered"
 STOP_SECONDS = 10.0
 _decode = msgspec.json.Decoder(ToRoom).decode
 
@@ -54,6 +58,8 @@ class FleetClasses:
         self._folder = folder
         self._server: asyncio.Server | None = None
         self._worlds: set[asyncio.Task[None]] = set()
+        self._nameless = 0
+        self._limited = LogLimiter(log)
 
     async def open(self) -> None:
         """Listen. On failure, log a warning; worlds then run without classes."""
@@ -71,12 +77,41 @@ class FleetClasses:
                 self._worlds.add(task)
                 task.add_done_callback(self._worlds.discard)
                 with contextlib.suppress(asyncio.CancelledError):  # of `close`; asyncio's streams would log it
-                    await _Link(room, writer).serve(reader)
+                    await self._serve(room, reader, writer)
 
             self._server = await asyncio.start_unix_server(serve, sock=listening, limit=LINE_MAX)
         except OSError as error:
             listening.close()
             log.warning("cannot open classes in this fleet: %s: %s", path, error)
+
+    async def _serve(self, room: Classroom, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        world = ""
+        try:
+            if (hello := await self._name(reader)) is not None:
+                world = hello.world
+                await _Link(room, writer, hello).serve(reader)
+        except BROKEN as error:
+            self._limited.warning(world, "disconnected world %s: %s", world, error)
+        finally:
+            writer.transport.abort()
+
+    async def _name(self, reader: asyncio.StreamReader) -> Hello | None:
+        """Return a console's first message; None if it is another, or none comes in time."""
+        if self._nameless >= NAMELESS_MAX:
+            return None
+        self._nameless += 1
+        why = "it sent no name"
+        try:
+            async with asyncio.timeout(NAMELESS_SECONDS):
+                hello = _decode(await reader.readline())
+            if isinstance(hello, Hello):
+                return hello
+        except BROKEN as error:
+            why = str(error) or why
+        finally:
+            self._nameless -= 1
+        self._limited.warning("", "disconnected a world: %s", why)
+        return None
 
     async def close(self) -> None:
         """Stop listening and hang up."""
@@ -92,28 +127,21 @@ class FleetClasses:
 class _Link:
     """One world's console."""
 
-    def __init__(self, room: Classroom, writer: asyncio.StreamWriter) -> None:
+    def __init__(self, room: Classroom, writer: asyncio.StreamWriter, hello: Hello) -> None:
         self._room, self._writer = room, writer
-        self._world = ""
+        self._world, self._page = hello.world, hello.page
         self._seats: dict[int, Seat] = {}
         self._stops: dict[int, asyncio.Future[str]] = {}
         self._pending: set[asyncio.Task[None]] = set()
 
     async def serve(self, reader: asyncio.StreamReader) -> None:
-        """Serve until the console hangs up."""
-        mine = None
+        """Serve until the console hangs up. Raises one of BROKEN if it sends nonsense."""
+        mine = self._room.worlds[self._world] = World(self._world, self._page, self._stop, self._end)
         try:
-            hello = _decode(await reader.readline())
-            if not isinstance(hello, Hello):
-                raise ValueError("it sent no name")
-            self._world = hello.world
-            mine = self._room.worlds[hello.world] = World(hello.world, hello.page, self._stop, self._end)
             while text := await reader.readline():
                 await self._on_message(_decode(text))
-        except (OSError, ValueError, msgspec.MsgspecError, RecursionError) as error:
-            log.warning("disconnected world %s: %s", self._world, error)
         finally:
-            if mine is not None and self._room.worlds.get(self._world) is mine:
+            if self._room.worlds.get(self._world) is mine:
                 del self._room.worlds[self._world]
             for seat in self._seats.values():
                 seat.close()
@@ -121,12 +149,13 @@ class _Link:
                 waiting.cancel()
             for task in self._pending:
                 task.cancel()
-            self._writer.transport.abort()
 
     async def _on_message(self, message: ToRoom) -> None:
         match message:
             case Opened() | Closed():
                 await self._change(message)
+            case SignIn(id=id) if len(self._pending) >= PENDING_MAX:
+                put(Admitted(id, BUSY), self._writer)
             case SignIn():
                 self._begin(self._admit(message), "admit a pupil")
             case Stopped(id=id, why=why):
@@ -168,7 +197,7 @@ class _Link:
 
     def _take(self, seat: Seat, requested: PageRequest) -> None:
         if len(self._pending) >= PENDING_MAX:
-            seat.post({"type": "refused", "id": requested.request.id, "why": "too much is being answered"})
+            seat.post({"type": "refused", "id": requested.request.id, "why": BUSY})
             return
 
         async def take() -> None:
@@ -190,24 +219,22 @@ class _Link:
             answer = Admitted(request.id, "", place.code, place.page, place.seconds)
         except RobotError as error:
             answer = Admitted(request.id, str(error))
-        self._writer.write(line(answer))
+        put(answer, self._writer)
 
     def _end(self, code: str) -> None:
         """Report the end of a class."""
-        self._writer.write(line(Ended(code)))
+        put(Ended(code), self._writer)
 
     def _send(self, number: int, message: dict[str, object]) -> None:
-        if number in self._seats and not self._writer.is_closing():
-            self._writer.write(line(News(number, message)))
-            if self._writer.transport.get_write_buffer_size() > UNREAD_MAX:
-                self._writer.transport.abort()
+        if number in self._seats:
+            put(News(number, message), self._writer)
 
     async def _stop(self, robot: str) -> None:
         """Stop all programs and motion of a robot. Raises Refused."""
         id = max(self._stops, default=0) + 1
         self._stops[id] = asyncio.get_running_loop().create_future()
         try:
-            self._writer.write(line(Stop(id, robot)))
+            put(Stop(id, robot), self._writer)
             async with asyncio.timeout(STOP_SECONDS):
                 why = await self._stops[id]
         except (TimeoutError, OSError):

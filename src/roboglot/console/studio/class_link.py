@@ -9,25 +9,29 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
 from roboglot.console.studio.class_requests import Member
-from roboglot.console.studio.classroom import Place, Tell
+from roboglot.console.studio.classroom import CODE_LENGTH, CODE_LETTERS, Place, Tell
 from roboglot.model.errors import NotFound, Refused, RobotError
 
 log = logging.getLogger(__name__)
 LINE_MAX = 4 << 20  # bytes
+UNREAD_MAX = 32 << 20  # bytes unread by the other end, which then counts as hung and is disconnected
 ADMIT_SECONDS = 10.0
 ADMITTING_MAX = 64  # requests to join that await an answer
 AGAIN = 1.0  # s between two attempts to connect
+Code = Annotated[str, msgspec.Meta(pattern=rf"^[{CODE_LETTERS}]{{{CODE_LENGTH}}}\Z")]  # a folder has this name
+Name = Annotated[str, msgspec.Meta(max_length=1000)]
 
 
 class Hello(msgspec.Struct, tag=True, frozen=True):
     """First message to the classroom: the console's world, and the URL of its pages."""
 
-    world: str
-    page: str
+    world: Name
+    page: Name
 
 
 class PageRequest(msgspec.Struct, tag=True, frozen=True):
@@ -61,7 +65,7 @@ class Left(msgspec.Struct, tag=True, frozen=True):
 class Opened(msgspec.Struct, tag=True, frozen=True):
     """Message to the classroom: a class for this world alone."""
 
-    code: str
+    code: Code
     name: str
 
 
@@ -121,9 +125,12 @@ FromRoom = News | Stop | Admitted | Ended
 _decode = msgspec.json.Decoder(FromRoom).decode
 
 
-def line(message: ToRoom | FromRoom) -> bytes:
-    """Return a message as a line of JSON."""
-    return msgspec.json.encode(message) + b"\n"
+def put(message: ToRoom | FromRoom, writer: asyncio.StreamWriter) -> None:
+    """Send a message as a line of JSON, and hang up on an end that does not read."""
+    if not writer.is_closing():
+        writer.write(msgspec.json.encode(message) + b"\n")
+        if writer.transport.get_write_buffer_size() > UNREAD_MAX:
+            writer.transport.abort()
 
 
 class LinkedRoom:
@@ -186,25 +193,25 @@ class LinkedRoom:
             raise Refused("the class is out of reach")
         if seat is not None:
             self._seats[seat.number] = seat
-        self._writer.write(line(message))
+        put(message, self._writer)
 
     def forget(self, seat: LinkedSeat) -> None:
         """Remove the seat of a page that has gone."""
         if self._seats.pop(seat.number, None) is not None and self._writer is not None:
-            self._writer.write(line(Left(seat.number)))
+            put(Left(seat.number), self._writer)
 
     async def _run(self) -> None:
         while True:
             try:
                 await self._talk()
-            except (OSError, ValueError, msgspec.MsgspecError) as error:
+            except (OSError, ValueError, msgspec.MsgspecError, RecursionError) as error:
                 log.warning("the class is out of reach: %s", error)
             await asyncio.sleep(AGAIN)
 
     async def _talk(self) -> None:
         reader, writer = await asyncio.open_unix_connection(self._path, limit=LINE_MAX)
         try:
-            writer.write(line(self._hello))
+            put(self._hello, writer)
             self._writer = writer
             while text := await reader.readline():
                 self._on_message(_decode(text))
@@ -237,7 +244,7 @@ class LinkedRoom:
         except (RobotError, OSError) as error:
             why = f"{request.robot}: {error}"
         if self._writer is not None:
-            self._writer.write(line(Stopped(request.id, why)))
+            put(Stopped(request.id, why), self._writer)
 
 
 class LinkedSeat:
