@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import re
 import subprocess
 import sys
@@ -12,9 +14,12 @@ from xml.etree import ElementTree
 
 import pytest
 
+from roboglot.config import Config, RobotConfig
 from roboglot.extras import MissingExtra
 from roboglot.model.geometry import Pose
 from roboglot.recording.reader import read_recording
+from roboglot.testing.blocking import Loop
+from roboglot.testing.clients import Clients
 from roboglot.testing.server import RobotServer
 from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
 from roboglot.wire.slamware.geometry import Location
@@ -148,3 +153,41 @@ def test_wrong_words_in_a_marker_are_errors(tmp_path: Path) -> None:
     done = run_pytest(tmp_path, f"import pytest\n@pytest.mark.world(sede=1)\n{tests}")
     assert "world has no sede" in done.stdout + done.stderr
     assert "robots names at least one robot" in done.stdout + done.stderr
+
+
+DOORS = {
+    "slamware": {"port": 1449},
+    "robomaster": {"control_port": 40933, "push_port": 40934},
+    "cyberdog": {"port": 50062},
+    "visual": {"port": 50063},
+}
+
+
+@pytest.mark.world("empty", doors=DOORS)
+def test_clients_find_doors_at_configured_ports(
+    robot_server: RobotServer, rest: Any, robomaster: Any, cyberdog: Any, program: Any
+) -> None:
+    """``url`` and all clients went to the usual ports, where nothing listened."""
+    assert robot_server.url.endswith(":1449")
+    assert robot_server.programs_url.endswith(":50063/programs")
+    assert rest.get_power_status().battery_percentage > 50
+    assert robomaster.robot.get_battery() > 50
+    assert cyberdog.found() is not None
+    assert cyberdog.connected
+    assert program.run(PROGRAM).printed == ["hello"]
+
+
+@pytest.mark.world("empty", doors={"cyberdog": {"app": "127.0.0.1:19345", "plaintext": True}})
+def test_a_configured_app_is_called_there(robot_server: RobotServer, cyberdog: Any) -> None:
+    assert robot_server.app_port == 19345
+    assert cyberdog.found() is not None
+    assert cyberdog.connected
+
+
+def test_an_unknown_robots_client_is_refused_by_name() -> None:
+    config = Config(robots=(RobotConfig("a"), RobotConfig("bob")))
+    with (
+        contextlib.closing(asyncio.new_event_loop()) as loop,
+        pytest.raises(ValueError, match="no robot 'c'; there are a"),
+    ):
+        Clients(config, Loop(loop)).new_rest("c")

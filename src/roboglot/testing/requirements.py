@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roboglot.config import RobotConfig
+import msgspec
+
+from roboglot.config import Config, ConsoleConfig, RecordConfig, RobotConfig, config_of
+from roboglot.testing.addresses import free_port
+from roboglot.validation import PYTHON, why_invalid
 from roboglot.values import dataclass
 
 if TYPE_CHECKING:
@@ -39,11 +45,27 @@ class Wanted:
     faults: tuple[WantedFault, ...] = ()
     doors: Mapping[str, object] = field(default_factory=dict, hash=False)
 
-    def configs(self, first: str) -> tuple[RobotConfig, ...]:
-        """Return the robots' configurations at consecutive addresses from ``first`` on."""
-        body = f"recording:{self.recording}" if self.recording else self.body
+    def addresses(self, first: str) -> dict[str, str]:
+        """Return the robots' addresses: consecutive ones from ``first`` on."""
         host, _, last = first.rpartition(".")
-        return tuple(RobotConfig(name, body, f"{host}.{int(last) + number}") for number, name in enumerate(self.robots))
+        return {name: f"{host}.{int(last) + number}" for number, name in enumerate(self.robots)}
+
+    def configuration(self, first: str, data: Path) -> Config:
+        """Return the configuration of the program, with every door's section. Raises ValueError."""
+        from roboglot.protocols import sections
+
+        body = f"recording:{self.recording}" if self.recording else self.body
+        doors: dict[str, object] = {name: {} for name in sections()} | dict(self.doors)
+        if isinstance(dog := doors["cyberdog"], Mapping):
+            doors["cyberdog"] = {"app": f"127.0.0.1:{free_port()}", **dog}
+        values = {"data": str(data), "world": self.world, "seed": self.seed, **doors}
+        values |= {"lockstep": True} if self.lockstep else {"speed": self.speed}
+        return replace(
+            config_of(values, doors=sections()),
+            robots=tuple(RobotConfig(name, body, address) for name, address in self.addresses(first).items()),
+            console=ConsoleConfig(enabled=False),
+            record=RecordConfig(ring=all(map(find_spec, ("mcap", "zstandard", "foxglove_schemas_protobuf")))),
+        )
 
     @property
     def place(self) -> Wanted:
@@ -60,15 +82,17 @@ def wanted_by(markers: Iterable[pytest.Mark]) -> Wanted:
             case "world":
                 given: dict[str, object] = dict(mark.kwargs)
                 if mark.args:
-                    given["world"] = str(mark.args[0])
+                    given["world"] = str(_only_argument(mark))
                 values = given | values
             case "body" | "seed" | "recording":
-                values.setdefault(mark.name, str(mark.args[0]) if mark.name != "seed" else int(mark.args[0]))
+                if mark.kwargs:
+                    raise ValueError(f"{mark.name} has no {', '.join(mark.kwargs)}")
+                value = _only_argument(mark)
+                values.setdefault(mark.name, str(value) if mark.name == "recording" else value)
             case "fault":
                 options = dict(mark.kwargs)
-                faults.append(
-                    WantedFault(str(mark.args[0]), options.pop("robot", None), tuple(sorted(options.items())))
-                )
+                kind, robot = str(_only_argument(mark)), options.pop("robot", None)
+                faults.append(WantedFault(kind, robot, tuple(sorted(options.items()))))
     return wanted_of(values, tuple(faults))
 
 
@@ -78,7 +102,18 @@ def wanted_of(values: Mapping[str, Any], faults: tuple[WantedFault, ...] = ()) -
     if unknown := values.keys() - known:
         raise ValueError(f"world has no {', '.join(sorted(unknown))}; there are {', '.join(sorted(known))}")
     robots = values.get("robots", ("a",))
-    names = (robots,) if isinstance(robots, str) else tuple(robots)
+    names = (robots,) if isinstance(robots, str) else robots
     if not names:
         raise ValueError("robots names at least one robot")
-    return Wanted(**(dict(values) | {"robots": names}), faults=faults)
+    try:
+        return replace(msgspec.convert(dict(values) | {"robots": names}, Wanted), faults=faults)
+    except msgspec.ValidationError as error:
+        raise ValueError(why_invalid(error, kinds=PYTHON, wanted=Wanted)) from None
+
+
+def _only_argument(mark: pytest.Mark) -> object:
+    """Return a marker's argument that has no name. Raises ValueError unless there is exactly one."""
+    if len(mark.args) != 1:
+        raise ValueError(f"{mark.name} takes one value without a name, not {len(mark.args)}")
+    argument: object = mark.args[0]
+    return argument

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import dataclasses
 import gc
 import shutil
 import tempfile
@@ -16,14 +15,14 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from roboglot.extras import explaining
-from roboglot.testing.addresses import free_addresses, free_port, give_back
+from roboglot.testing.addresses import free_addresses, give_back
 from roboglot.testing.blocking import PATIENCE, Loop
 from roboglot.testing.clients import Clients
 from roboglot.testing.requirements import Wanted
 from roboglot.testing.tracks import LOOK_AGAIN, Ways, pass_time
 
 if TYPE_CHECKING:
-    from roboglot.config import RobotConfig
+    from roboglot.config import Config
     from roboglot.model.geometry import Pose
     from roboglot.model.robot import Robot
     from roboglot.model.tap import Exchange
@@ -44,14 +43,15 @@ class RobotServer:
     Methods block, and may be called from any thread but the server's own.
     """
 
-    clients: Clients  # set by ``start``
+    clients: Clients  # set by ``start``, as are the next two
+    config: Config
+    app_port: int  # at which the robots call a dog's app
 
     def __init__(self, wanted: Wanted | None = None, *, data: Path | None = None) -> None:
         self.wanted = wanted or Wanted()
         self._given_data = data
         self.data = data or Path(tempfile.mkdtemp(prefix="roboglot-test-"))
         self.addresses: dict[str, str] = {}
-        self.app_port = 0
         self.exchanges: deque[Exchange] = deque(maxlen=KEPT_EXCHANGES)
         self._runtime: Runtime | None = None
         self._loop: Loop | None = None
@@ -74,17 +74,18 @@ class RobotServer:
 
         Raises the errors of ``up``, and MissingExtra.
         """
-        configs = self.wanted.configs(free_addresses(len(self.wanted.robots)))
-        self.addresses = {robot.name: robot.address for robot in configs}
-        self.app_port = free_port()
+        first = free_addresses(len(self.wanted.robots))
+        self.addresses = self.wanted.addresses(first)
         loop = _new_loop()
         self._loop = Loop(loop)
-        self.clients = Clients(self.addresses, self.data, self.app_port, self._loop)
         self._thread = threading.Thread(target=_serve, args=(loop,), name="roboglot", daemon=True)
         self._thread.start()
         try:
             with explaining("a robot's server", "up"):
-                self._loop.run(self._start, configs, within=START_SECONDS_MAX)
+                self.config = self.wanted.configuration(first, self.data)
+                self.clients = Clients(self.config, self._loop)
+                self.app_port = self.clients.app_port
+                self._loop.run(self._start, within=START_SECONDS_MAX)
         except BaseException:
             self.close()
             raise
@@ -94,9 +95,9 @@ class RobotServer:
         """Close the clients, stop, and delete the data."""
         if self._loop is None or self._thread is None:
             return
-        self.clients.close()
         try:
             if self._runtime is not None:
+                self.clients.close()
                 self._loop.run(self._runtime.close)
         finally:
             self._loop.loop.call_soon_threadsafe(self._loop.loop.stop)
@@ -107,29 +108,17 @@ class RobotServer:
             if self._given_data is None:
                 shutil.rmtree(self.data, ignore_errors=True)
 
-    async def _start(self, configs: tuple[RobotConfig, ...]) -> None:
-        from roboglot.config import ConsoleConfig, RecordConfig, config_of
-        from roboglot.protocols import sections
+    async def _start(self) -> None:
         from roboglot.runtime import Runtime
 
-        wanted = self.wanted
-        doors = {"cyberdog": {"app": f"127.0.0.1:{self.app_port}"}} | dict(wanted.doors)
-        values = {"data": str(self.data), "world": wanted.world, "seed": wanted.seed, **doors}
-        values |= {"lockstep": True} if wanted.lockstep else {"speed": wanted.speed}
-        config = dataclasses.replace(
-            config_of(values, doors=sections()),
-            robots=configs,
-            console=ConsoleConfig(enabled=False),
-            record=RecordConfig(ring=_can_record()),
-        )
-        self._runtime = Runtime(config)
+        self._runtime = Runtime(self.config)
         for name, robot in self._runtime.fleet.robots.items():
             robot.tap.listen(self.exchanges.append)
             self.tracks[name] = []
         self._ways.begin(self._runtime.fleet, self._runtime.clock)
         await self._runtime.start()
         self._ways.follow()
-        if not wanted.recording:
+        if not self.wanted.recording:
             await self._ways.wait_for_places()
         self._break_things()
 
@@ -168,12 +157,12 @@ class RobotServer:
     @property
     def url(self) -> str:
         """URL of the first robot's REST API."""
-        return f"http://{self.address}:1448"
+        return f"http://{self.address}:{self.config.doors['slamware'].port}"
 
     @property
     def programs_url(self) -> str:
         """URL of the first robot's WebSocket of block programs."""
-        return f"ws://{self.address}:50053/programs"
+        return f"ws://{self.address}:{self.config.doors['visual'].port}/programs"
 
     @property
     def robot(self) -> Robot:
@@ -288,12 +277,6 @@ def _serve(loop: asyncio.AbstractEventLoop) -> None:
         loop.run_until_complete(loop.shutdown_asyncgens())
         loop.run_until_complete(loop.shutdown_default_executor())
         loop.close()
-
-
-def _can_record() -> bool:
-    from importlib.util import find_spec
-
-    return all(find_spec(name) for name in ("mcap", "zstandard", "foxglove_schemas_protobuf"))
 
 
 @contextlib.contextmanager

@@ -94,7 +94,8 @@ class Steps:
         method, _, path = (step.rest or "").partition(" ")
         body = None if step.body is None else json.dumps(step.body)
         host = self._server.addresses[step.robot] if step.robot else self._server.address
-        with contextlib.closing(http.client.HTTPConnection(host, 1448, timeout=step.within)) as connection:
+        port = self._server.config.doors["slamware"].port
+        with contextlib.closing(http.client.HTTPConnection(host, port, timeout=step.within)) as connection:
             connection.request(method, path.strip(), body, {"Content-Type": "application/json"} if body else {})
             response = connection.getresponse()
             data = response.read(ANSWER_MAX)
