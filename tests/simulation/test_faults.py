@@ -1,5 +1,7 @@
 """Fault injection: how each shows, ends, is refused, and comes from a world's file."""
 
+import math
+
 import pytest
 
 from roboglot.model.clock import LockstepClock
@@ -144,17 +146,29 @@ async def test_without_a_robot_it_happens_to_all(sim):
         (lambda faults: faults.inject("low_batery"), "did you mean 'low_battery'"),
         (lambda faults: faults.inject("low_battery", chrge=0.1), "did you mean 'charge'"),
         (lambda faults: faults.inject("low_battery", charge=3.0), "between 0 and 1"),
+        (lambda faults: faults.inject("low_battery", charge="x"), "^low_battery.charge must be a number, not text$"),
+        (lambda faults: faults.inject("slow_answers", seconds=math.nan), "seconds must be a number, not nan"),
+        (lambda faults: faults.inject("low_battery", duration="x"), "^duration must be a number, not text$"),
         (lambda faults: faults.inject("low_battery", duration=0.0), "more than 0 s"),
         (lambda faults: faults.inject("lift_out_of_service", "a"), "affects the building, not a robot"),
         (lambda faults: faults.inject("cliff", "a", zone="above"), "a zone is one of front"),
         (lambda faults: faults.inject("motor_fault", "a", wheel="fifth"), "a wheel is one of"),
         (lambda faults: [faults.inject("lidar_gone", "a") for _ in range(2)], "already on a"),
         (lambda faults: faults.inject("dock_not_found", dock=7), "no dock 7"),
+        (lambda faults: faults.inject("dock_not_found", aside=1e308), "up to 100 m"),
     ],
 )
 def test_impossible_faults_are_refused_in_plain_words(sim, call, message):
     with pytest.raises(ValueError, match=message):
         call(sim.world.faults)
+
+
+def test_a_refused_option_leaves_the_lift_sound(sim):
+    """3.7 people boarded, and no fault of the lift could begin or end any more."""
+    with pytest.raises(ValueError, match="people must be a whole number"):
+        sim.world.faults.inject("lift_occupied", people=3.7)
+    sim.world.faults.inject("lift_occupied", people=2)
+    sim.world.faults.clear()
 
 
 def test_unknown_names_are_not_found(sim):
@@ -232,6 +246,7 @@ async def test_a_world_file_plans_faults(tmp_path, caplog, simulate):
     [
         ('kind = "lidar_gon"', "did you mean 'lidar_gone'"),
         ('kind = "cliff"\noptions = { zon = "front" }', "did you mean 'zone'"),
+        ('kind = "low_battery"\noptions = { charge = "x" }', "low_battery.charge must be a number, not text"),
     ],
 )
 def test_mistakes_in_the_file_are_explained(tmp_path, line, message):

@@ -51,6 +51,7 @@ from roboglot.values import dataclass
 Undo = Callable[[], object]
 C = TypeVar("C", bound=Component)
 DELAY_MAX = 60.0  # s: the longest delay of answers
+ASIDE_MAX = 100.0  # m by which a dock is moved at most
 KIDNAP_TRIES = 400
 KIDNAP_DISTANCE = 4.0  # m at least
 
@@ -188,6 +189,8 @@ def dock_not_found(target: Target, *, dock: int = 0, floor: int = 0, aside: floa
     building = target.world.building
     if not (0 <= floor < len(building.docks) and 0 <= dock < len(building.docks[floor])):
         raise ValueError(f"there is no dock {dock} on floor {floor}")
+    if abs(aside) > ASIDE_MAX:
+        raise ValueError(f"a dock can be moved by up to {ASIDE_MAX:g} m")
     before = building.docks[floor][dock]
     building.move_dock(before.compose(Pose(0.0, aside)), dock, floor)
     return lambda: building.move_dock(before, dock, floor)

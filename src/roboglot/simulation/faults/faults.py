@@ -12,17 +12,21 @@ import itertools
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar, get_type_hints
+
+import msgspec
 
 from roboglot.model.client_context import concerning
 from roboglot.model.errors import ComponentMissing, NotFound, RobotError
 from roboglot.model.stage import ActiveFault, FaultKind
 from roboglot.simulation.faults.fault_kinds import KINDS, FaultRecipe, FragileWorld, Target, Undo
 from roboglot.spelling import meant
+from roboglot.validation import why_invalid
 
 if TYPE_CHECKING:
     from roboglot.simulation.world.description import PlannedFault
 
+T = TypeVar("T")
 log = logging.getLogger(__name__)
 FAULTS_MAX = 100
 
@@ -58,8 +62,8 @@ class Faults:
         """
         if kind not in KINDS:
             raise ValueError(f"no fault is called {kind!r}{meant(kind, KINDS)}")
-        _check_options(kind, options)
-        if duration is not None and not duration > 0.0:
+        options = _checked_options(kind, options)
+        if duration is not None and not _checked("duration", duration, float) > 0.0:
             raise ValueError("a fault lasts for more than 0 s")
         begun = []
         for target in self._targets(kind, robot):
@@ -124,7 +128,7 @@ class Faults:
             with concerning(plan.robot or ""):
                 try:
                     self.inject(plan.kind, plan.robot, duration=plan.duration, **plan.options)
-                except (ValueError, TypeError, RobotError) as error:
+                except (ValueError, RobotError) as error:
                     log.warning("cannot schedule fault %s: %s", plan.kind, error)
 
         return begin
@@ -139,13 +143,26 @@ def _options_of(kind: FaultRecipe) -> dict[str, float | int | str | None]:
     return {name: parameter.default for name, parameter in parameters if name != "target"}
 
 
-def _check_options(kind: str, options: Mapping[str, object]) -> None:
-    """Raise ValueError for an option that the kind's function does not have."""
+def _checked_options(kind: str, options: Mapping[str, object]) -> dict[str, object]:
+    """Return a kind's options in the types of its function. Raises ValueError for one that it does not have, too."""
+    types = get_type_hints(KINDS[kind].begin)
     known = [name for name in inspect.signature(KINDS[kind].begin).parameters if name != "target"]
     for name in options:
         if name not in known:
             has = ", ".join(known) or "none"
             raise ValueError(f"{kind} has no option {name!r}{meant(name, known)}; options: {has}")
+    return {name: _checked(f"{kind}.{name}", value, types[name]) for name, value in options.items()}
+
+
+def _checked(name: str, value: object, kind: type[T]) -> T:
+    """Return a value as ``kind``. Raises ValueError if it is of another type, or not finite."""
+    try:
+        converted = msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        raise ValueError(why_invalid(error, field=name)) from None
+    if isinstance(converted, float) and not math.isfinite(converted):
+        raise ValueError(f"{name} must be a number, not {converted}")
+    return converted
 
 
 def problem_of(plan: PlannedFault) -> str | None:
@@ -153,7 +170,7 @@ def problem_of(plan: PlannedFault) -> str | None:
     if plan.kind not in KINDS:
         return f"no fault is called {plan.kind!r}{meant(plan.kind, KINDS)}"
     try:
-        _check_options(plan.kind, plan.options)
+        _checked_options(plan.kind, plan.options)
     except ValueError as error:
         return str(error)
     return None
