@@ -38,8 +38,8 @@ from roboglot.model.components.system.ledger import Ledger
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.geometry import Pose
 from roboglot.model.inputs.fairness import Fairness
+from roboglot.model.responder import Responder
 from roboglot.model.robot import Description, Robot
-from roboglot.model.stand_in import StandIn
 from roboglot.simulation.bodies.files import body_source
 from roboglot.simulation.world.world import RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world, world_sources
@@ -135,7 +135,7 @@ def build_fleet(world: str, robots: Sequence[RobotConfig], *, clock: Clock, seed
                 drivers.add(robot, config.body)
             elif config.recording:
                 robot = built[config.name] = Robot(config.name, UNKNOWN, clock)
-                robot.stand_in = _stand_in(config.recording, clock)
+                robot.responder = _responder(config.recording, clock)
             else:
                 robot = built[config.name] = Robot(config.name, simulated.description_of(config.name), clock)
                 simulated.equip(robot)
@@ -160,8 +160,8 @@ def _placement(robot: RobotConfig) -> RobotPlacement:
     return RobotPlacement(robot.name, robot.body, Pose(start.x, start.y, start.yaw), start.floor, robot.serial)
 
 
-def _stand_in(place: str, clock: Clock) -> StandIn:
-    """Return a stand-in with the answers of a recorded robot. Raises ValueError in plain words."""
+def _responder(place: str, clock: Clock) -> Responder:
+    """Return a responder with the answers of a recorded robot. Raises ValueError in plain words."""
     from roboglot.recording.playback import open_playback
 
     return open_playback(place, clock)

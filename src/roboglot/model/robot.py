@@ -16,7 +16,7 @@ from roboglot.model.errors import ComponentMissing
 from roboglot.model.events import EventStream
 from roboglot.model.inputs.external import ExternalInputs
 from roboglot.model.inputs.fairness import Fairness
-from roboglot.model.stand_in import StandIn
+from roboglot.model.responder import Responder
 from roboglot.model.tap import Tap
 from roboglot.values import dataclass
 
@@ -51,7 +51,7 @@ class Robot:
     inputs: ExternalInputs = field(init=False)
     admission: Admission = field(default_factory=Admission)
     fairness: Fairness | None = None  # shared by all robots of a program; None: clients never wait
-    stand_in: StandIn | None = None  # answers requests in the robot's place
+    responder: Responder | None = None  # answers requests in the robot's place
     _components: dict[type[Component], Component] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from roboglot.model.clock import Clock
 from roboglot.model.errors import NotFound
-from roboglot.model.stand_in import Recorded, StandIn, StandInReply
+from roboglot.model.responder import Recorded, Responder, ResponderReply
 from roboglot.model.tap import Exchange
 from roboglot.recording.matching import NormalizedRequest, normal, rewritten, without_numbers
 from roboglot.recording.reader import AnsweredRequest, BadRecording, Recording, pair, read_recording
@@ -57,7 +57,7 @@ class _Door:
     begun: bool = False
 
 
-class Playback(StandIn):
+class Playback(Responder):
     """One recorded robot. ``missing``: requests that were never recorded."""
 
     def __init__(self, exchanges: Sequence[Exchange], clock: Clock, epoch: float, redact: Sequence[str] = ()) -> None:
@@ -79,8 +79,8 @@ class Playback(StandIn):
         for number, push in pushes:
             self._doors[push.door].pushes.append((number, push))
 
-    async def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:
-        """See ``StandIn``."""
+    async def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[ResponderReply]:
+        """See ``Responder``."""
         began = self._clock.time()
         live = normal(door, self._redaction.of(door, operation)(payload))  # in the form of the recording
         kept = self._doors[door]
@@ -101,17 +101,17 @@ class Playback(StandIn):
             due = began + max(0.0, reply.stamp - asked.request.stamp)
             await kept.timeline.turn(due, number, in_order=in_order)
             payload = self._as_now(reply, recorded.fresh, live.fresh)
-            yield StandInReply(payload, reply.status, index == len(asked.numbered))
+            yield ResponderReply(payload, reply.status, index == len(asked.numbered))
 
     def join(self, door: str, send: Callable[[str, bytes], None], reads: Collection[str] = ()) -> Callable[[], None]:
-        """See ``StandIn``."""
+        """See ``Responder``."""
         self._doors[door].reads |= set(reads)
         listeners = self._doors[door].listeners
         listeners.append(send)
         return lambda: listeners.remove(send) if send in listeners else None
 
     def first_push(self, door: str, operation: str) -> bytes | None:
-        """See ``StandIn``."""
+        """See ``Responder``."""
         pushes = self._doors[door].pushes if door in self._doors else []
         return next((push.payload for _, push in pushes if push.operation == operation), None)
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from msgspec import Struct
 
 from roboglot.model.errors import ComponentMissing, RobotError
+from roboglot.model.responder import Responder
 from roboglot.model.response_delay import response_delay
-from roboglot.model.stand_in import StandIn
 from roboglot.model.tap import SILENT
 from roboglot.operations import BadParameters, Right
 from roboglot.protocols.cyberdog.call import Call
@@ -61,7 +61,7 @@ async def answer(call: Call) -> object | None:
     if robot.tap.watched:
         last = await _run_and_note(call)
     else:
-        last = await (_run(call) if robot.stand_in is None else _run_on_stand_in(call, robot.stand_in))
+        last = await (_run(call) if robot.responder is None else _run_on_responder(call, robot.responder))
     if delay := response_delay(robot):
         await robot.clock.sleep(delay)
     return last
@@ -73,7 +73,7 @@ async def _run_and_note(call: Call) -> object | None:
     tap, key = robot.tap, str(int(call.code))
     began = call.began = tap.request(DOOR, key, call.text)
     try:
-        last = await (_run(call) if robot.stand_in is None else _run_on_stand_in(call, robot.stand_in))
+        last = await (_run(call) if robot.responder is None else _run_on_responder(call, robot.responder))
     except NotJson as bad:
         answered = error(InBandError.BAD_PARAMETERS)
         tap.reply(DOOR, key, write(answered), _status(answered), str(bad), began)
@@ -87,23 +87,23 @@ async def _run_and_note(call: Call) -> object | None:
     return last
 
 
-async def _run_on_stand_in(call: Call, stand_in: StandIn) -> object | None:
-    """Return the last answer of the robot's stand-in."""
+async def _run_on_responder(call: Call, responder: Responder) -> object | None:
+    """Return the last answer of the robot's responder."""
     try:
-        return await _ask_stand_in(call, stand_in)
+        return await _ask_responder(call, responder)
     except RobotError as refused:
         call.why = str(refused)
         log.info("%d refused: %s", call.code, refused)
         return error(InBandError.UNAVAILABLE)
 
 
-async def _ask_stand_in(call: Call, stand_in: StandIn) -> object | None:
-    """Let the stand-in answer; send all but the last answer."""
+async def _ask_responder(call: Call, responder: Responder) -> object | None:
+    """Let the responder answer; send all but the last answer."""
     operation = TABLE.get(call.code)
     if call.context.robot.admission.enforced:
         call.context.robot.admission.check(DOOR, str(int(call.code)), operation.right if operation else Right.ADMIN)
     reads = operation is not None and operation.right is Right.SEE
-    async for reply in stand_in.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
+    async for reply in responder.answer(DOOR, str(int(call.code)), call.text.encode(), reads=reads):
         RecordedEnd.check(reply.status)
         if reply.status == SILENT:
             call.why = "the recorded robot gave no answer either"

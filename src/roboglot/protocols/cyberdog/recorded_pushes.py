@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import field
 
 from roboglot.model.clock import Clock
-from roboglot.model.stand_in import StandIn
+from roboglot.model.responder import Responder
 from roboglot.protocols.cyberdog.app_link import AppLink
 from roboglot.protocols.cyberdog.frame_queue import KEPT_SECONDS
 from roboglot.values import dataclass
@@ -33,9 +33,9 @@ class _Line:
 class PlayedPushes:
     """Recorded pushes for one app. ``door`` is the name under which they were recorded."""
 
-    def __init__(self, stand_in: StandIn, app: AppLink, clock: Clock, door: str) -> None:
+    def __init__(self, responder: Responder, app: AppLink, clock: Clock, door: str) -> None:
         self._app, self._clock = app, clock
-        self._beat = stand_in.first_push(door, HEARTBEAT)
+        self._beat = responder.first_push(door, HEARTBEAT)
         self._lines: dict[int, _Line] = {}
         app.on_found.append(self._go_on)
 

@@ -173,9 +173,9 @@ class CyberDogDoor:
             listen(LocalizationLost, lambda event: tasks.lose_place(event.reason)),
             listen(LocalizationRecovered, lambda _: tasks.find_place()),
         ]
-        if robot.stand_in is not None:
-            played = context.played = PlayedPushes(robot.stand_in, app, robot.clock, self.name)
-            self._cleanup += [played.close, robot.stand_in.join(self.name, played.put, _reads())]
+        if robot.responder is not None:
+            played = context.played = PlayedPushes(robot.responder, app, robot.clock, self.name)
+            self._cleanup += [played.close, robot.responder.join(self.name, played.put, _reads())]
         if self._relay:
             context.frames = queue_to(app, robot.clock)
             self._cleanup += [context.frames.close, self._relay.attach(context.frames)]

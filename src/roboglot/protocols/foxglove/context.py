@@ -58,7 +58,7 @@ class Context:
         self.joined = asyncio.Event()  # set when ``topics`` is ready, or failed
         session = f"{robot.id}-{int(robot.clock.epoch() * 1e3)}"
         model = robot.description.model
-        recorded = robot.stand_in.recorded if robot.stand_in is not None else None
+        recorded = robot.responder.recorded if robot.responder is not None else None
         self.send(
             message(
                 "serverInfo",

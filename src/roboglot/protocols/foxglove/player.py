@@ -16,8 +16,8 @@ from functools import partial
 from roboglot.model.background import beside
 from roboglot.model.client_context import set_client
 from roboglot.model.errors import NotReady
+from roboglot.model.responder import Recorded
 from roboglot.model.robot import Robot
-from roboglot.model.stand_in import Recorded
 from roboglot.protocols.foxglove.channels import Channel, Listener, PlaybackCommand
 from roboglot.recording.message_index import MessageIndex, TimedMessage
 from roboglot.recording.reader import BadRecording
@@ -227,7 +227,7 @@ class Player:
 
 async def open_source(robot: Robot) -> Player:
     """Return the source of a robot that is played back. Raises BadRecording, OSError."""
-    assert robot.stand_in is not None
-    recorded = robot.stand_in.recorded
+    assert robot.responder is not None
+    recorded = robot.responder.recorded
     assert recorded is not None
     return Player(robot, recorded, await beside(partial(MessageIndex, recorded.path)))

@@ -72,7 +72,7 @@ class FoxgloveDoor:
         """Return the robot's topics, live or recorded. Raises ImportError (without the extra), OSError, ValueError."""
         async with self._opening:
             if self._topics is None:
-                name = RECORDED if self.robot.stand_in is not None and self.robot.stand_in.recorded else LIVE
+                name = RECORDED if self.robot.responder is not None and self.robot.responder.recorded else LIVE
                 module = await load(lambda: import_module(name))
                 source: Source = await module.open_source(self.robot)
                 self._topics = source

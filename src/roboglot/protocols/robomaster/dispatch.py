@@ -12,7 +12,7 @@ from typing import cast
 from roboglot.model.components.system.link import Link
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
-from roboglot.model.stand_in import StandIn
+from roboglot.model.responder import Responder
 from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.robomaster.answers import Answer, FastPath, Result, Why
 from roboglot.protocols.robomaster.chapters import (  # noqa: F401
@@ -86,11 +86,11 @@ class _Refusal(Exception):
 async def answer(context: Context, text: str | None) -> Answer:
     """Run one command (None: it was too long) and return its answer; raises only CancelledError."""
     request, tap = _Request(), context.robot.tap
-    stand_in = context.robot.stand_in
-    if stand_in is None:
+    responder = context.robot.responder
+    if responder is None:
         result = await _run(context, text, request)
     else:
-        result = await _run_on_stand_in(context, stand_in, text, request)
+        result = await _run_on_responder(context, responder, text, request)
     if tap.watched:
         if request.began is None:  # refused before it was parsed
             request.began = tap.request(DOOR, request.key, text or "")
@@ -154,7 +154,7 @@ def fast_path(context: Context, text: str) -> FastPath | None:
     The function returns None, with no effect, if the repeated line must go through ``answer``.
     """
     this_robot = context.robot
-    if not context.active or this_robot.admission.enforced or this_robot.stand_in is not None:
+    if not context.active or this_robot.admission.enforced or this_robot.responder is not None:
         return None
     try:
         line = _parse_line(text, context.active, context.profile.as_robots)
@@ -183,23 +183,25 @@ def fast_path(context: Context, text: str) -> FastPath | None:
     return reply
 
 
-async def _run_on_stand_in(context: Context, stand_in: StandIn, text: str | None, request: _Request) -> Answer:
-    """Parse a line and return the stand-in's answer to it."""
+async def _run_on_responder(context: Context, responder: Responder, text: str | None, request: _Request) -> Answer:
+    """Parse a line and return the responder's answer to it."""
     seq = None
     try:
         if text is None:
             raise _Refusal(Reply.PARSE_ERROR, lambda: f"longer than {LINE_MAX} bytes")
         command = parse(text)
         seq = command.seq
-        return await _ask_stand_in(context, stand_in, command, text, request)
+        return await _ask_responder(context, responder, command, text, request)
     except (Malformed, _Refusal) as refusal:
         return Answer(context.profile.result(refusal.reply, seq), refusal.why)
     except RobotError as error:
         return Answer(context.profile.result(reply_to(error), seq), partial(str, error))
 
 
-async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, text: str, request: _Request) -> Answer:
-    """Return the stand-in's first answer. Raises _Refusal without one."""
+async def _ask_responder(
+    context: Context, responder: Responder, command: Command, text: str, request: _Request
+) -> Answer:
+    """Return the responder's first answer. Raises _Refusal without one."""
     operation = next((found for key, _ in command.keys if (found := TABLE.get(key))), None)
     request.key = operation.key if operation else ""
     if context.robot.tap.watched:
@@ -208,7 +210,7 @@ async def _ask_stand_in(context: Context, stand_in: StandIn, command: Command, t
         context.robot.admission.check(DOOR, request.key, operation.right if operation else Right.ADMIN)
     try:
         reads = text.rstrip(" ;").endswith("?")
-        async for reply in stand_in.answer(DOOR, request.key, text.encode(), reads=reads):
+        async for reply in responder.answer(DOOR, request.key, text.encode(), reads=reads):
             return Answer(reply.payload, None if reply.status == "ok" else partial(str, reply.status))
     except NotFound as unknown:
         raise _Refusal(Reply.FAIL, partial(str, str(unknown))) from None

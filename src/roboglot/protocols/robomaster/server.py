@@ -61,7 +61,7 @@ class RoboMasterDoor:
         self._serial: SerialLine | None = None
         self._serial_link = Path(f"{config.uart}-{robot.id}")
         self._announcing: asyncio.Task[None] | None = None
-        self._leave_stand_in: Callable[[], None] = lambda: None
+        self._leave_responder: Callable[[], None] = lambda: None
 
     async def start(self) -> None:
         """Listen on all ports and announce the robot. Raises OSError naming an address that is taken."""
@@ -90,8 +90,8 @@ class RoboMasterDoor:
         except OSError:
             await self.close()
             raise
-        if (stand_in := self.context.robot.stand_in) is not None:
-            self._leave_stand_in = stand_in.join(self.name, self._play)
+        if (responder := self.context.robot.responder) is not None:
+            self._leave_responder = responder.join(self.name, self._play)
         if not everywhere and self._address not in KNOWN_ADDRESSES:
             self._announcing = loop.create_task(
                 announce(self.context, self._address, self._broadcast), name="robomaster ip"
@@ -101,7 +101,7 @@ class RoboMasterDoor:
         """Stop listening, disconnect clients and cancel their actions, without waiting for the robot to brake."""
         if self._announcing:
             self._announcing.cancel()
-        self._leave_stand_in()
+        self._leave_responder()
         self._watch.close()
         self._gate.close()
         for server in self._servers.values():
@@ -158,7 +158,7 @@ class RoboMasterDoor:
             self._serial.write(event + LINE_END)
 
     def _play(self, operation: str, message: bytes) -> None:
-        """Send a stand-in's push: an event to its readers, any other to every client's host."""
+        """Send a responder's push: an event to its readers, any other to every client's host."""
         if operation.endswith(" event"):
             self.send_event(message)
         elif operation != "> robot ip":  # this robot is elsewhere and reports it itself

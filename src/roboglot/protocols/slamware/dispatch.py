@@ -23,8 +23,8 @@ from roboglot.model.client_context import set_client
 from roboglot.model.components.mapping.map_memory import is_settled, settle
 from roboglot.model.components.system.network import Network
 from roboglot.model.errors import NotFound, RobotError
+from roboglot.model.responder import Responder
 from roboglot.model.response_delay import delay_response
-from roboglot.model.stand_in import StandIn
 from roboglot.operations import BadParameters, Operation, Right
 from roboglot.protocols.browsers import Browsers, of_rows
 from roboglot.protocols.slamware.bodies import ClientGone, Receive, Scope
@@ -151,7 +151,7 @@ class Application:
         """
         robot = self._context.robot
         operation, match = self._find_plain_read(scope)
-        if operation is None or match is None or self._admission.enforced or robot.stand_in is not None:
+        if operation is None or match is None or self._admission.enforced or robot.responder is not None:
             return None
         if log.isEnabledFor(logging.DEBUG):
             return None
@@ -250,13 +250,13 @@ class Application:
 
     async def _carry_out(self, row: Row, match: Match, scope: Scope, receive: Receive) -> tuple[int, Headers, bytes]:
         scope["operation"] = row.key
-        operation, stand_in = TABLE.get(row.key), self._context.robot.stand_in
-        if operation is None and stand_in is None:
+        operation, responder = TABLE.get(row.key), self._context.robot.responder
+        if operation is None and responder is None:
             raise HttpError(501, f"{row.name} is not implemented", row.key)
         self._check_right(row.key, operation.right if operation else Right.ADMIN)
-        if stand_in is not None or operation is None:
-            assert stand_in is not None
-            return await self._ask_stand_in(stand_in, row, scope, receive)
+        if responder is not None or operation is None:
+            assert responder is not None
+            return await self._ask_responder(responder, row, scope, receive)
         values = await self._parameters.read(operation, match, scope, receive)
         if self._tap.watched:
             self._note_request(scope)
@@ -305,16 +305,16 @@ class Application:
             if isinstance(body := values.get("body"), Upload):
                 body.close()
 
-    async def _ask_stand_in(
-        self, stand_in: StandIn, row: Row, scope: Scope, receive: Receive
+    async def _ask_responder(
+        self, responder: Responder, row: Row, scope: Scope, receive: Receive
     ) -> tuple[int, Headers, bytes]:
-        """Return the answer of the robot's stand-in. Raises HttpError 501 if it has none."""
+        """Return the answer of the robot's responder. Raises HttpError 501 if it has none."""
         scope["body"] = await self._parameters.whole(scope, receive)
         if self._tap.watched:
             self._note_request(scope)
         reads = scope["method"] in ("GET", "HEAD")
         try:
-            async for reply in stand_in.answer("slamware", row.key, _for_tap(scope), reads=reads):
+            async for reply in responder.answer("slamware", row.key, _for_tap(scope), reads=reads):
                 status = int(reply.status)
                 kind = PLAIN if status >= 400 else _kind_of(reply.payload, scope)
                 return status, [kind] if reply.payload else [], reply.payload

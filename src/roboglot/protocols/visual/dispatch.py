@@ -9,7 +9,7 @@ from contextlib import AsyncExitStack
 
 from roboglot.model.admission import Forbidden
 from roboglot.model.errors import NotFound
-from roboglot.model.stand_in import StandIn
+from roboglot.model.responder import Responder
 from roboglot.operations import Right
 from roboglot.programs.errors import ProgramError, StoreError
 from roboglot.programs.stores import StoredProgram
@@ -67,8 +67,8 @@ class Dispatch:
             except Forbidden as forbidden:
                 answers.refuse(FeedbackState.ILLEGAL, str(forbidden))
                 return
-        if self._service.robot.stand_in is not None:
-            await self._ask_stand_in(self._service.robot.stand_in, request, text, answers, began)
+        if self._service.robot.responder is not None:
+            await self._ask_responder(self._service.robot.responder, request, text, answers, began)
             return
         # A separate task, so that an operation is completed even if the client disconnects.
         await asyncio.shield(self._begin(request, answers))
@@ -98,14 +98,14 @@ class Dispatch:
         task.add_done_callback(self._pending.pop)
         return task
 
-    async def _ask_stand_in(
-        self, stand_in: StandIn, request: Request, text: str, answers: Answers, began: float | None
+    async def _ask_responder(
+        self, responder: Responder, request: Request, text: str, answers: Answers, began: float | None
     ) -> None:
-        """Let the stand-in answer in the robot's place."""
+        """Let the responder answer in the robot's place."""
         tap, key = self._service.robot.tap, key_of(request)
         try:
             reads = request.operate == "inquiry"
-            async for reply in stand_in.answer(DOOR, key, text.encode(), reads=reads):
+            async for reply in responder.answer(DOOR, key, text.encode(), reads=reads):
                 if tap.watched:
                     tap.reply(DOOR, key, reply.payload, reply.status, began=began)
                 self._front_ends.answer(reply.payload.decode("utf-8", "replace"))

@@ -71,8 +71,8 @@ class VisualDoor:
             self._service.reports.join(self._report),
             self._service.pace.join(self._front_ends.drain),
         ]
-        if (stand_in := self._service.robot.stand_in) is not None:
-            self._listening.append(stand_in.join(self.name, self._play))
+        if (responder := self._service.robot.responder) is not None:
+            self._listening.append(responder.join(self.name, self._play))
 
     async def close(self) -> None:
         """Finish pending answers, end all runs, stop reporting."""
@@ -109,7 +109,7 @@ class VisualDoor:
         await self._dispatch.receive(text)
 
     def _play(self, operation: str, message: bytes) -> None:
-        """Send a stand-in's push to all front ends, or to the readers of the log."""
+        """Send a responder's push to all front ends, or to the readers of the log."""
         if operation == LOG:
             self._side_paths.print(message.decode("utf-8", "replace"))
             return

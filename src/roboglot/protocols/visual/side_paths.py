@@ -66,10 +66,10 @@ class SidePaths:
     def _noted(
         self, path: str, answer: Callable[[str, Send], Awaitable[None]]
     ) -> Callable[[str, Send], Awaitable[None]]:
-        """Return ``answer`` noted by the tap, or a stand-in's answers if there is one."""
+        """Return ``answer`` noted by the tap, or a responder's answers if there is one."""
 
         async def receive(text: str, send: Send) -> None:
-            tap, stand_in = self._service.robot.tap, self._service.robot.stand_in
+            tap, responder = self._service.robot.tap, self._service.robot.responder
             began = tap.request(DOOR, path, text) if tap.watched else None
 
             def reply(line: str) -> None:
@@ -77,11 +77,11 @@ class SidePaths:
                     tap.reply(DOOR, path, line, "ok", began=began)
                 send(line)
 
-            if stand_in is None:
+            if responder is None:
                 await answer(text, reply)
                 return
             try:
-                async for found in stand_in.answer(DOOR, path, text.encode(), reads=path != DEBUG):
+                async for found in responder.answer(DOOR, path, text.encode(), reads=path != DEBUG):
                     reply(found.payload.decode("utf-8", "replace"))
             except NotFound as unknown:
                 nothing: dict[str, object] = {"target_id": text[:ID_MAX], "error": str(unknown)}

@@ -13,7 +13,7 @@ from roboglot.media.recorder import Recorder
 from roboglot.model.admission import Forbidden
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.errors import NotFound, RobotError
-from roboglot.model.stand_in import StandIn
+from roboglot.model.responder import Responder
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.call import Call
 from roboglot.protocols.cyberdog.chapters.camera.camera_files import CameraFiles
@@ -33,8 +33,8 @@ def get_file(
     context: Context, host: str, code: int, fields: Mapping[str, object], params: str = ""
 ) -> AsyncGenerator[pb.FileChunk, None]:
     """Yield the chunks that answer a ``getFile`` of ``host``; ``params``: the text that ``fields`` were read from."""
-    if (stand_in := context.robot.stand_in) is not None:
-        return _played(context, stand_in, code, params)
+    if (responder := context.robot.responder) is not None:
+        return _played(context, responder, code, params)
     if Camera not in context.robot or Recorder not in context.robot:
         return _refused(FileError.CAMERA_SILENT if code in (Code.CAMERA, Code.SAVED_FILE) else FileError.WRONG_CODE)
     if not _may_fetch(context, code):
@@ -62,13 +62,13 @@ def _may_fetch(context: Context, code: int) -> bool:
     return True
 
 
-async def _played(context: Context, stand_in: StandIn, code: int, params: str) -> AsyncGenerator[pb.FileChunk, None]:
+async def _played(context: Context, responder: Responder, code: int, params: str) -> AsyncGenerator[pb.FileChunk, None]:
     """Yield the chunks of a file that was fetched in the recording."""
     if not _may_fetch(context, code):
         yield pb.FileChunk(error_code=FileError.CAMERA_SILENT)
         return
     try:
-        async for reply in stand_in.answer("cyberdog", str(int(code)), params.encode(), reads=code == Code.SAVED_FILE):
+        async for reply in responder.answer("cyberdog", str(int(code)), params.encode(), reads=code == Code.SAVED_FILE):
             RecordedEnd.check(reply.status)
             yield pb.FileChunk.FromString(reply.payload)
     except (NotFound, DecodeError) as error:

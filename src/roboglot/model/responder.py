@@ -1,4 +1,4 @@
-"""Stand-in that answers requests in a robot's place: doors pass parsed requests to it instead of their chapters.
+"""Responder that answers requests in a robot's place: doors pass parsed requests to it instead of their chapters.
 
 Thus a recorded robot is played back behind real doors, with their ports, framing and certificates.
 """
@@ -24,7 +24,7 @@ class Recorded(NamedTuple):
     last: int
 
 
-class StandInReply(NamedTuple):
+class ResponderReply(NamedTuple):
     """One answer in the protocol's own bytes; ``status`` as in the tap; ``last``: no further answer follows."""
 
     payload: bytes
@@ -32,13 +32,13 @@ class StandInReply(NamedTuple):
     last: bool = True
 
 
-class StandIn(ABC):
+class Responder(ABC):
     """Answers for one robot at all its doors. ``recorded``: the recording that it plays back, if any."""
 
     recorded: Recorded | None = None
 
     @abstractmethod
-    def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[StandInReply]:
+    def answer(self, door: str, operation: str, payload: bytes, *, reads: bool) -> AsyncIterator[ResponderReply]:
         """Yield the answers, each at its time; ``reads``: the request changes nothing.
 
         Send each before awaiting anything else, to keep its place among the pushes. Raises NotFound without an answer.
