@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.model.clock import HASTE, LEAD, LEAD_MAX, OWED_MAX, THOUGHT, PatientClock
+from roboglot.model.clock import COMPUTATION_MAX, HASTE, LEAD, LEAD_MAX, OWED_MAX, PatientClock
 from tests.slow_machine import Hours
 
 STEPS = st.tuples(st.sampled_from(["pass", "tick", "pause", "resume", "speed"]), st.floats(0.01, 5.0))
@@ -56,25 +56,25 @@ async def test_timers_wait_with_their_clock() -> None:
     assert start + 2.5 * LEAD_MAX <= clock.time() <= start + 3 * LEAD_MAX + 1e-9
 
 
-async def test_time_waits_for_thoughts(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_time_waits_for_computations(monkeypatch: pytest.MonkeyPatch) -> None:
     hours = Hours(monkeypatch)
     clock = PatientClock(speed=6.0)
-    with clock.thinking():
+    with clock.computing():
         hours.now += 0.01
-        with clock.thinking():
+        with clock.computing():
             hours.now += 10.0
-            assert clock.time() == pytest.approx(THOUGHT)
+            assert clock.time() == pytest.approx(COMPUTATION_MAX)
         hours.now += 10.0
-        assert clock.time() == pytest.approx(THOUGHT)  # the first goes on
+        assert clock.time() == pytest.approx(COMPUTATION_MAX)  # the first goes on
     hours.now += 0.001
-    assert THOUGHT < clock.time() <= THOUGHT + 0.006 * (1 + HASTE) + 1e-9
-    assert clock.behind == pytest.approx(20.01 * 6.0 - THOUGHT - OWED_MAX * 6.0)
+    assert COMPUTATION_MAX < clock.time() <= COMPUTATION_MAX + 0.006 * (1 + HASTE) + 1e-9
+    assert clock.behind == pytest.approx(20.01 * 6.0 - COMPUTATION_MAX - OWED_MAX * 6.0)
 
 
 async def test_a_thought_that_hangs_holds_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboglot.model.clock.THOUGHT_MAX", 0.01)
+    monkeypatch.setattr("roboglot.model.clock.HUNG_AFTER", 0.01)
     clock = PatientClock(speed=1000.0)
-    with clock.thinking():
+    with clock.computing():
         await asyncio.wait_for(clock.sleep(2.0), 60)
 
 

@@ -15,7 +15,7 @@ async def computed(clock: Clock, work: Callable[[], T]) -> T:
     """Return or raise the result of ``work``."""
     if isinstance(clock, LockstepClock):
         return work()
-    with clock.thinking():
+    with clock.computing():
         return await asyncio.to_thread(work)
 
 

@@ -26,7 +26,8 @@ YIELD_AFTER = 0.5  # s of lockstep time
 ROUNDS_MAX = 200  # of the event loop
 LEAD, LEAD_MAX = 0.03, 0.1  # robot s by which a patient clock may be ahead of the world, at 1 x and at great speeds
 LEAD_REAL = 0.002  # real s that the lead must last: timers are no finer than half of that
-THOUGHT, THOUGHT_MAX = 0.5, 60.0  # robot s that a robot's computation takes at most, real s that time waits for it
+COMPUTATION_MAX = 0.5  # robot s that a robot's computation takes at most
+HUNG_AFTER = 60.0  # real s that time waits for a computation
 HASTE = 0.25  # share by which a patient clock runs faster after it stood still
 OWED_MAX = 0.5  # real s that it makes up for at most
 STANDING = 0.002  # real s between two checks of a patient clock that stands still
@@ -121,14 +122,14 @@ class RealClock(Clock):
 class PatientClock(RealClock):
     """A real clock that waits for the world and for what robots compute: on a slow machine robot time falls behind.
 
-    It may be ahead of the world by LEAD to LEAD_MAX, and of a computation by THOUGHT. After it stood still, it runs
-    faster by HASTE to make up for up to OWED_MAX; any more is lost, and counted in ``behind``. Until the first call of
-    ``reached`` it does not wait for the world.
+    It may be ahead of the world by LEAD to LEAD_MAX, and of a computation by COMPUTATION_MAX. After it stood still,
+    it runs faster by HASTE to make up for up to OWED_MAX; any more is lost, and counted in ``behind``. Until the first
+    call of ``reached`` it does not wait for the world.
     """
 
     def __init__(self, speed: float = 1.0) -> None:
         self._reach = self._limit = math.inf  # robot time that the world allows; at which the clock stands still
-        self._thoughts: dict[object, float] = {}  # robot time that each allows
+        self._computations: dict[object, float] = {}  # robot time that each allows
         self._owed = 0.0  # robot s at the anchor
         super().__init__(speed)
 
@@ -150,19 +151,19 @@ class PatientClock(RealClock):
         self._wait_anew()
 
     @contextmanager
-    def thinking(self) -> Iterator[None]:
-        thought = object()
-        self._thoughts[thought] = self.time() + THOUGHT
+    def computing(self) -> Iterator[None]:
+        computation = object()
+        self._computations[computation] = self.time() + COMPUTATION_MAX
         self._wait_anew()
-        hung = asyncio.get_running_loop().call_later(THOUGHT_MAX, self._forget, thought)
+        hung = asyncio.get_running_loop().call_later(HUNG_AFTER, self._forget, computation)
         try:
             yield
         finally:
             hung.cancel()
-            self._forget(thought)
+            self._forget(computation)
 
-    def _forget(self, thought: object) -> None:
-        if self._thoughts.pop(thought, None) is not None:
+    def _forget(self, computation: object) -> None:
+        if self._computations.pop(computation, None) is not None:
             self._wait_anew()
 
     def _wait_anew(self) -> None:
@@ -172,7 +173,7 @@ class PatientClock(RealClock):
             owed = min(robot + (now - real) * self._speed + self._owed, self._until) - self._limit
             self._anchor, self._owed = (now, self._limit), min(owed, OWED_MAX * self._speed)
             self.behind += owed - self._owed
-        self._limit = min(self._reach, *self._thoughts.values(), math.inf)
+        self._limit = min(self._reach, *self._computations.values(), math.inf)
 
     def real_seconds_until(self, when: float) -> float | None:
         if when > self._until:

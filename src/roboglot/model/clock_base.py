@@ -93,7 +93,7 @@ class Clock(ABC):
         """Report that the world has been simulated up to ``stamp``; inf: the world is gone."""
 
     @contextmanager
-    def thinking(self) -> Iterator[None]:
+    def computing(self) -> Iterator[None]:
         """Compute in a thread inside ``with`` for a robot: time that depends on the machine's speed waits for it."""
         yield
 
