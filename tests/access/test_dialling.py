@@ -9,12 +9,12 @@ import pytest
 
 from roboglot.access.tunnel import connector, dialling
 from roboglot.access.tunnel.connector import KnownGateways
-from roboglot.access.tunnel.dialling import Dialling, Ended, OnePlace, Place
+from roboglot.access.tunnel.dialling import Dialling, Ended, FixedGateway, Gateway
 
 
 def dial(port: int, folder: Path, said: list[str]) -> Dialling:
-    place = Place("127.0.0.1", port, KnownGateways(folder / "gateways.json"))
-    return Dialling(OnePlace(place), "a", "token", "127.0.0.1", lambda *_: None, said.append)
+    gateway = Gateway("127.0.0.1", port, KnownGateways(folder / "gateways.json"))
+    return Dialling(FixedGateway(gateway), "a", "token", "127.0.0.1", lambda *_: None, said.append)
 
 
 async def test_gateways_that_do_not_answer_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

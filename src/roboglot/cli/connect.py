@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 import typer
 
 from roboglot.access.tunnel.connector import APPS, AnnouncedGateway, KnownGateways, NotTrusted, Refused
-from roboglot.access.tunnel.dialling import Dialling, Ended, OnePlace, Place, Places, Unusable
+from roboglot.access.tunnel.dialling import Dialling, Ended, FixedGateway, Gateway, Gateways, Unusable
 from roboglot.config import ROBOTS_MAX, is_loopback
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.escaping import visible
@@ -103,10 +103,10 @@ def addresses(count: int, first: str, network: str) -> list[str]:
 
 
 async def _keep_all(
-    places: AbstractContextManager[Places], robots: dict[str, str], token: str, apps: frozenset[int], *, once: bool
+    gateways: AbstractContextManager[Gateways], robots: dict[str, str], token: str, apps: frozenset[int], *, once: bool
 ) -> None:
     """Keep each robot's ports on its address."""
-    with places as known:
+    with gateways as known:
         await together(
             *(
                 Dialling(known, name, token, address, partial(_ready, address), _print, apps).keep(once=once)
@@ -125,26 +125,26 @@ def _print(line: str) -> None:
     print(f"roboglot connect: {visible(line)}", file=sys.stderr)
 
 
-class _Registered:
-    """Places from the registry of robots, which has each gateway's certificate."""
+class _RegisteredGateways:
+    """Gateways from the registry of robots, which has each gateway's certificate."""
 
     def __init__(self, lookup: GatewayLookup) -> None:
-        self._whereabouts = lookup
+        self._lookup = lookup
 
-    async def of(self, robot: str) -> Place | None:
+    async def of(self, robot: str) -> Gateway | None:
         """Return the robot's gateway, or None. Raises OSError."""
-        found = await self._whereabouts.of(robot)
+        found = await self._lookup.of(robot)
         if found is None:
             return None
-        return Place(found.host, found.port, AnnouncedGateway(found.certificate), found.epoch)
+        return Gateway(found.host, found.port, AnnouncedGateway(found.certificate), found.epoch)
 
-    async def moved(self, robot: str, place: Place) -> None:
+    async def moved(self, robot: str, gateway: Gateway) -> None:
         """Return when the registry has another gateway of the robot."""
-        await self._whereabouts.moved(robot, place.epoch)
+        await self._lookup.moved(robot, gateway.epoch)
 
 
 @contextmanager
-def registered(registry: str) -> Iterator[Places]:
+def registered(registry: str) -> Iterator[Gateways]:
     """Context to find robots by a registry: a PostgreSQL URL, or a file. Raises OSError, ValueError, sqlite3.Error."""
     from roboglot.storage.gateways import GatewayLookup
     from roboglot.storage.opening import read_registry
@@ -152,13 +152,13 @@ def registered(registry: str) -> Iterator[Places]:
 
     database = read_registry(registry)
     try:
-        yield _Registered(GatewayLookup(RobotRegistry(database)))
+        yield _RegisteredGateways(GatewayLookup(RobotRegistry(database)))
     finally:
         database.close()
 
 
-def _one(gateway: str) -> AbstractContextManager[Places]:
-    """Return the given gateway as the place of all robots. Raises ValueError."""
+def _one(gateway: str) -> AbstractContextManager[Gateways]:
+    """Return the given gateway as that of all robots. Raises ValueError."""
     try:
         parts = urlsplit(f"//{gateway}")
         host, port = parts.hostname, parts.port or PORT
@@ -166,7 +166,7 @@ def _one(gateway: str) -> AbstractContextManager[Places]:
         host = None
     if not host or gateway.endswith(":") or parts.netloc != gateway:
         raise ValueError(f"{gateway!r} is not HOST or HOST:PORT, such as [::1]:50090")
-    return nullcontext(OnePlace(Place(host, port, KnownGateways(_settings() / "gateways.json"))))
+    return nullcontext(FixedGateway(Gateway(host, port, KnownGateways(_settings() / "gateways.json"))))
 
 
 def _settings() -> Path:

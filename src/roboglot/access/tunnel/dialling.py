@@ -25,7 +25,7 @@ class Ended(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Gateway:
     """A gateway. ``epoch`` changes with each move of the robot."""
 
     host: str
@@ -34,27 +34,27 @@ class Place:
     epoch: int = 0
 
 
-class Places(Protocol):
+class Gateways(Protocol):
     """Finds the gateway of a robot."""
 
-    async def of(self, robot: str, /) -> Place | None:
+    async def of(self, robot: str, /) -> Gateway | None:
         """Return the robot's gateway; None if it has none at present. Raises OSError."""
 
-    async def moved(self, robot: str, place: Place, /) -> None:
-        """Return when the robot is no longer at this place."""
+    async def moved(self, robot: str, gateway: Gateway, /) -> None:
+        """Return when this is the robot's gateway no longer."""
 
 
-class OnePlace:
+class FixedGateway:
     """One fixed gateway for all robots."""
 
-    def __init__(self, place: Place) -> None:
-        self._place = place
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
 
-    async def of(self, _robot: str, /) -> Place:
+    async def of(self, _robot: str, /) -> Gateway:
         """Return the gateway."""
-        return self._place
+        return self._gateway
 
-    async def moved(self, _robot: str, _place: Place, /) -> None:
+    async def moved(self, _robot: str, _gateway: Gateway, /) -> None:
         """Wait forever: robots do not move."""
         await asyncio.Event().wait()
 
@@ -64,7 +64,7 @@ class Dialling:
 
     def __init__(
         self,
-        places: Places,
+        gateways: Gateways,
         robot: str,
         token: str,
         address: str,
@@ -72,15 +72,15 @@ class Dialling:
         say: Callable[[str], None],
         apps: Collection[int] = APPS,
     ) -> None:
-        self._places, self._robot, self._token, self._address = places, robot, token, address
+        self._gateways, self._robot, self._token, self._address = gateways, robot, token, address
         self._ready, self._say, self._apps = ready, say, apps
         self._said = ""
 
     async def keep(self, *, once: bool = False) -> None:
         """Keep the ports open; ``once``: until the tunnel is lost (Ended). Raises NotTrusted, Refused, Unusable."""
         while True:
-            place = await self._find()
-            lost = await self._carry(place)
+            gateway = await self._find()
+            lost = await self._carry(gateway)
             if once:
                 raise Ended(f"robot {self._robot}: {lost or 'it moved'}")
             if lost:
@@ -89,22 +89,22 @@ class Dialling:
             else:
                 self._say_once("it moved")
 
-    async def _find(self) -> Place:
+    async def _find(self) -> Gateway:
         while True:
             try:
-                if place := await self._places.of(self._robot):
-                    return place
+                if gateway := await self._gateways.of(self._robot):
+                    return gateway
                 self._say_once("no gateway is known that leads to it now")
             except OSError as error:
                 self._say_once(str(error))
             await asyncio.sleep(SOON)
 
-    async def _carry(self, place: Place) -> str:
+    async def _carry(self, gateway: Gateway) -> str:
         """Carry the ports until the tunnel is lost or the robot has moved; return why it is lost, "" if it moved."""
         robot, token, address = self._robot, self._token, self._address
-        connector = Connector(place.host, place.port, robot, token, address, place.trust, self._apps)
+        connector = Connector(gateway.host, gateway.port, robot, token, address, gateway.trust, self._apps)
         running = asyncio.ensure_future(connector.run(self._open))
-        moving = asyncio.ensure_future(self._places.moved(self._robot, place))
+        moving = asyncio.ensure_future(self._gateways.moved(self._robot, gateway))
         try:
             await asyncio.wait([running, moving], return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -113,34 +113,34 @@ class Dialling:
             (outcome, _) = await asyncio.gather(running, moving, return_exceptions=True)
         if isinstance(outcome, asyncio.CancelledError):
             return ""
-        return await self._lost(outcome, place)
+        return await self._lost(outcome, gateway)
 
     def _open(self, ports: list[int], fingerprint: str, new: bool) -> None:
         self._said = ""
         self._ready(self._robot, ports, fingerprint, new)
 
-    async def _lost(self, outcome: object, place: Place) -> str:
+    async def _lost(self, outcome: object, gateway: Gateway) -> str:
         """Return why a tunnel ended; "" if the robot has moved meanwhile."""
         match outcome:
             case NotTrusted() | Refused():
-                if await self._is_there(place):
+                if await self._is_there(gateway):
                     raise outcome
                 return ""
             case OSError() | TimeoutError() | asyncio.IncompleteReadError():
                 if unusable := _unusable(outcome, self._address):
                     raise Unusable(unusable) from None
-                return f"{place.host}:{place.port}: {in_words(outcome) or 'no answer'}"
+                return f"{gateway.host}:{gateway.port}: {in_words(outcome) or 'no answer'}"
             case BaseException():
                 raise outcome
         return ""
 
-    async def _is_there(self, place: Place) -> bool:
-        """Return whether the gateway at ``place`` is still the robot's."""
+    async def _is_there(self, gateway: Gateway) -> bool:
+        """Return whether ``gateway`` is still the robot's."""
         try:
-            now = await self._places.of(self._robot)
+            now = await self._gateways.of(self._robot)
         except OSError:
             return True
-        return now is not None and (now.host, now.port, now.epoch) == (place.host, place.port, place.epoch)
+        return now is not None and (now.host, now.port, now.epoch) == (gateway.host, gateway.port, gateway.epoch)
 
     def _say_once(self, why: str) -> None:
         if why != self._said:

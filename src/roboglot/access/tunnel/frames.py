@@ -6,7 +6,7 @@ import struct
 from enum import IntEnum
 from typing import NamedTuple
 
-FRAME_MAX = 64 * 1024  # bytes of one frame's payload
+FRAME_MAX = 0xFFFF  # bytes of one frame's payload
 HEAD = struct.Struct("!BIH")
 PORT = struct.Struct("!H")
 CREDIT = struct.Struct("!I")
@@ -40,5 +40,5 @@ class BadFrame(ValueError):
 
 
 def encode(kind: FrameKind, stream: int = 0, payload: bytes = b"") -> bytes:
-    """Return the frame's bytes; the payload has at most FRAME_MAX - 1."""
+    """Return the frame's bytes; the payload has at most FRAME_MAX."""
     return HEAD.pack(kind, stream, len(payload)) + payload
