@@ -18,7 +18,7 @@ from roboglot.clients.errors import ClientError
 from roboglot.model.clock import RealClock
 from roboglot.model.tap import SILENT, Direction, Exchange
 from roboglot.recording.comparing.comparison import Comparison, answers_only, compare
-from roboglot.recording.comparing.names import Names
+from roboglot.recording.comparing.ids import IdMap
 from roboglot.recording.lines import Line, Target, status_of
 from roboglot.recording.reader import BadRecording, Recording, read_recording
 from roboglot.recording.replaying import Replay
@@ -206,7 +206,7 @@ async def repeated(robot: Numbered, heard: list[str]) -> Comparison:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Target, "line", lambda *_: ToNumbered(robot, heard))
         live = await Replay(recorded, target, RealClock(), fast=True).run()
-    return compare(recorded, live, names=Names())
+    return compare(recorded, live, ids=IdMap())
 
 
 async def test_new_name_of_a_thing_is_no_difference() -> None:
@@ -226,11 +226,11 @@ async def test_name_of_another_thing_is_a_difference(muddle: str) -> None:
     assert [difference.what for difference in current.differences][:1] == ["$.action_id"]
 
 
-def test_words_and_other_fields_are_no_names() -> None:
-    names = Names()
+def test_words_and_other_fields_are_no_ids() -> None:
+    ids = IdMap()
     for path, one, other in (("$.grid", 3, 4), ("$.valid", 1, 2), ("$.map_id", "office", "lobby"), ("$.x", 1, 2)):
-        assert names.agree(path, one, other) is None
-    assert names.agree("$.action_id", 1, "1") is None
-    assert names.agree("$.taskId", "order-2026-0001", "order-2026-0007")
-    assert not names.agree("$.taskId", "order-2026-0001", "order-2026-0008")
-    assert not names.agree("$.taskId", "order-2026-0002", "order-2026-0007")
+        assert ids.agree(path, one, other) is None
+    assert ids.agree("$.action_id", 1, "1") is None
+    assert ids.agree("$.taskId", "order-2026-0001", "order-2026-0007")
+    assert not ids.agree("$.taskId", "order-2026-0001", "order-2026-0008")
+    assert not ids.agree("$.taskId", "order-2026-0002", "order-2026-0007")

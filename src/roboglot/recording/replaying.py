@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from roboglot.clients.errors import ClientError, LinkLost
 from roboglot.model.clock import Clock
 from roboglot.model.tap import Direction, Exchange
-from roboglot.recording.comparing.names import IDS_MAX, NOT_NAMED, Name, name_of, renamed
+from roboglot.recording.comparing.ids import IDS_MAX, NO_ID, Id, id_of, with_ids
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.lines import Line, Target
 from roboglot.recording.reader import AnsweredRequest, pair
@@ -33,7 +33,7 @@ class Replay:
         self._asked = [asked for asked in pair(sendable(recorded)[0])[0] if asked.request.door == target.door]
         self._target, self._clock, self._fast = target, clock, fast
         self._found: list[Exchange] = []
-        self._ids: dict[Name, str] = {}
+        self._ids: dict[Id, str] = {}
         self._started = 0.0
         self._answered = False
         self._lost: LinkLost | None = None
@@ -112,9 +112,9 @@ class Replay:
         """Remember the robot's new ids for the recorded ones: the newest, as it may give one again."""
         now: dict[str, object] = dict(leaves(tree(live)))
         for path, value in leaves(tree(recorded)):
-            old, new = name_of(path, value), name_of(path, now.get(path))
-            if NOT_NAMED not in (old, new) and (old in self._ids or len(self._ids) < IDS_MAX):
+            old, new = id_of(path, value), id_of(path, now.get(path))
+            if NO_ID not in (old, new) and (old in self._ids or len(self._ids) < IDS_MAX):
                 self._ids[old] = str(now[path])
 
     def _renamed(self, payload: bytes) -> bytes:
-        return renamed(payload, self._ids, head=self._target.door == "slamware")
+        return with_ids(payload, self._ids, head=self._target.door == "slamware")

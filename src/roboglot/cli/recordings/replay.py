@@ -36,8 +36,8 @@ def command(
     from roboglot.model.clock import RealClock
     from roboglot.recording.comparing import reports
     from roboglot.recording.comparing.comparison import answers_only, compare
+    from roboglot.recording.comparing.ids import IdMap
     from roboglot.recording.comparing.masks import Mask, read_mask
-    from roboglot.recording.comparing.names import Names
     from roboglot.recording.lines import Target
     from roboglot.recording.probing import first_of
     from roboglot.recording.reader import read_recording
@@ -52,7 +52,7 @@ def command(
         sys.exit(f"roboglot replay: {in_words(first_of(errors))}")
     if withheld:
         print(f"{withheld} requests are not sent, because they contain [redacted]", file=sys.stderr)
-    comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast, names=Names())
+    comparison = compare(answers_only(recorded), answers_only(live), used, order=not fast, ids=IdMap())
     comparison.reason = "a replay compares answers"
     try:
         if html:

@@ -9,8 +9,8 @@ from dataclasses import field
 from itertools import pairwise
 
 from roboglot.model.tap import Direction, Exchange
+from roboglot.recording.comparing.ids import IdMap
 from roboglot.recording.comparing.masks import ComparisonMode, Mask
-from roboglot.recording.comparing.names import Names
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.matching import normal
 from roboglot.recording.reader import AnsweredRequest, pair
@@ -105,7 +105,7 @@ class Comparison:
 
     @property
     def doors(self) -> list[str]:
-        """Names of the doors, sorted."""
+        """IdMap of the doors, sorted."""
         return sorted({row.door for row in self.rows})
 
 
@@ -115,11 +115,11 @@ def compare(
     mask: Mask | None = None,
     *,
     order: bool = True,
-    names: Names | None = None,
+    ids: IdMap | None = None,
 ) -> Comparison:
     """Compare two sessions, of one robot each; ``order``: compare the order of operations, too.
 
-    ``names``: ids agree if each stands for the same one throughout, as where one session repeats the other; None: they
+    ``ids``: they agree if each stands for the same one throughout, as where one session repeats the other; None: they
     are compared as other values are, and any two UUIDs agree.
     """
     mask = mask or Mask()
@@ -127,7 +127,7 @@ def compare(
     asked_one, pushed_one = pair(one)
     asked_other, pushed_other = pair(other)
     starts = _start(one), _start(other)
-    _compare_answers(rows, asked_one, asked_other, mask, names)
+    _compare_answers(rows, asked_one, asked_other, mask, ids)
     _compare_pushes(rows, [e for _, e in pushed_one], [e for _, e in pushed_other], starts, mask)
     if order:
         compare_order(rows, one, other)
@@ -153,7 +153,7 @@ def _compare_answers(
     ones: Sequence[AnsweredRequest],
     others: Sequence[AnsweredRequest],
     mask: Mask,
-    names: Names | None,
+    ids: IdMap | None,
 ) -> None:
     left: dict[tuple[str, str, str], list[AnsweredRequest]] = defaultdict(list)
     for asked in others:
@@ -164,7 +164,7 @@ def _compare_answers(
         row.ones += 1
         alike = left[_key(asked)]
         if alike:
-            _compare_replies(row, asked, alike.pop(0), mask, names)
+            _compare_replies(row, asked, alike.pop(0), mask, ids)
         else:
             row.check(False, "request", asked.request.payload, MISSING)
     for alike in left.values():
@@ -177,15 +177,15 @@ def _key(asked: AnsweredRequest) -> tuple[str, str, str]:
     return request.door, request.operation, normal(request.door, request.payload).text
 
 
-def _compare_replies(row: Row, one: AnsweredRequest, other: AnsweredRequest, mask: Mask, names: Names | None) -> None:
+def _compare_replies(row: Row, one: AnsweredRequest, other: AnsweredRequest, mask: Mask, ids: IdMap | None) -> None:
     row.check(len(one.replies) == len(other.replies), "number of replies", len(one.replies), len(other.replies))
     for mine, theirs in zip(one.replies, other.replies, strict=False):
         row.check(mine.status == theirs.status, "status", mine.status, theirs.status)
         row.check(mask.in_time(mine.seconds, theirs.seconds), "seconds", mine.seconds, theirs.seconds)
-        _compare_payloads(row, mine.payload, theirs.payload, mask, names)
+        _compare_payloads(row, mine.payload, theirs.payload, mask, ids)
 
 
-def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask, names: Names | None = None) -> None:
+def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask, ids: IdMap | None = None) -> None:
     mine, theirs = dict(leaves(tree(one))), dict(leaves(tree(other)))
     for path in mine | theirs:
         a, b = mine.get(path, MISSING), theirs.get(path, MISSING)
@@ -194,7 +194,7 @@ def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask, names: Nam
         elif path not in mine or path not in theirs:
             good = False
         else:
-            named = names.agree(path, a, b) if names is not None and mask.how(row.operation, path) is None else None
+            named = ids.agree(path, a, b) if ids is not None and mask.how(row.operation, path) is None else None
             good = mask.agree(row.operation, path, a, b) if named is None else named
         row.check(good, path, a, b)
 

@@ -1,7 +1,7 @@
-"""Names that a robot makes new in each session, such as ids of actions: pairs those of two recordings one to one.
+"""Ids that a robot makes new in each session, such as those of actions: maps those of two recordings one to one.
 
-Such a name is a UUID anywhere, or a number or a text with digits in a field whose name says id. UUIDs are unique;
-the others are so among the fields of their name: action 1 is not wall 1.
+An id is a UUID anywhere, or a number or a text with digits in a field whose name says id. UUIDs are unique; the others
+are so among the fields of their name: action 1 is not wall 1.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ _id_key = re.compile(r"(?:.*[_a-z0-9])?(?:Id|ID)|(?:.*_)?id")  # neither "grid" 
 _in_path = re.compile(rb"(?<=/)([^/?\n]+)/([^/?\n]+)(?=[/?\n]|$)")
 _in_query = re.compile(rb"(?<=[?&])(\w+)=([^&\n]+)")
 _in_json = re.compile(rb'"([^"\\]+)"(\s*:\s*"?)([^"\\,}\]\s]+)(?=["\s,}])')
-Name = tuple[str, str]  # the kind, "" for UUIDs, and the name
-NOT_NAMED: Name = ("", "")
+Id = tuple[str, str]  # the kind, "" for UUIDs, and the id
+NO_ID: Id = ("", "")
 
 
-def name_of(path: str, value: object) -> Name:
-    """Return the name that a field at ``path`` ("$.actions[0].action_id") holds; NOT_NAMED if it is none."""
+def id_of(path: str, value: object) -> Id:
+    """Return the id that a field at ``path`` ("$.actions[0].action_id") holds; NO_ID if it is none."""
     if isinstance(value, str) and _uuid.fullmatch(value):
         return "", value.lower()
     found = _last.search(path)
     if found is None or not _id_key.fullmatch(found[1]) or not _is_made(value):
-        return NOT_NAMED
+        return NO_ID
     return found[1].lower(), str(value)
 
 
@@ -38,17 +38,17 @@ def _is_made(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-class Names:
-    """The names of two sessions: each of one stands for the same one of the other throughout."""
+class IdMap:
+    """One-to-one map between the ids of two sessions, made as they are compared."""
 
     def __init__(self) -> None:
-        self._theirs: dict[Name, Name] = {}
-        self._ours: dict[Name, Name] = {}
+        self._theirs: dict[Id, Id] = {}
+        self._ours: dict[Id, Id] = {}
 
     def agree(self, path: str, one: object, other: object) -> bool | None:
-        """Return whether two values are names of the same thing, from now on; None if they are not names."""
-        ours, theirs = name_of(path, one), name_of(path, other)
-        if NOT_NAMED in (ours, theirs) or type(one) is not type(other):
+        """Return whether two values are ids of the same thing, from now on; None if they are not ids."""
+        ours, theirs = id_of(path, one), id_of(path, other)
+        if NO_ID in (ours, theirs) or type(one) is not type(other):
             return None
         if ours in self._theirs or theirs in self._ours:
             return self._theirs.get(ours) == theirs
@@ -57,30 +57,30 @@ class Names:
         return True
 
 
-def renamed(payload: bytes, names: Mapping[Name, str], *, head: bool) -> bytes:
-    """Return a request with other names: UUIDs, and ids in JSON; with ``head`` also in the path, which comes first."""
-    if not names:
+def with_ids(payload: bytes, ids: Mapping[Id, str], *, head: bool) -> bytes:
+    """Return a request with other ids, by the old ones; with ``head`` also in the path, which comes first."""
+    if not ids:
         return payload
-    payload = _uuid_bytes.sub(lambda found: _other(names, "", found[0].lower()) or found[0], payload)
+    payload = _uuid_bytes.sub(lambda found: _other(ids, "", found[0].lower()) or found[0], payload)
     first, blank, body = payload.partition(b"\n\n") if head else (b"", b"", payload)
 
     def in_path(found: re.Match[bytes]) -> bytes:
-        kinds = (kind for kind, name in names if name.encode() == found[2] and _is_of(kind, found[1]))
-        return b"%b/%b" % (found[1], next((_other(names, kind, found[2]) for kind in kinds), b"") or found[2])
+        kinds = (kind for kind, id in ids if id.encode() == found[2] and _is_of(kind, found[1]))
+        return b"%b/%b" % (found[1], next((_other(ids, kind, found[2]) for kind in kinds), b"") or found[2])
 
     def in_query(found: re.Match[bytes]) -> bytes:
-        return b"%b=%b" % (found[1], _other(names, found[1].decode().lower(), found[2]) or found[2])
+        return b"%b=%b" % (found[1], _other(ids, found[1].decode().lower(), found[2]) or found[2])
 
     def in_json(found: re.Match[bytes]) -> bytes:
         key = found[1].decode("utf-8", "replace")
-        new = _other(names, key.lower(), found[3]) if _id_key.fullmatch(key) else b""
+        new = _other(ids, key.lower(), found[3]) if _id_key.fullmatch(key) else b""
         return b'"%b"%b%b' % (found[1], found[2], new or found[3])
 
     return _in_query.sub(in_query, _in_path.sub(in_path, first)) + blank + _in_json.sub(in_json, body)
 
 
-def _other(names: Mapping[Name, str], kind: str, name: bytes) -> bytes:
-    return names.get((kind, name.decode("utf-8", "replace")), "").encode()
+def _other(ids: Mapping[Id, str], kind: str, id: bytes) -> bytes:
+    return ids.get((kind, id.decode("utf-8", "replace")), "").encode()
 
 
 def _is_of(kind: str, segment: bytes) -> bool:
