@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboglot.programs.language import BUILTINS, Names, ProblemKind, check, compile_unit
+from roboglot.programs.language import BUILTINS, Namespace, ProblemKind, check, compile_unit
 from roboglot.programs.language.instrument import Marks
 from roboglot.programs.language.places import Places
 from roboglot.programs.language.policy import attribute_allowed
@@ -16,7 +16,7 @@ from roboglot.programs.language.problems import _SYNTAX, from_syntax_error
 from roboglot.programs.worker.environment import build_builtins
 
 MARKS = Marks([None], lambda _unit, _line: None)
-NAMES = Names(
+NAMES = Namespace(
     plain=frozenset({"StateCode", "say"}),
     dotted=frozenset({"cyberdog.motion.turn", "cyberdog.state", "StateCode.fail"}),
 )

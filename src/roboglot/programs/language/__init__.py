@@ -5,7 +5,7 @@ layer of defence; the boundary that confines a hostile program is the worker's j
 """
 
 from roboglot.programs.language.check import check, compile_unit, uses
-from roboglot.programs.language.names import BUILTINS, MODULES, Names
+from roboglot.programs.language.names import BUILTINS, MODULES, Namespace
 from roboglot.programs.language.problems import Problem, ProblemKind
 
-__all__ = ["BUILTINS", "MODULES", "Names", "Problem", "ProblemKind", "check", "compile_unit", "uses"]
+__all__ = ["BUILTINS", "MODULES", "Namespace", "Problem", "ProblemKind", "check", "compile_unit", "uses"]

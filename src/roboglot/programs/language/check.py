@@ -12,7 +12,7 @@ from itertools import islice
 from types import CodeType
 
 from roboglot.programs.language.instrument import Marks, instrument
-from roboglot.programs.language.names import Names, free_names, unknown_names
+from roboglot.programs.language.names import Namespace, free_names, unknown_names
 from roboglot.programs.language.policy import violations
 from roboglot.programs.language.problems import Problem, ProblemKind, from_syntax_error
 
@@ -25,7 +25,7 @@ PROBLEMS_MAX = 50
 _LOOKED_AT_MAX = 4 * PROBLEMS_MAX
 
 
-def check(source: str, names: Names | None = None) -> list[Problem]:
+def check(source: str, names: Namespace | None = None) -> list[Problem]:
     """Return the problems of a program, in the order of its lines; empty if it can run.
 
     ``names``: names that the host offers; None skips the search for unknown names.

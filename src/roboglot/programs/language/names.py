@@ -43,7 +43,7 @@ _STAR_NAMES = {"math": frozenset(name for name in dir(math) if not name.startswi
 
 
 @dataclass(frozen=True, slots=True)
-class Names:
+class Namespace:
     """Names that the host offers.
 
     ``plain`` names (types, enums, module functions) and ``dotted`` ones such as ``cyberdog.motion.turn``.
@@ -58,7 +58,7 @@ class Names:
         return frozenset(name.partition(".")[0] for name in self.dotted)
 
 
-def unknown_names(tree: ast.Module, names: Names) -> Iterator[Problem]:
+def unknown_names(tree: ast.Module, names: Namespace) -> Iterator[Problem]:
     """Yield problems for undefined names and for misspelt parts of dotted names (``cyberdog.motion.trun``)."""
     bound = set(_bound(tree))
     known = bound | BUILTINS | names.plain | names.roots | {"time", "__name__"}

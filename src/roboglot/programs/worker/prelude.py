@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Any
 
-from roboglot.programs.language.names import Names
+from roboglot.programs.language.names import Namespace
 from roboglot.programs.worker.values import pack, unpack
 from roboglot.values import dataclass
 
@@ -59,11 +59,11 @@ class Prelude:
         """Return the names that the program may call."""
         return self.calls | self.attributes | TIME_CALLS
 
-    def names(self, functions: frozenset[str] = frozenset()) -> Names:
+    def names(self, functions: frozenset[str] = frozenset()) -> Namespace:
         """Return the names for the checker; ``functions``: those of the program's modules."""
         members = {f"{enum}.{member}" for enum, values in self.enums.items() for member in values}
         constructible = {name for name, kind in self.records.items() if kind.constructible}
-        return Names(frozenset(constructible | set(self.enums) | functions), self.calls | self.attributes | members)
+        return Namespace(frozenset(constructible | set(self.enums) | functions), self.calls | self.attributes | members)
 
     def to_wire(self) -> dict[str, object]:
         """Return the prelude in JSON types, for the worker."""
