@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from roboglot.model.geometry import Pose
 from roboglot.model.perception import JOINTS, Box, FaceSeen, GestureSeen, Joint, PersonSeen, RobotSeen, SkeletonSeen
 from roboglot.simulation.bodies.hull import Hull
-from roboglot.simulation.detectors.glance import PIXEL_NOISE, Floats, Glance
+from roboglot.simulation.detectors.observation import PIXEL_NOISE, Floats, Observation
 from roboglot.simulation.people import figure
 from roboglot.simulation.people.people import Walker
 from roboglot.values import dataclass
@@ -44,97 +44,106 @@ class _SeenPerson:
         return middle
 
 
-def see_people(glance: Glance) -> list[PersonSeen]:
+def see_people(observation: Observation) -> list[PersonSeen]:
     """Return the people who are sufficiently visible."""
     found = []
-    for who in _people_in_sight(glance):
-        distance, place = glance.estimate(who.middle)
-        found.append(PersonSeen(glance.shaken(who.box), _number(who, glance), distance, place))
+    for who in _people_in_sight(observation):
+        distance, place = observation.estimate(who.middle)
+        found.append(PersonSeen(observation.shaken(who.box), _number(who, observation), distance, place))
     return found
 
 
-def see_skeletons(glance: Glance) -> list[SkeletonSeen]:
+def see_skeletons(observation: Observation) -> list[SkeletonSeen]:
     """Return the joints of people, with those outside the picture or hidden marked as invisible."""
     found = []
-    for who in _people_in_sight(glance):
-        places, _ = glance.view.project(who.joints)
-        places += glance.random.standard_normal(places.shape) * PIXEL_NOISE * (1.0, glance.view.aspect)
+    for who in _people_in_sight(observation):
+        places, _ = observation.view.project(who.joints)
+        places += observation.random.standard_normal(places.shape) * PIXEL_NOISE * (1.0, observation.view.aspect)
         joints = tuple(Joint(x, y, visible) for (x, y), visible in zip(places.tolist(), who.seen.tolist(), strict=True))
-        found.append(SkeletonSeen(glance.shaken(who.box), _number(who, glance), joints, glance.view.aspect))
+        found.append(
+            SkeletonSeen(observation.shaken(who.box), _number(who, observation), joints, observation.view.aspect)
+        )
     return found
 
 
-def see_faces(glance: Glance) -> list[FaceSeen]:
+def see_faces(observation: Observation) -> list[FaceSeen]:
     """Return the faces turned to the camera and near enough to be distinguished."""
     found = []
-    for who in _people_in_sight(glance):
+    for who in _people_in_sight(observation):
         walker = who.walker
         head = who.joints[HEAD].mean(axis=0)
         facing = Pose(float(head[0]), float(head[1]), walker.pose.yaw)
-        box = glance.view.box(_turned(glance.view.corners(FACE_LOW, FACE_HIGH), walker.pose.yaw) + head)
-        if box is None or box.height < FACE_HEIGHT or glance.bearing_from(facing) > FRONTAL or not who.seen[HEAD].all():
+        box = observation.view.box(_turned(observation.view.corners(FACE_LOW, FACE_HIGH), walker.pose.yaw) + head)
+        if (
+            box is None
+            or box.height < FACE_HEIGHT
+            or observation.bearing_from(facing) > FRONTAL
+            or not who.seen[HEAD].all()
+        ):
             continue
-        age = walker.person.age + float(glance.random.standard_normal()) * AGE_NOISE
-        distance, _ = glance.estimate(head)
-        name = glance.names.get(walker.face, "")
-        number = _number(who, glance)
-        found.append(FaceSeen(glance.shaken(box), number, walker.face, name, max(0.0, age), walker.emotion, distance))
+        age = walker.person.age + float(observation.random.standard_normal()) * AGE_NOISE
+        distance, _ = observation.estimate(head)
+        name = observation.names.get(walker.face, "")
+        number = _number(who, observation)
+        found.append(
+            FaceSeen(observation.shaken(box), number, walker.face, name, max(0.0, age), walker.emotion, distance)
+        )
     return found
 
 
-def see_gestures(glance: Glance) -> list[GestureSeen]:
+def see_gestures(observation: Observation) -> list[GestureSeen]:
     """Return the gestures made towards the camera with a visible hand."""
     found = []
-    for who in _people_in_sight(glance):
+    for who in _people_in_sight(observation):
         showing = who.walker.showing
         if showing is None or showing[1] < GESTURE_TIME or who.distance > GESTURE_RANGE:
             continue
-        if who.seen[WRIST] and glance.bearing_from(who.walker.pose) <= FRONTAL:
-            found.append(GestureSeen(glance.shaken(who.box), showing[0].gesture, _number(who, glance)))
+        if who.seen[WRIST] and observation.bearing_from(who.walker.pose) <= FRONTAL:
+            found.append(GestureSeen(observation.shaken(who.box), showing[0].gesture, _number(who, observation)))
     return found
 
 
-def see_robots(glance: Glance) -> list[RobotSeen]:
+def see_robots(observation: Observation) -> list[RobotSeen]:
     """Return the other robots that are sufficiently visible."""
     found = []
-    for hull in glance.around.hulls:
-        if hull is glance.hull or hull.floor != glance.floor:
+    for hull in observation.around.hulls:
+        if hull is observation.hull or hull.floor != observation.floor:
             continue
-        away = math.dist((hull.pose.x, hull.pose.y), glance.view.at[:2])
+        away = math.dist((hull.pose.x, hull.pose.y), observation.view.at[:2])
         if away > ROBOT_RANGE:
             continue
-        box = glance.view.box(_outline(hull))
+        box = observation.view.box(_outline(hull))
         if box is None or box.height < ROBOT_HEIGHT:
             continue
-        if glance.visible(_spots(hull, glance), hull).mean() < PART or glance.overlooked():
+        if observation.visible(_spots(hull, observation), hull).mean() < PART or observation.overlooked():
             continue
         middle = np.array((hull.pose.x, hull.pose.y, hull.elevation + hull.belly))
-        distance, place = glance.estimate(middle)
-        found.append((away, RobotSeen(glance.shaken(box), distance, place)))
+        distance, place = observation.estimate(middle)
+        found.append((away, RobotSeen(observation.shaken(box), distance, place)))
     return [robot for _, robot in sorted(found, key=lambda entry: entry[0])]
 
 
-def _people_in_sight(glance: Glance) -> Iterator[_SeenPerson]:
+def _people_in_sight(observation: Observation) -> Iterator[_SeenPerson]:
     """Yield the people in sight, nearest first."""
     near = []
-    for walker in glance.around.walkers:
-        away = math.dist((walker.pose.x, walker.pose.y), glance.view.at[:2])
-        if walker.floor == glance.floor and away <= PEOPLE_RANGE:
+    for walker in observation.around.walkers:
+        away = math.dist((walker.pose.x, walker.pose.y), observation.view.at[:2])
+        if walker.floor == observation.floor and away <= PEOPLE_RANGE:
             near.append((away, walker))
     for away, walker in sorted(near, key=lambda entry: entry[0]):
-        at = np.array((walker.pose.x, walker.pose.y, glance.ground))
+        at = np.array((walker.pose.x, walker.pose.y, observation.ground))
         own = walker.joints
-        box = glance.view.box(_turned(glance.view.corners(*figure.extent(own)), walker.pose.yaw) + at)
+        box = observation.view.box(_turned(observation.view.corners(*figure.extent(own)), walker.pose.yaw) + at)
         if box is None or box.height < PERSON_HEIGHT:
             continue
         joints = _turned(own, walker.pose.yaw) + at
-        seen = glance.visible(joints, walker)
-        if seen.mean() >= PART and not glance.overlooked():
+        seen = observation.visible(joints, walker)
+        if seen.mean() >= PART and not observation.overlooked():
             yield _SeenPerson(walker, joints, seen, box, away)
 
 
-def _number(who: _SeenPerson, glance: Glance) -> int:
-    return glance.numbers.setdefault(who.walker.key, len(glance.numbers) + 1)
+def _number(who: _SeenPerson, observation: Observation) -> int:
+    return observation.numbers.setdefault(who.walker.key, len(observation.numbers) + 1)
 
 
 def _turned(places: Floats, yaw: float) -> Floats:
@@ -157,9 +166,9 @@ def _outline(hull: Hull) -> Floats:
     return np.concatenate([np.stack((x, y, np.full(24, z)), axis=1) for z in _heights(hull)])
 
 
-def _spots(hull: Hull, glance: Glance) -> Floats:
+def _spots(hull: Hull, observation: Observation) -> Floats:
     """Return nine points across a robot, as seen from the camera (world)."""
-    bearing = math.atan2(hull.pose.y - glance.view.at[1], hull.pose.x - glance.view.at[0])
+    bearing = math.atan2(hull.pose.y - observation.view.at[1], hull.pose.x - observation.view.at[0])
     low, high = _heights(hull)
     aside = 0.8 * hull.body.hull.radius
     return np.array(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboglot.model.perception import LINE_POINTS, LinePoint, LineSeen
-from roboglot.simulation.detectors.glance import PIXEL_NOISE, Floats, Glance
+from roboglot.simulation.detectors.observation import PIXEL_NOISE, Floats, Observation
 from roboglot.simulation.detectors.tapes import Tape
 
 LINE_RANGE = 3.0  # m
@@ -14,24 +14,24 @@ SHORTEST = 12  # points of uninterrupted tape that make a line
 CURVATURE_NOISE = 0.02  # 1/m
 
 
-def see_lines(glance: Glance) -> list[LineSeen]:
+def see_lines(observation: Observation) -> list[LineSeen]:
     """Return the nearest visible piece of each line, if it is long enough; nearest line first."""
     found = []
-    for tape in glance.around.tapes(glance.floor):
-        run = _nearest_run(tape, glance)
-        if run is not None and not glance.overlooked():
-            away = float(np.hypot(*(tape.points[run[0]] - glance.view.at[:2])))
-            found.append((away, _line(tape, run, glance)))
+    for tape in observation.around.tapes(observation.floor):
+        run = _nearest_run(tape, observation)
+        if run is not None and not observation.overlooked():
+            away = float(np.hypot(*(tape.points[run[0]] - observation.view.at[:2])))
+            found.append((away, _line(tape, run, observation)))
     return [line for _, line in sorted(found, key=lambda entry: entry[0])]
 
 
-def _nearest_run(tape: Tape, glance: Glance) -> NDArray[np.intp] | None:
+def _nearest_run(tape: Tape, observation: Observation) -> NDArray[np.intp] | None:
     """Return the indices of the nearest visible piece, from its nearer end; None: there is none."""
-    away = np.hypot(*(tape.points - glance.view.at[:2]).T)
+    away = np.hypot(*(tape.points - observation.view.at[:2]).T)
     seen = away <= LINE_RANGE
     if not seen.any():
         return None
-    seen[seen] = glance.visible(_on_floor(tape.points[seen], glance))
+    seen[seen] = observation.visible(_on_floor(tape.points[seen], observation))
     runs = [run for run in _runs(seen, tape.closed) if len(run) >= SHORTEST]
     if not runs:
         return None
@@ -50,10 +50,10 @@ def _runs(seen: NDArray[np.bool_], closed: bool) -> list[NDArray[np.intp]]:
     return list(runs)
 
 
-def _line(tape: Tape, run: NDArray[np.intp], glance: Glance) -> LineSeen:
-    view, random = glance.view, glance.random
+def _line(tape: Tape, run: NDArray[np.intp], observation: Observation) -> LineSeen:
+    view, random = observation.view, observation.random
     picked = np.linspace(0, len(run) - 1, LINE_POINTS).round().astype(np.intp)
-    places, _ = view.project(_on_floor(tape.points[run], glance))
+    places, _ = view.project(_on_floor(tape.points[run], observation))
     before, after = np.maximum(picked - 2, 0), np.minimum(picked + 2, len(run) - 1)
     ahead = places[after] - places[before]
     angles = np.arctan2(ahead[:, 0] * view.aspect, -ahead[:, 1])
@@ -65,5 +65,5 @@ def _line(tape: Tape, run: NDArray[np.intp], glance: Glance) -> LineSeen:
     return LineSeen(tape.colour, tuple(LinePoint(x, y, angle, bend) for (x, y), angle, bend in points))
 
 
-def _on_floor(points: Floats, glance: Glance) -> Floats:
-    return np.column_stack((points, np.full(len(points), glance.ground)))
+def _on_floor(points: Floats, observation: Observation) -> Floats:
+    return np.column_stack((points, np.full(len(points), observation.ground)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from roboglot.model.geometry import Pose
 from roboglot.simulation.building.building import Building
 from roboglot.simulation.building.things import Things
-from roboglot.simulation.detectors.glance import Surroundings
+from roboglot.simulation.detectors.observation import Surroundings
 from roboglot.simulation.radio.gadgets import Gadgets
 from roboglot.simulation.radio.radio import Radio
 from roboglot.simulation.rendering.render_pool import RenderPool

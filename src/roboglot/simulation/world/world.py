@@ -32,7 +32,7 @@ from roboglot.simulation.bodies.files import load_body
 from roboglot.simulation.bodies.part import Fitting
 from roboglot.simulation.bodies.ticks import RobotTicks
 from roboglot.simulation.building.building import Building
-from roboglot.simulation.detectors.glance import Surroundings
+from roboglot.simulation.detectors.observation import Surroundings
 from roboglot.simulation.faults.faults import Faults
 from roboglot.simulation.people.crowd import Crowd
 from roboglot.simulation.people.people import Walker, keyed

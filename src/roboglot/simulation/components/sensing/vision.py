@@ -24,8 +24,8 @@ from roboglot.simulation.bodies.hull import Hull
 from roboglot.simulation.bodies.part import Fitting, Part
 from roboglot.simulation.detectors.bodies import see_faces, see_gestures, see_people, see_robots, see_skeletons
 from roboglot.simulation.detectors.cards import see_markers, see_tags
-from roboglot.simulation.detectors.glance import Glance, Surroundings
 from roboglot.simulation.detectors.lines import see_lines
+from roboglot.simulation.detectors.observation import Observation, Surroundings
 from roboglot.simulation.rendering.projection import view_of
 from roboglot.simulation.world.randomness import RandomStreams
 
@@ -116,12 +116,12 @@ class SimulatedVision(Vision):
         for close in self._closing:
             close()
 
-    def _detector(self, name: str, see: Callable[[Glance], list[T]]) -> SimulatedDetector[T]:
+    def _detector(self, name: str, see: Callable[[Observation], list[T]]) -> SimulatedDetector[T]:
         random = self._chances.of(self._robot.id, "vision", name)
 
         def look() -> list[T]:
             view, known = view_of(self._camera, self._hull), self._faces()
-            return see(Glance(self._around, self._hull, view, random, self._numbers, known))
+            return see(Observation(self._around, self._hull, view, random, self._numbers, known))
 
         detector = SimulatedDetector(name, self._section.rate, self._robot.clock, look)
         self._closing.append(detector.close)

@@ -1,4 +1,4 @@
-"""One look at the world through one robot's camera, shared by all detectors. Knows no kind of thing."""
+"""Observation of the world by one robot's camera, shared by all detectors. Knows no kind of thing."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Surroundings:
 
 
 @dataclass(slots=True)
-class Glance:
-    """One look; ``numbers``: the robot's numbers of people, kept between looks; ``names``: of known faces."""
+class Observation:
+    """One instant's view; ``numbers``: the robot's numbers of people, kept between instants; ``names``: of faces."""
 
     around: Surroundings
     hull: Hull
