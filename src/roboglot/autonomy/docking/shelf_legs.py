@@ -61,10 +61,8 @@ class CarriedLegs:
                 self._set_down(reader.carried)
             reader.carried, self._load.radius = None, 0.0
         elif reader.carried is None and (scan := self._robot[Lidar].scan) is not None:
-            reader.carried = np.array(
-                [(leg.x, leg.y) for leg in standing_among(legs_of(ScanReader().read(scan).points))]
-            )
-            reader.carried = reader.carried.reshape(-1, 2)
+            legs = standing_among(legs_of(ScanReader().read(scan).points))
+            reader.carried = np.array([(leg.x, leg.y) for leg in legs]).reshape(-1, 2)
             self._take_up(reader.carried)
 
     def _take_up(self, legs: Floats) -> None:

@@ -39,9 +39,8 @@ def _cluster(points: Points, place: Point, within: float) -> Points | None:
         return None
     linked = np.hypot(*(near[:, None] - near[None]).transpose(2, 0, 1)) <= LINK
     inside = np.hypot(near[:, 0] - place.x, near[:, 1] - place.y) <= away.min()
-    count = 0
-    while count != (count := int(inside.sum())):
-        inside = linked[inside].any(axis=0)
+    while (grown := linked[inside].any(axis=0)).sum() > inside.sum():
+        inside = grown
     cluster: Points = near[inside]
     return cluster
 

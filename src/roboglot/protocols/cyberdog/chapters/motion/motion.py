@@ -100,7 +100,5 @@ async def motion(
         return {"error_code": int(InBandError.TIMEOUT)}
     if code is not MotionCode.DONE:
         call.why = reason(code, motion_id, request)
-    motion = (
-        call.context.gaits.motion if call.context.profile is Profile.ROBOT else motion_id
-    )  # what robots then report
-    return {"motion_id": int(motion), "result": code is MotionCode.DONE, "code": int(code)}
+    reported = call.context.gaits.motion if call.context.profile is Profile.ROBOT else motion_id
+    return {"motion_id": int(reported), "result": code is MotionCode.DONE, "code": int(code)}
