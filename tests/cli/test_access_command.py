@@ -71,10 +71,14 @@ def test_mistakes_are_reported_in_one_line(tmp_path: Path, arguments: tuple[str,
 
 
 def test_the_audit_is_printed_and_verified(tmp_path: Path) -> None:
+    known = Entry(time.time(), "anna", "10.0.0.7:1", "a", "slamware", "DELETE /x", "done")
+    unknown = Entry(time.time(), "", "10.0.0.8:1", "a", "", "", "turned away", "why")
     with open_trail(tmp_path) as trail:
-        trail.add([Entry(time.time(), "anna", "10.0.0.7:1", "a", "slamware", "DELETE /x", "done")])
-    assert "anna 10.0.0.7:1 DELETE /x done" in call("audit", "--data", str(tmp_path)).stdout
-    assert "1 rows are intact" in call("audit", "--verify", "--data", str(tmp_path)).stdout
+        trail.add([known, unknown])
+    printed = call("audit", "--data", str(tmp_path)).stdout
+    assert "a slamware anna 10.0.0.7:1 DELETE /x done\n" in printed
+    assert "a - - 10.0.0.8:1 - turned away: why\n" in printed  # a column of its own for each field
+    assert "2 rows are intact" in call("audit", "--verify", "--data", str(tmp_path)).stdout
 
 
 def test_rights_are_read_and_written() -> None:

@@ -57,7 +57,7 @@ def _print(trail: Trail, robot: str, after: int) -> int:
 
 def _line(number: int, entry: Entry) -> str:
     when = f"{datetime.fromtimestamp(entry.at).astimezone():%Y-%m-%d %H:%M:%S}"
-    who = f"{entry.who or '-'} {entry.address}".strip()
+    parts = (entry.robot, entry.door, entry.who, entry.address, entry.operation)
     again = f" (and {entry.repeats} times before)" if entry.repeats else ""
     reason = f": {entry.reason}" if entry.reason else ""
-    return in_line(f"{number} {when} {entry.robot} {entry.door} {who} {entry.operation} {entry.outcome}{reason}{again}")
+    return in_line(f"{number} {when} {' '.join(part or '-' for part in parts)} {entry.outcome}{reason}{again}")
