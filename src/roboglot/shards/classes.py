@@ -100,17 +100,17 @@ class FleetClasses:
         if self._nameless >= NAMELESS_MAX:
             return None
         self._nameless += 1
-        why = "it sent no name"
+        fault = "it sent no name"
         try:
             async with asyncio.timeout(NAMELESS_SECONDS):
                 hello = _decode(await reader.readline())
             if isinstance(hello, Hello):
                 return hello
         except BROKEN as error:
-            why = str(error) or why
+            fault = str(error) or fault
         finally:
             self._nameless -= 1
-        self._limited.warning("", "disconnected a world: %s", why)
+        self._limited.warning("", "disconnected a world: %s", fault)
         return None
 
     async def close(self) -> None:
