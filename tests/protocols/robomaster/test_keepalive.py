@@ -1,4 +1,4 @@
-"""Peers that vanished are disconnected; those that are there and do not read are not."""
+"""Peers that vanished are disconnected, those that are there and do not read are not; nobody is there to refuse."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ import socket
 import struct
 from dataclasses import dataclass, field
 from typing import Any, cast
+from unittest.mock import Mock
 
 import pytest
+import uvloop
 
+from roboglot.protocols.robomaster.connection import ControlConnection
 from roboglot.protocols.robomaster.keepalive import LOOK_PERIOD, probe_for_life, unanswered
 from roboglot.protocols.robomaster.limits import WATCH_PERIOD
 from tests.protocols.robomaster.text_client import ADDRESS
@@ -94,3 +97,25 @@ def test_kernels_figures_stand_where_they_are_read() -> None:
             probes, _, silent = unanswered(served)
             assert (probes, silent < 60_000) == (0, True)
             client.recv(1)
+
+
+def test_clients_gone_at_once_are_not_refused(caplog: pytest.LogCaptureFixture) -> None:
+    uvloop.run(_meet_gone_clients(3))  # asyncio's own loop still knows whose they were
+    assert "refused" not in caplog.text
+
+
+async def _meet_gone_clients(count: int) -> None:
+    made: list[ControlConnection] = []
+
+    def make() -> ControlConnection:
+        made.append(ControlConnection(Mock(), set(), Mock()))
+        return made[-1]
+
+    server = await asyncio.get_running_loop().create_server(make, ADDRESS, 0)
+    for _ in range(count):
+        with socket.create_connection(server.sockets[0].getsockname()) as gone:  # before it is accepted
+            gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # ends with a reset
+    async with asyncio.timeout(100):
+        while len(made) < count or not all(hasattr(one, "transport") for one in made):  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
+    server.close()

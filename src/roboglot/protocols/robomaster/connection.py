@@ -84,12 +84,14 @@ class ControlConnection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = transport = cast(asyncio.Transport, transport)  # uvloop's transport does not inherit from it
-        peer = transport.get_extra_info("peername")  # None: already disconnected
-        self.host = peer[0] if peer else ""
-        self._name = f"{peer[0]}:{peer[1]}" if peer else ""
-        who = self._context.robot.admission.cached_identity(self._name) if peer else None
+        peer = transport.get_extra_info("peername")
+        if not peer:  # already disconnected
+            transport.abort()
+            return
+        self.host, self._name = peer[0], f"{peer[0]}:{peer[1]}"
+        who = self._context.robot.admission.cached_identity(self._name)
         self._shown = f"{who} at {self.host}" if who else self.host
-        if not peer or len(self._connections) >= CONTROL_CONNECTIONS_MAX:
+        if len(self._connections) >= CONTROL_CONNECTIONS_MAX:
             log.warning("robomaster: refused %s: %d connections are open", self.host, len(self._connections))
             transport.abort()
             return
