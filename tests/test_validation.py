@@ -159,7 +159,15 @@ def test_a_deep_nest_is_named() -> None:
     assert why_invalid(raised.value) == "JSON is nested too deeply"
 
 
-@pytest.mark.parametrize(("sent", "words"), [(b'"\xff"', "the text is not UTF-8"), (b'{"x"', "JSON is incomplete")])
+@pytest.mark.parametrize(
+    ("sent", "words"),
+    [
+        (b'"\xff"', "the text is not UTF-8"),
+        (b'{"x"', "JSON is incomplete"),
+        (b'{"x": {"y": 1e400}}', "a number is out of range"),
+        (b'{"x": [1' + b"0" * 5000 + b"]}", "a number is out of range"),
+    ],
+)
 def test_broken_json_is_named_in_plain_words(sent: bytes, words: str) -> None:
     with pytest.raises(ValueError) as raised:  # noqa: PT011 - of two libraries
         msgspec.json.decode(sent)

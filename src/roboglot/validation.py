@@ -44,6 +44,7 @@ _FORMS = {  # the library's messages; the first group of a missing or unknown fi
     r"Expected `\w+` that's a multiple of (.+)": "{place} must be a multiple of {}",
     r"Expected `str` matching regex '(.+)'": "{place} must match {}",
     r"Invalid (?:enum )?value (.+)": "{place} cannot be {}",
+    r"(?:Number|Integer value) out of range": "a number is out of range",  # of a place that the library does not name
 }
 # Text that would be read as a number where text may be one, or has letters of these words or a minus escaped.
 _NO_NUMBER = re.compile(rb'"-?(nan|inf|infinity)"|\\u00(2d|[46][169e]|[57][49])', re.IGNORECASE)
