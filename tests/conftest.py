@@ -210,7 +210,7 @@ def pytest_collection_finish() -> None:
     """Leave all that was loaded out of garbage collections: it stays. What is garbage of it is not worth a look."""
     gc.freeze()
     gc.enable()
-    gc.set_threshold(20_000, 20, 20)  # a test's world is thousands of objects that end together
+    gc.set_threshold(5_000, 5, 5)  # a world is thousands of objects that end together
 
 
 @pytest.fixture(scope="session")
