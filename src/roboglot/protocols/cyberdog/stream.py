@@ -35,7 +35,7 @@ class Stream:
         self._reader = None
 
     def attach(self) -> Reader:
-        """Take over the stream: yield the latest feedback, then all further ones up to the result."""
+        """Take over the stream; return a queue of the latest feedback and all that follows, up to the result."""
         self.unbind()
         self._reader = asyncio.Queue(UNREAD_MAX)
         if self._last is not None:
