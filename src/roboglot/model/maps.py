@@ -59,7 +59,9 @@ class OccupancyGrid:
 
     def trimmed(self) -> OccupancyGrid:
         """Return the smallest window that holds every known cell; empty if none is known."""
-        rows, cols = (np.flatnonzero(self.log_odds.any(axis=axis)) for axis in (1, 0))
+        rows = cols = np.empty(0, np.intp)
+        if self.log_odds.size:  # a map of 0 by 10^10 cells is small, and its rows' masks are not
+            rows, cols = (np.flatnonzero(self.log_odds.any(axis=axis)) for axis in (1, 0))
         if not len(rows):
             return OccupancyGrid(self.log_odds[:0, :0], self.resolution, self.origin)
         origin = Point(self.origin.x + int(cols[0]) * self.resolution, self.origin.y + int(rows[0]) * self.resolution)

@@ -43,6 +43,17 @@ def test_grid_without_known_cells_is_an_empty_map() -> None:
     assert evidence_of(OccupancyGrid(np.zeros((9, 9), np.int8), 0.05, Point())).scans == 0
 
 
+@pytest.mark.parametrize("shape", [(0, 1 << 50), (1 << 50, 0)])
+def test_cells_that_are_not_there_take_no_memory(shape: tuple[int, int]) -> None:
+    assert evidence_of(OccupancyGrid(np.zeros(shape, np.int8), 0.05, Point())).scans == 0
+
+
+@pytest.mark.parametrize("resolution", [1e-4, 1e-9, 1e-300])
+def test_tiny_maps_are_one_cell(resolution: float) -> None:
+    cells = np.array([[-1, 5], [0, -1]], np.int8)
+    assert evidence_of(OccupancyGrid(cells, resolution, Point())).occupancy().log_odds.tolist() == [[5]]
+
+
 @pytest.mark.parametrize("shape", [(1, 9000), (3000, 2800)])
 def test_a_map_that_is_too_large_is_refused(shape: tuple[int, int]) -> None:
     cells = np.zeros(shape, np.int8)

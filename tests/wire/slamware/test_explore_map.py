@@ -50,6 +50,7 @@ def test_encoded_maps_are_decoded_unchanged(cells: np.ndarray) -> None:
         HEADER.pack(0, 0, 2, 2, float("nan"), 4) + bytes(4),
         HEADER.pack(float("inf"), 0, 2, 2, 0.05, 4) + bytes(4),
         HEADER.pack(0, 0, 1 << 31, 1 << 31, 0.05, 0),
+        HEADER.pack(0, 0, 0, (1 << 32) - 1, 0.05, 0),
     ],
 )
 def test_bytes_that_are_no_map_are_refused(data: bytes) -> None:

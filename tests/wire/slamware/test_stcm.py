@@ -85,6 +85,8 @@ def test_grids() -> None:
     assert stcm_layers.read_grid(Layer((*layer.pairs, ("compression", "rle")), layer.payload)) is None
     for broken, words in (
         (Layer(layer.pairs, layer.payload[:-1]), "3 x 2 cells do not make 5"),
+        (Layer((*layer.pairs, ("dimension_width", "0"), ("dimension_height", "9" * 12))), "cells do not make 0"),
+        (Layer((*layer.pairs, ("dimension_width", "9" * 50), ("dimension_height", "0"))), "cells do not make 0"),
         (Layer((*layer.pairs, ("origin_x", "nan")), layer.payload), "no map has its corner"),
         (Layer((*layer.pairs, ("origin_x", "")), layer.payload), "the grid's origin_x is missing or no number"),
         (Layer((*layer.pairs, ("resolution_x", "0")), layer.payload), "cells of 0.0 x"),

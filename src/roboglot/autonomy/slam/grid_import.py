@@ -41,7 +41,7 @@ def _resampled(grid: OccupancyGrid) -> tuple[NDArray[np.int8], int, int]:
     row, column = grid.origin.y / RESOLUTION, grid.origin.x / RESOLUTION
     if not all(map(math.isfinite, (row, column, finer))) or finer <= 0.0:
         raise InvalidGoal("the map has no place")
-    height, width = math.ceil(grid.height / finer - SAME), math.ceil(grid.width / finer - SAME)
+    height, width = (max(1, math.ceil(side / finer - SAME)) for side in (grid.height, grid.width))
     if is_too_large(height, width):
         raise InvalidGoal(f"a map has at most {CELLS_MAX * RESOLUTION**2:,.0f} m2, {GRID_MAX * RESOLUTION:g} m a side")
     if abs(finer - 1.0) < SAME:

@@ -50,7 +50,7 @@ def decode_explore_map(data: bytes) -> ExploreMap:
     if len(data) < HEADER.size:
         raise BadMap(f"{len(data)} bytes are too few for the header of {HEADER.size}")
     x, y, width, height, resolution, size = HEADER.unpack_from(data)
-    if width * height != size or size > CELLS_MAX:
+    if width * height != size or max(width, height, size) > CELLS_MAX:
         raise BadMap(f"{width} x {height} cells do not make {size}")
     if len(data) != HEADER.size + size:
         raise BadMap(f"{len(data) - HEADER.size} cells came, {size} were announced")

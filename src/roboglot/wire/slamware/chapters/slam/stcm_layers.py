@@ -119,8 +119,9 @@ def read_grid(layer: Layer) -> ExploreMap | None:
     width, height = (_number(values, key, int) for key in ("dimension_width", "dimension_height"))
     keys = ("origin_x", "origin_y", "resolution_x", "resolution_y")
     x, y, resolution, other = (_number(values, key, float) for key in keys)
-    if not (min(width, height) >= 0 and width * height == len(layer.payload) <= CELLS_MAX):
-        raise BadMap(f"{width} x {height} cells do not make {len(layer.payload)}")
+    size = len(layer.payload)
+    if min(width, height) < 0 or width * height != size or max(width, height, size) > CELLS_MAX:
+        raise BadMap(f"{width} x {height} cells do not make {size}")
     if not (math.hypot(x, y) <= COORDINATE_MAX and 0 < resolution < math.inf and resolution == other):
         raise BadMap(f"no map has its corner at ({x}, {y}) and cells of {resolution} x {other} m")
     return ExploreMap(x, y, resolution, np.frombuffer(layer.payload, np.int8).reshape(height, width))
