@@ -55,6 +55,69 @@ async def test_answers_and_pushes_keep_times_and_clients_ids() -> None:
     assert pushed[1:] == [(104.1, b"chassis push position 2 0 0;")]
 
 
+async def test_sequence_numbers_replace_no_other_numbers() -> None:
+    """Recorded 4, live 99: a position of 4.5 m became 99.5 m, in answers and in pushes."""
+    rest = ("a", "robomaster", "127.0.0.1:5", "x")
+    session = [
+        Exchange(1.0, *rest, Direction.REQUEST, "chassis position", b"chassis position ? seq 4"),
+        Exchange(1.0, *rest, Direction.REPLY, "chassis position", b"4.500 4 0.000 seq 4 ;", "ok", "", 0.0),
+        Exchange(1.0, *rest, Direction.PUSH, "> chassis push", b"chassis push position 4.500 4 0.000;"),
+    ]
+    clock, pushed = LockstepClock(), list[bytes]()
+    playback = Playback(session, clock, 0.0)
+    playback.join("robomaster", lambda _, message: pushed.append(message))
+    asking = asyncio.create_task(ask(playback, b"chassis position ? seq 99", reads=True))
+    await clock.advance(1.0)
+    assert asking.result() == [(b"4.500 4 0.000 seq 99 ;", "ok")]
+    assert pushed == [b"chassis push position 4.500 4 0.000;"]
+
+
+@pytest.mark.parametrize(
+    ("recorded", "answered", "live", "expected"),
+    [
+        (b"chassis speed ?", b"0.100 0.000;", b"chassis speed ? seq 7;", b"0.100 0.000 seq 7 ;"),
+        (b"chassis speed ? seq 3", b"0.100 seq 3 ;", b"chassis speed ?;", b"0.100;"),
+        (b"chassis speed ? seq 3", b"0.100 seq 3 ", b"chassis speed ?", b"0.100 "),
+        (b"chassis move x 1", b"ok", b"chassis move x 1 seq 7", b"ok seq 7"),
+    ],
+)
+async def test_commands_match_with_and_without_sequence_numbers(
+    recorded: bytes, answered: bytes, live: bytes, expected: bytes
+) -> None:
+    rest = ("a", "robomaster", "127.0.0.1:5", "x")
+    operation = b" ".join(recorded.split()[:2]).decode()
+    session = [
+        Exchange(1.0, *rest, Direction.REQUEST, operation, recorded),
+        Exchange(1.0, *rest, Direction.REPLY, operation, answered, "ok", "", 0.0),
+    ]
+    clock = LockstepClock()
+    asking = asyncio.create_task(ask(Playback(session, clock, 0.0), live, reads=b"?" in live))
+    await clock.advance(1.0)
+    assert asking.result() == [(expected, "ok")]
+
+
+async def test_queries_with_sequence_numbers_repeat() -> None:
+    """They counted as commands, each answered once and in order."""
+    rest = ("a", "robomaster", "127.0.0.1:5", "x")
+    session = [
+        exchange
+        for n, speed in ((1, b"0.1;"), (2, b"0.2;"))
+        for exchange in (
+            Exchange(float(n), *rest, Direction.REQUEST, "chassis speed", b"chassis speed ? seq %d" % n),
+            Exchange(float(n), *rest, Direction.REPLY, "chassis speed", speed, "ok", "", 0.0),
+            Exchange(n + 0.5, *rest, Direction.REQUEST, "chassis move", b"chassis move x %d" % n),
+            Exchange(n + 0.5, *rest, Direction.REPLY, "chassis move", b"ok;", "ok", "", 0.0),
+        )
+    ]
+    clock = LockstepClock()
+    playback, seen = Playback(session, clock, 0.0), list[bytes]()
+    for line in (b"chassis speed ? seq 5", b"chassis speed ? seq 6", b"chassis move x 1", b"chassis speed ? seq 7"):
+        asking = asyncio.create_task(ask(playback, line, reads=b"?" in line))
+        await clock.advance(2.0)
+        seen += [payload for payload, _ in asking.result()]
+    assert seen == [b"0.1;", b"0.1;", b"ok;", b"0.2;"]
+
+
 async def test_unrecorded_requests_are_refused_and_noted(caplog: pytest.LogCaptureFixture) -> None:
     playback = Playback(pushing_session(), LockstepClock(), 0.0)
     with pytest.raises(NotFound, match="no such request"):

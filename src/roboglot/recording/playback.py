@@ -22,7 +22,7 @@ from roboglot.model.clock import Clock
 from roboglot.model.errors import NotFound
 from roboglot.model.responder import Recorded, Responder, ResponderReply
 from roboglot.model.tap import Exchange
-from roboglot.recording.matching import NormalizedRequest, normal, rewritten, without_numbers
+from roboglot.recording.matching import NormalizedRequest, normal, rewritten, with_seq, without_numbers
 from roboglot.recording.reader import AnsweredRequest, BadRecording, Recording, pair, read_recording
 from roboglot.recording.redaction import FIELDS, Redaction
 from roboglot.recording.timeline import Timeline
@@ -35,6 +35,7 @@ OFF_SHARE = 0.02  # ... or relative
 MISSING_MAX = 1000  # unrecorded requests that are kept
 DAY = 86_400.0
 IDS_MAX = 10_000
+_query = re.compile(rb"\?(?:\s+seq\s+\d+)?[\s;]*$")
 _inquiry = re.compile(rb'"operate"\s*:\s*"inquiry"')
 _time = re.compile(rb"(?<![\w.])1[5-9]\d{8}(?:\d{3}){0,3}(?![\w])")
 
@@ -101,6 +102,8 @@ class Playback(Responder):
             due = began + max(0.0, reply.stamp - asked.request.stamp)
             await kept.timeline.turn(due, number, in_order=in_order)
             payload = self._as_now(reply, recorded.fresh, live.fresh)
+            if door == "robomaster":
+                payload = with_seq(payload, recorded.fresh, live.fresh)
             yield ResponderReply(payload, reply.status, index == len(asked.numbered))
 
     def join(self, door: str, send: Callable[[str, bytes], None], reads: Collection[str] = ()) -> Callable[[], None]:
@@ -161,7 +164,7 @@ class Playback(Responder):
         if request.door == "slamware":
             return not request.payload.startswith((b"GET ", b"HEAD "))
         if request.door == "robomaster":
-            return not request.payload.rstrip(b" ;").endswith(b"?")
+            return not _query.search(request.payload)
         if request.door == "visual":
             if request.operation.startswith("/"):  # another path than that of the frames
                 return request.operation == "/debug"

@@ -209,8 +209,7 @@ async def _ask_responder(
     if context.robot.admission.enforced:
         context.robot.admission.check(DOOR, request.key, operation.right if operation else Right.ADMIN)
     try:
-        reads = text.rstrip(" ;").endswith("?")
-        async for reply in responder.answer(DOOR, request.key, text.encode(), reads=reads):
+        async for reply in responder.answer(DOOR, request.key, text.encode(), reads=command.query):
             return Answer(reply.payload, None if reply.status == "ok" else partial(str, reply.status))
     except NotFound as unknown:
         raise _Refusal(Reply.FAIL, partial(str, str(unknown))) from None
