@@ -39,6 +39,20 @@ def test_other_cell_sizes_are_resampled_without_losing_walls(resolution: float) 
     assert (again.log_odds[:, :20] == -50).all()
 
 
+@pytest.mark.parametrize("resolution", [0.0499, 0.033, 0.01])
+def test_cells_have_their_strongest_wall(resolution: float) -> None:
+    cells = np.random.default_rng(1).integers(-127, 127, (41, 33), dtype=np.int8)
+    found = evidence_of(OccupancyGrid(cells, resolution, Point())).occupancy().log_odds
+    wanted: dict[tuple[int, int], int] = {}
+    for (row, column), value in np.ndenumerate(cells):
+        at = tuple(
+            min(int(n / (0.05 / resolution)), most - 1) for n, most in zip((row, column), found.shape, strict=True)
+        )
+        before = wanted.get(at, 0)
+        wanted[at] = max(before, int(value)) if max(before, int(value)) > 0 else min(before, int(value))
+    assert wanted == {at: value for at, value in np.ndenumerate(found) if at in wanted}
+
+
 def test_grid_without_known_cells_is_an_empty_map() -> None:
     assert evidence_of(OccupancyGrid(np.zeros((9, 9), np.int8), 0.05, Point())).scans == 0
 

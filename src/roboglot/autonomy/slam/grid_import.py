@@ -52,32 +52,40 @@ def _resampled(grid: OccupancyGrid) -> tuple[NDArray[np.int8], int, int]:
             for n, most in ((height, grid.height), (width, grid.width))
         )
         return grid.log_odds[np.ix_(rows, columns)], round(row), round(column)
-    occupied, free = np.zeros((height, width), np.int8), np.zeros((height, width), np.int8)
-    rows, columns = ((np.arange(n) / finer).astype(int) for n in grid.log_odds.shape)
-    where = np.ix_(np.minimum(rows, height - 1), np.minimum(columns, width - 1))
-    np.maximum.at(occupied, where, grid.log_odds)
-    np.minimum.at(free, where, grid.log_odds)
-    return np.where(occupied > 0, occupied, free), round(row), round(column)
+    (rows, to_rows), (columns, to_columns) = (
+        _groups(np.minimum((np.arange(n) / finer).astype(int), most - 1))
+        for n, most in ((grid.height, height), (grid.width, width))
+    )
+    occupied = np.maximum.reduceat(np.maximum.reduceat(grid.log_odds, rows, axis=0), columns, axis=1)
+    free = np.minimum.reduceat(np.minimum.reduceat(grid.log_odds, rows, axis=0), columns, axis=1)
+    cells = np.zeros((height, width), np.int8)
+    cells[np.ix_(to_rows, to_columns)] = np.where(occupied > 0, occupied, free)
+    return cells, round(row), round(column)
+
+
+def _groups(ascending: NDArray[np.int_]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Return where each run of equal numbers begins, and its number."""
+    begins = np.flatnonzero(np.diff(ascending, prepend=-1))
+    return begins, ascending[begins]
 
 
 def _surfaces(cells: NDArray[np.int8]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Return the surfaces with the sides that they face, and their slots, in the form of ``kernels.occupancy``."""
-    height, width = cells.shape
-    free = np.pad(cells < 0, 1).astype(np.float32)
-    towards_x, towards_y = np.zeros((2, height, width), np.float32)
+    free = np.pad(cells < 0, 1)
+    rows, columns = np.nonzero(cells > 0)
+    count = len(rows)
+    towards_x, towards_y = np.zeros((2, count), np.float32)
     for down in (-1, 0, 1):
         for along in (-1, 0, 1):
             if down or along:
-                there = free[1 + down : 1 + down + height, 1 + along : 1 + along + width] / math.hypot(down, along)
+                there = free[rows + 1 + down, columns + 1 + along].astype(np.float32) / math.hypot(down, along)
                 towards_x += along * there
                 towards_y += down * there
     length = np.maximum(np.hypot(towards_x, towards_y), 1.0)  # a thin wall is seen from both sides
-    occupied = cells > 0
-    count = int(np.count_nonzero(occupied))
-    surfaces, slots = np.zeros((1 + count, 5), np.float32), np.zeros((height, width), np.int32)
-    slots[occupied] = np.arange(1, 1 + count)
+    surfaces, slots = np.zeros((1 + count, 5), np.float32), np.zeros(cells.shape, np.int32)
+    slots[rows, columns] = np.arange(1, 1 + count)
     surfaces[1:, 0] = HITS
     surfaces[1:, 1] = surfaces[1:, 2] = HITS * RESOLUTION / 2
-    surfaces[1:, 3] = HITS * (towards_x / length)[occupied]
-    surfaces[1:, 4] = HITS * (towards_y / length)[occupied]
+    surfaces[1:, 3] = HITS * (towards_x / length)
+    surfaces[1:, 4] = HITS * (towards_y / length)
     return surfaces, slots
