@@ -1,6 +1,7 @@
 """ROS maps become worlds: free stays free, walls stay walls, bad files are named."""
 
 import os
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -173,6 +174,7 @@ def test_noise_does_not_become_a_million_boxes(write):
         (b"P5\n9 9\n0\n" + bytes(81), "maxval"),
         (b"P2\n9 9\n255\n" + b"9" * 99, "Token too long"),
         (b"P5\n99999 99999\n255\n", "pixels"),
+        (b"P5\n9999 9999\n255\n", "more than 16000000"),  # of which the library would print a warning
         (None, "not a file"),
     ],
 )
@@ -183,4 +185,11 @@ def test_hostile_images_are_refused(write, tmp_path, image, message):
     else:
         (tmp_path / "hostile.pgm").write_bytes(image)
     with pytest.raises(BadFile, match=message):
+        load_world(path)
+
+
+def test_images_that_need_all_memory_are_refused(write, monkeypatch):
+    path = write(room())
+    monkeypatch.setattr(Image.Image, "convert", Mock(side_effect=MemoryError))
+    with pytest.raises(BadFile, match="more memory"):
         load_world(path)

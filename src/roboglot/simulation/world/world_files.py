@@ -5,6 +5,7 @@ Occupied cells become walls, exactly; unknown cells are empty space. A dock is p
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -132,7 +133,7 @@ def _pixels(path: Path) -> NDArray[np.float64]:
     try:
         if path.exists() and not path.is_file():
             raise BadFile(f"{path}: not a file")
-        with Image.open(path, formats=IMAGES) as image:
+        with warnings.catch_warnings(action="ignore"), Image.open(path, formats=IMAGES) as image:
             if image.width * image.height > CELLS_MAX:
                 raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than {CELLS_MAX}")
             if image.mode == "F":
@@ -145,6 +146,8 @@ def _pixels(path: Path) -> NDArray[np.float64]:
         raise BadFile(f"{path}: {reason}") from None
     except BadFile:
         raise
+    except MemoryError:  # by a part of a PNG that says that it has 4 GB
+        raise BadFile(f"{path}: it takes more memory than there is") from None
     except (Image.DecompressionBombError, ValueError, SyntaxError) as error:
         raise BadFile(f"{path}: {error}") from None
 
