@@ -169,6 +169,10 @@ def test_clients_find_doors_at_configured_ports(
 ) -> None:
     """``url`` and all clients went to the usual ports, where nothing listened."""
     assert robot_server.url.endswith(":1449")
+    assert "get_power_status" in dir(rest)  # for completion at a prompt
+    assert "inject_fault" in dir(robot_server.stage)
+    with pytest.raises(ValueError, match="time does not go back"):
+        robot_server.forward(-1.0)  # passed at once while a clock ran
     assert robot_server.programs_url.endswith(":50063/programs")
     assert rest.get_power_status().battery_percentage > 50
     assert robomaster.robot.get_battery() > 50

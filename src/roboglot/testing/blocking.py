@@ -62,6 +62,9 @@ class Blocking:
         else:
             setattr(self._target, name, value)
 
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *dir(self._target)})
+
     def __repr__(self) -> str:
         return f"Blocking({self._target!r})"
 

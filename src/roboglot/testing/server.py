@@ -247,6 +247,9 @@ class _LoopProxy:
     def __init__(self, target: object, loop: Loop) -> None:
         self._target, self._loop = target, loop
 
+    def __dir__(self) -> list[str]:
+        return dir(self._target)
+
     def __getattr__(self, name: str) -> Any:
         value = self._loop.run(lambda: getattr(self._target, name))
         if not callable(value):

@@ -16,7 +16,12 @@ TRACK_PERIOD = 0.2  # s of robot time between two points of a track
 
 
 async def pass_time(clock: Clock, seconds: float) -> None:
-    """Let ``seconds`` of robot time pass: in lockstep as fast as possible, else at the clock's speed."""
+    """Let ``seconds`` of robot time pass: in lockstep as fast as possible, else at the clock's speed.
+
+    Raises ValueError if negative.
+    """
+    if not seconds >= 0.0:
+        raise ValueError("time does not go back")
     await (clock.advance(seconds) if isinstance(clock, LockstepClock) else clock.sleep(seconds))
 
 

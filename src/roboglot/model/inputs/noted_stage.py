@@ -46,6 +46,9 @@ class _Noted:
             return value
         return partial(self._carry_out, name, value)
 
+    def __dir__(self) -> list[str]:
+        return dir(self._inner)
+
     def _person(self, name: str) -> StagePerson:
         person = _Noted(cast(Stage, self._inner).person(name), StagePerson, self._inputs, {PERSON: name})
         return cast(StagePerson, person)
