@@ -16,7 +16,7 @@ from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.errors import Collided, NotFound, Refused
 from roboglot.model.events import ArmorHit
-from roboglot.model.geometry import Pose, Twist, Vector3
+from roboglot.model.geometry import Point, Pose, Twist, Vector3
 from roboglot.model.sound import claps
 from roboglot.simulation.world.description import Box
 from roboglot.simulation.world.world_files import load_world
@@ -44,6 +44,38 @@ def test_stage_find_only_what_is_there(simulate):
     ):
         with pytest.raises(NotFound):
             touch()
+
+
+NAN, FAR = math.nan, 1e9
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda stage: stage.lift("a", NAN),
+        lambda stage: stage.lift("a", FAR),
+        lambda stage: stage.push("a", Vector3(0.0, 0.0, math.inf)),
+        lambda stage: stage.push("a", Vector3(FAR)),
+        lambda stage: stage.pull("a", Point(0.0, NAN)),
+        lambda stage: stage.roll_over("a", math.inf),
+        lambda stage: stage.touch("a", "often"),
+        lambda stage: stage.place("a", Pose(), 0.5),
+        lambda stage: stage.move_thing("can", Vector3(NAN)),
+        lambda stage: stage.make_sound(claps(1), Point(1.0, 1.0), loudness=NAN),
+    ],
+)
+async def test_impossible_values_change_nothing(simulate, ask):
+    """Not even for the robots beside it: all share one physics."""
+    sim = simulate("obstacle_course", robots=("a", "b"), body="cyberdog2")
+    hands = sim.world.stage
+    sim.world.start()
+    await sim.clock.advance(0.5)
+    before = [robot.pose for robot in hands.robots]
+    with pytest.raises(ValueError, match=r"not|no place"):
+        ask(hands)
+    await sim.clock.advance(0.5)
+    moved = [robot.pose.distance_to(there) for robot, there in zip(hands.robots, before, strict=True)]
+    assert max(moved) < 0.01, moved
 
 
 async def test_somebody_more_stands_in_way_until_taken_away(simulate):

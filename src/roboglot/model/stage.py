@@ -204,7 +204,7 @@ class Stage(ABC):
 
     @abstractmethod
     def lift(self, name: str, height: float = 0.3) -> None:
-        """Lift a robot by ``height`` m, and hold it there until ``let_go``."""
+        """Lift a robot by ``height`` m, and hold it there until ``let_go``. Raises ValueError beyond 10 m."""
 
     @abstractmethod
     def let_go(self, name: str) -> None:
@@ -212,18 +212,22 @@ class Stage(ABC):
 
     @abstractmethod
     def push(self, name: str, impulse: Vector3) -> None:
-        """Push a robot with an impulse (N s, base_link)."""
+        """Push a robot with an impulse (N s, base_link). Raises ValueError beyond 500 N s along an axis."""
 
     @abstractmethod
     def pull(self, name: str, force: Point) -> None:
         """Pull a robot's leash with a force (N, world) from now on; 0 lets it hang.
 
-        A robot that walks on a leash gives way; any other stands against it.
+        A robot that walks on a leash gives way; any other stands against it. Raises ValueError beyond 1000 N along an
+        axis.
         """
 
     @abstractmethod
     def roll_over(self, name: str, roll: float = math.pi) -> None:
-        """Roll a robot over by ``roll`` (rad about its x); 0: back onto its wheels."""
+        """Roll a robot over by ``roll`` (rad about its x); 0: back onto its wheels.
+
+        Raises ValueError beyond a whole turn.
+        """
 
     @abstractmethod
     def touch(self, name: str, kind: TouchKind = TouchKind.SINGLE) -> None:
@@ -260,7 +264,7 @@ class Stage(ABC):
 
     @abstractmethod
     def move_thing(self, name: str, position: Vector3) -> None:
-        """Move a small thing to a position (m), at rest."""
+        """Move a small thing to a position (m), at rest. Raises NotFound, ValueError beyond 10 km."""
 
     @abstractmethod
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
@@ -300,7 +304,7 @@ class Stage(ABC):
 
     @abstractmethod
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
-        """Play ``sound`` at a place, from now on. Raises ValueError if too many sounds are playing."""
+        """Play ``sound`` at a place, from now on. Raises ValueError if too many are playing, or too loud (over 100)."""
 
     # -- faults --
 

@@ -186,7 +186,7 @@ class Places:
 
     def inside(self, pose: Pose, floor: int) -> bool:
         """True if the floor exists and the place lies on it, be it occupied or not."""
-        if not 0 <= floor < len(self.world.floors) or not math.isfinite(pose.yaw):
+        if floor not in range(len(self.world.floors)) or not math.isfinite(pose.yaw):
             return False
         (x, y), (width, depth) = self.world.floors[floor].origin, self.world.floors[floor].size
         return x <= pose.x <= x + width and y <= pose.y <= y + depth

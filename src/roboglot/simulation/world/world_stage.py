@@ -41,6 +41,10 @@ if TYPE_CHECKING:
 
 TAG_HEIGHT_MAX = 5.0  # m
 TAG_SIZE_MIN, TAG_SIZE_MAX = 0.02, 2.0  # m, as in world files
+LIFTED_MAX = 10.0  # m up or down
+BLOW_MAX, PULL_MAX = 500.0, 1000.0  # N s, N along each axis: what is far stronger would break the physics of all robots
+AWAY_MAX = 10_000.0  # m from the world's origin, as in world files
+LOUDNESS_MAX = 100.0
 
 
 class WorldStage(Stage):
@@ -121,22 +125,24 @@ class WorldStage(Stage):
             battery.reset()
 
     def lift(self, name: str, height: float = 0.3) -> None:
-        self._population.hull(name).lift(height)
+        self._population.hull(name).lift(_bounded("height", "m", LIFTED_MAX, height)[0])
 
     def let_go(self, name: str) -> None:
         self._population.hull(name).lift(None)
 
     def push(self, name: str, impulse: Vector3) -> None:
-        self._population.hull(name).push(impulse.x, impulse.y, impulse.z)
+        blow = _bounded("an impulse along an axis", "N s", BLOW_MAX, impulse.x, impulse.y, impulse.z)
+        self._population.hull(name).push(*blow)
 
     def pull(self, name: str, force: Point) -> None:
-        self._population.hull(name).leash = (force.x, force.y)
+        along, across = _bounded("a force along an axis", "N", PULL_MAX, force.x, force.y)
+        self._population.hull(name).leash = along, across
 
     def roll_over(self, name: str, roll: float = math.pi) -> None:
-        self._population.hull(name).overturn(roll)
+        self._population.hull(name).overturn(_bounded("roll", "rad", math.tau, roll)[0])
 
     def touch(self, name: str, kind: TouchKind = TouchKind.SINGLE) -> None:
-        self._population.part(name, SimulatedTouch, Touch).touch(kind)
+        self._population.part(name, SimulatedTouch, Touch).touch(TouchKind(kind))
 
     def plug_in(self, name: str, wire: bool = True) -> None:
         self._population.part(name, SimulatedBattery, Battery).plug(wire)
@@ -171,7 +177,8 @@ class WorldStage(Stage):
         self._environment.sight.moved()
 
     def move_thing(self, name: str, position: Vector3) -> None:
-        self._environment.things[name].put(np.array((position.x, position.y, position.z)))
+        place = _bounded("a coordinate", "m", AWAY_MAX, position.x, position.y, position.z)
+        self._environment.things[name].put(np.array(place))
 
     def add_obstacle(self, pose: Pose, size: tuple[float, float, float] = (0.4, 0.4, 1.0), floor: int = 0) -> int:
         self._check_inside(pose, floor)
@@ -219,6 +226,8 @@ class WorldStage(Stage):
 
     def make_sound(self, sound: Sound, at: Point, floor: int = 0, loudness: float = 1.0) -> None:
         self._check_inside(Pose(at.x, at.y), floor)
+        if not 0.0 <= loudness <= LOUDNESS_MAX:
+            raise ValueError(f"the loudness of a sound is 0 to {LOUDNESS_MAX:g}, not {loudness:g}")
         self._environment.air.emit(Source(sound, at, floor, self._clock.time(), loudness))
 
     @property
@@ -244,3 +253,10 @@ class WorldStage(Stage):
         """Raise Refused if a robot stands where something is put: it would be pressed through the floor."""
         if robot := Truth(self._population, self._environment).robot_in(solid, floor):
             raise Refused(f"{robot} stands there")
+
+
+def _bounded(what: str, unit: str, most: float, *values: float) -> Sequence[float]:
+    """Return the values. Raises ValueError beyond ``most`` in either direction, and for what is no number."""
+    if not all(abs(value) <= most for value in values):
+        raise ValueError(f"{what} is at most {most:.4g} {unit}, not {', '.join(f'{value:g}' for value in values)}")
+    return values
