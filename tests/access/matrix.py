@@ -14,7 +14,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 from websockets.typing import Subprotocol
 
-from roboglot.access.rights import NOTHING, whole
+from roboglot.access.rights import NOTHING, effective
 from roboglot.clients.visual import TextLink
 from roboglot.operations import Right
 from roboglot.protocols.cyberdog.certificates import export_app
@@ -40,7 +40,7 @@ class Caller:
 
 CALLERS = (
     Caller("unknown", "127.0.95.1", NOTHING),
-    *(Caller(right, f"127.0.95.{number}", whole([right])) for number, right in enumerate(Right, 2)),
+    *(Caller(right, f"127.0.95.{number}", effective([right])) for number, right in enumerate(Right, 2)),
     Caller("revoked", "127.0.95.10", NOTHING),
     Caller("owner-of-b", "127.0.95.11", NOTHING),
 )

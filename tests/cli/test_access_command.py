@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from roboglot.access.rights import parse_rights, whole, write_rights
+from roboglot.access.rights import effective, parse_rights, write_rights
 from roboglot.access.secrets import password_fits, password_hash, token_hash
 from roboglot.access.store import FILE, Grant, IdentityKind, open_store
 from roboglot.access.trail import Entry, open_trail
@@ -83,9 +83,9 @@ def test_the_audit_is_printed_and_verified(tmp_path: Path) -> None:
 
 def test_rights_are_read_and_written() -> None:
     assert write_rights(parse_rights("edit, drive")) == "drive,edit"
-    assert whole([Right.PROGRAM]) == {Right.SEE, Right.DRIVE, Right.PROGRAM}
-    assert whole([Right.ADMIN]) == set(Right)
-    assert whole([]) == frozenset()
+    assert effective([Right.PROGRAM]) == {Right.SEE, Right.DRIVE, Right.PROGRAM}
+    assert effective([Right.ADMIN]) == set(Right)
+    assert effective([]) == frozenset()
 
 
 def test_times_of_people_are_understood() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from roboglot.access.rights import ALL_ROBOTS, EVERYTHING, NOTHING, whole
+from roboglot.access.rights import ALL_ROBOTS, EVERYTHING, NOTHING, effective
 from roboglot.access.store import Identity, IdentityKind
 from roboglot.operations import Right
 
@@ -43,7 +43,7 @@ class Identities:
                 for grant in identity.grants
                 if grant.robot in (robot, ALL_ROBOTS) and (grant.until is None or now < grant.until)
             ]
-            found[identity.name] = whole(right for grant in valid for right in grant.rights) if valid else NOTHING
+            found[identity.name] = effective(right for grant in valid for right in grant.rights) if valid else NOTHING
         return found
 
     def next_end(self, now: float) -> float:

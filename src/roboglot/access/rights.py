@@ -8,20 +8,20 @@ from roboglot.operations import Right
 
 ALL_ROBOTS = "*"
 # Driving includes seeing; programs may drive; administrators may do everything.
-BRINGS = {
+IMPLIED = {
     Right.SEE: frozenset({Right.SEE}),
     Right.DRIVE: frozenset({Right.SEE, Right.DRIVE}),
     Right.PROGRAM: frozenset({Right.SEE, Right.DRIVE, Right.PROGRAM}),
     Right.EDIT: frozenset({Right.SEE, Right.EDIT}),
     Right.ADMIN: frozenset(Right),
 }
-EVERYTHING = BRINGS[Right.ADMIN]
+EVERYTHING = IMPLIED[Right.ADMIN]
 NOTHING: frozenset[Right] = frozenset()
 
 
-def whole(rights: Iterable[Right]) -> frozenset[Right]:
-    """Return the rights with all rights that they include."""
-    return frozenset().union(*(BRINGS[right] for right in rights))
+def effective(rights: Iterable[Right]) -> frozenset[Right]:
+    """Return these rights and all that they imply."""
+    return frozenset().union(*(IMPLIED[right] for right in rights))
 
 
 def parse_rights(text: str) -> frozenset[Right]:

@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from roboglot.access.rights import ALL_ROBOTS, BRINGS, whole, write_rights
+from roboglot.access.rights import ALL_ROBOTS, IMPLIED, effective, write_rights
 from roboglot.access.store import FILE, Grant, Identity, IdentityKind, open_store
 from roboglot.access.trail import FILE as TRAIL
 from roboglot.access.trail import open_trail
@@ -148,7 +148,7 @@ def _until(grant: Grant) -> str:
 def _weakness(identity: Identity, grants: list[Grant]) -> str:
     if not grants:
         return f"roboglot access revoke {identity.name}" if identity.grants else ""
-    rights = whole(right for grant in grants for right in grant.rights)
+    rights = effective(right for grant in grants for right in grant.rights)
     if identity.kind is IdentityKind.ADDRESS and any(grant.until is None for grant in grants) and rights > {Right.SEE}:
         return "an address is weak proof on a shared network: limit its time (--for 2h)"
     if identity.kind is IdentityKind.ADDRESS and Right.ADMIN in rights:
@@ -169,7 +169,7 @@ def _unused(config: Config, identities: list[Identity]) -> Iterator[Finding]:
         return
     for identity in identities:
         had = {right for grant in identity.grants for right in grant.rights} - {Right.SEE}
-        idle = sorted(right for right in had if not BRINGS[right] - {Right.SEE} & used[identity.name])
+        idle = sorted(right for right in had if not IMPLIED[right] - {Right.SEE} & used[identity.name])
         if idle:
             seen = f"{', '.join(idle)} not used for {UNUSED_DAYS} days"
             yield Finding(f"unused: {identity.name}", False, seen, f"roboglot access revoke {identity.name}, or fewer")
