@@ -53,7 +53,8 @@ class NarrowFinder:
         self._first, self._evidence = (0, 0), np.zeros((0, 0), np.int16)
         self._found = np.zeros((0, 0), np.uint8)  # by cell of whole pieces: UNSEEN, OPEN or NARROW
         self._corner = (0, 0)  # row and column of its first cell, counted from the map's origin
-        self._before: dict[tuple[int, int], tuple[NDArray[np.int8], NDArray[np.uint8]]] = {}  # … of what they showed
+        # By piece: what it showed, and its part of ``_found``.
+        self._before: dict[tuple[int, int], tuple[NDArray[np.int8], NDArray[np.uint8]]] = {}
 
     def at(self, grid: EvidenceGrid, points: NDArray[np.float64], now: float) -> NDArray[np.bool_]:
         """Return which of ``points`` (n, 2; map; the first is the robot's) lie in a narrow place.

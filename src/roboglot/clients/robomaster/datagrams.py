@@ -76,11 +76,11 @@ async def discover(
     loop, clock = asyncio.get_running_loop(), clock or RealClock()
     found: dict[str, None] = {}
     enough = loop.create_future()
-    with contextlib.closing(_bound("", port, "something else on this machine looks for robots")) as ear:
+    with contextlib.closing(_bound("", port, "something else on this machine looks for robots")) as listener:
 
         def read() -> None:
             with contextlib.suppress(OSError):
-                data, (sender, _) = ear.recvfrom(DATAGRAM_MAX)
+                data, (sender, _) = listener.recvfrom(DATAGRAM_MAX)
                 if sender in passing_over:
                     return
                 if broadcast_of(data) == sender and len(found) < ROBOTS_MAX:  # addressed to another robot
@@ -88,13 +88,13 @@ async def discover(
                     if first and not enough.done():
                         enough.set_result(None)
 
-        loop.add_reader(ear, read)
+        loop.add_reader(listener, read)
         try:
             await clock.wait_for(enough, seconds)
         except TimeoutError:
             pass
         finally:
-            loop.remove_reader(ear)
+            loop.remove_reader(listener)
     return list(found)
 
 

@@ -52,15 +52,15 @@ class Announcer:
 
 def _listening() -> socket.socket:
     """Return a socket for broadcasts that shares its port with clients on this machine."""
-    ear = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    ear.setblocking(False)
-    ear.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    listener.setblocking(False)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        ear.bind(("", PORT))
+        listener.bind(("", PORT))
     except OSError:
-        ear.close()
+        listener.close()
         raise
-    return ear
+    return listener
 
 
 class _DatagramListener(asyncio.DatagramProtocol):

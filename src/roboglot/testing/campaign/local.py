@@ -36,7 +36,7 @@ class _Running:
     trial: Trial
     attempt: int
     process: BaseProcess
-    ear: Connection
+    receiver: Connection
     deadline: float
     scratch: str  # its folder for temporary files, which it cannot delete itself if it dies
 
@@ -79,19 +79,19 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
 
 def _start(context: ForkServerContext, trial: Trial, attempt: int, folder: Path | None, seconds_max: float) -> _Running:
     """Start a trial in its own process."""
-    ear, mouth = context.Pipe(duplex=False)
+    receiver, sender = context.Pipe(duplex=False)
     scratch = tempfile.mkdtemp(prefix="roboglot-trial-")
-    process = context.Process(target=_play, args=(trial, folder, scratch, mouth), daemon=False)
+    process = context.Process(target=_play, args=(trial, folder, scratch, sender), daemon=False)
     process.start()
-    mouth.close()
-    return _Running(trial, attempt, process, ear, _now() + seconds_max, scratch)
+    sender.close()
+    return _Running(trial, attempt, process, receiver, _now() + seconds_max, scratch)
 
 
 def _done(running: list[_Running], interrupted: Connection) -> list[_Running]:
     """Wait until a trial ends, is late, or is interrupted; return those that have ended or are late."""
     nearest = min(one.deadline for one in running)
-    wait([interrupted, *(one.ear for one in running)], max(0.0, nearest - _now()))
-    return [one for one in running if one.ear.poll() or one.deadline <= _now()]
+    wait([interrupted, *(one.receiver for one in running)], max(0.0, nearest - _now()))
+    return [one for one in running if one.receiver.poll() or one.deadline <= _now()]
 
 
 def _start_fork_server() -> None:
@@ -107,16 +107,16 @@ def _start_fork_server() -> None:
 @contextlib.contextmanager
 def interruptions() -> Iterator[Connection]:
     """Deliver SIGINT and SIGTERM through a pipe: raised anywhere, they could lose a process that was just started."""
-    ear, mouth = multiprocessing.Pipe(duplex=False)
+    receiver, sender = multiprocessing.Pipe(duplex=False)
     numbers = signal.SIGINT, signal.SIGTERM
-    before = [(number, signal.signal(number, lambda *_: mouth.send_bytes(b"!"))) for number in numbers]
+    before = [(number, signal.signal(number, lambda *_: sender.send_bytes(b"!"))) for number in numbers]
     try:
-        yield ear
+        yield receiver
     finally:
         for number, handler in before:
             signal.signal(number, handler)
-        ear.close()
-        mouth.close()
+        receiver.close()
+        sender.close()
 
 
 def _now() -> float:
@@ -126,15 +126,15 @@ def _now() -> float:
 def _result(one: _Running, seconds_max: float) -> Result:
     """Return the result that the trial's process reported; end the process if it is late."""
     try:
-        if not one.ear.poll():
+        if not one.receiver.poll():
             return Result(Outcome.LATE, f"it was ended after {seconds_max:.0f} s", seconds_max)
-        return msgspec.json.decode(one.ear.recv_bytes(), type=Result)
+        return msgspec.json.decode(one.receiver.recv_bytes(), type=Result)
     except (EOFError, OSError):
         one.process.join(5.0)
         seconds = seconds_max - (one.deadline - _now())
         return Result(Outcome.CRASHED, f"its process ended with {one.process.exitcode}", seconds)
     finally:
-        one.ear.close()
+        one.receiver.close()
         _end(one)
 
 
@@ -151,7 +151,7 @@ def _end(one: _Running) -> None:
     shutil.rmtree(one.scratch, ignore_errors=True)
 
 
-def _play(trial: Trial, leave: Path | None, scratch: str, mouth: Connection) -> None:
+def _play(trial: Trial, leave: Path | None, scratch: str, sender: Connection) -> None:
     """Play in the forked process, in its own group, so that Ctrl-C reaches the campaign alone; it ends with that."""
     os.setpgid(0, 0)
     tempfile.tempdir = os.environ["TMPDIR"] = scratch
@@ -160,8 +160,8 @@ def _play(trial: Trial, leave: Path | None, scratch: str, mouth: Connection) -> 
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_campaign, daemon=True).start()
     try:
-        mouth.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
-        mouth.close()
+        sender.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
+        sender.close()
     finally:
         shutil.rmtree(scratch, ignore_errors=True)  # the campaign may have been killed
 

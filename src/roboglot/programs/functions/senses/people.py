@@ -86,11 +86,11 @@ async def voiceprint_recognized(
         _check("duration", duration, 1, 30)
         _check("sensitivity", sensitivity, 0, SENSITIVITY_MAX)
         wanted = _named(session.robot, names)
-        ear, since, left = session.part(SpeechListener), session.robot.clock.time() - sensitivity, duration
+        listener, since, left = session.part(SpeechListener), session.robot.clock.time() - sensitivity, duration
         while not _enough(heard.keys(), wanted, everyone) and left > 0:
             await session.sleep(LOOK_EVERY)
             left -= LOOK_EVERY
-            heard |= {speech.name: None for speech in ear.heard(since) if speech.name in wanted}
+            heard |= {speech.name: None for speech in listener.heard(since) if speech.name in wanted}
     except RobotError as error:
         return Record("VoiceprintRecognized", {"state": state(StateCode.FAIL, str(error))})
     fields = {"state": state(), "list": list(heard), "data": _enough(heard.keys(), wanted, everyone)}
@@ -111,11 +111,11 @@ async def training_words_recognized(session: Session, timeout: int = 5) -> Recor
     """Wait until one of these words is said (5 to 300 s); without one in time, it is empty: no failure."""
     outcome, word = state(), Record("MsgTrainingWords")
     try:
-        left, since, ear = usable(timeout), session.robot.clock.time(), session.part(SpeechListener)
+        left, since, listener = usable(timeout), session.robot.clock.time(), session.part(SpeechListener)
         while not word.fields and left > 0:
             await session.sleep(LOOK_EVERY)
             left -= LOOK_EVERY
-            said = [speech.text.strip() for speech in ear.heard(since)]
+            said = [speech.text.strip() for speech in listener.heard(since)]
             known = {word.trigger: word for word in known_words(session.robot)}
             word = next((_word(known[text]) for text in said if text in known), word)
     except RobotError as error:
