@@ -40,6 +40,29 @@ def test_the_holder_of_a_port_is_named(listener: int) -> None:
     assert f"process {os.getpid()}" in str(holder)
 
 
+@pytest.mark.parametrize(
+    ("bound", "asked"),
+    [(f"::ffff:{ADDRESS}", ADDRESS), ("::1", "::1"), ("::", ADDRESS), ("127.0.0.1", "localhost")],
+    ids=["mapped", "IPv6", "all", "name"],
+)
+def test_holders_of_other_forms_are_found(bound: str, asked: str) -> None:
+    """gRPC takes IPv4 on IPv6 sockets: an open CyberDog port was "closed now"."""
+    with socket.socket(socket.AF_INET6 if ":" in bound else socket.AF_INET) as server:
+        try:
+            server.bind((bound, 0))
+        except OSError:
+            pytest.skip("this machine has no IPv6")
+        server.listen()
+        port = server.getsockname()[1]
+        assert (found := holder_of(asked, port)) is not None
+        assert found.pid == os.getpid()
+        assert holder_of("127.0.0.78", port) is None or bound == "::"
+
+
+def test_a_name_without_address_has_no_holder() -> None:
+    assert holder_of("no..name", 1448) is None
+
+
 def test_long_command_lines_are_cut_between_words() -> None:
     command = "/opt/robots/bin/python /opt/robots/bin/roboglot up --config /etc/roboglot/robots.toml --speed 2"
     shown = str(Holder(7, command))

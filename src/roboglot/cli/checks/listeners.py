@@ -6,13 +6,14 @@ import contextlib
 import os
 import socket
 import struct
+from collections.abc import Iterator
+from ipaddress import ip_address
 from pathlib import Path
 
 from roboglot.cli.screen import shortened
 from roboglot.values import dataclass
 
 LISTENING = "0A"  # of /proc/net/tcp
-ANY = "0.0.0.0"
 COMMAND_MAX = 80  # characters shown of a command line
 
 
@@ -35,7 +36,7 @@ class Holder:
 
 
 def holder_of(address: str, port: int) -> Holder | None:
-    """Return the process that listens on ``address`` (IPv4) or on every address; None if the port is free."""
+    """Return the process that listens on ``address`` or on every address; None if the port is free."""
     inode = _socket_inode(address, port)
     if inode is None:
         return None
@@ -54,15 +55,28 @@ def _links_to(file: Path, inode: str) -> bool:
 
 
 def _socket_inode(address: str, port: int) -> str | None:
-    wanted = {_hexadecimal(host, port) for host in (address, ANY)}
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/net/tcp").read_text().splitlines()[1:]:
-            fields = line.split()
-            if fields[1] in wanted and fields[3] == LISTENING:
-                return fields[9]
+    wanted = {_as_in_proc(host, port) for host in _bindings(address)}
+    for table in ("tcp", "tcp6"):
+        with contextlib.suppress(OSError):
+            for line in Path("/proc/net", table).read_text().splitlines()[1:]:
+                fields = line.split()
+                if fields[1] in wanted and fields[3] == LISTENING:
+                    return fields[9]
     return None
 
 
-def _hexadecimal(address: str, port: int) -> str:
-    (number,) = struct.unpack("=I", socket.inet_aton(address))
-    return f"{number:08X}:{port:04X}"
+def _bindings(address: str) -> Iterator[str]:
+    """Yield the addresses to which a socket that takes connections to ``address`` may be bound."""
+    with contextlib.suppress(OSError, UnicodeError):  # no such name
+        for *_, (host, *_) in socket.getaddrinfo(address, None, type=socket.SOCK_STREAM):
+            yield str(host)
+            if ":" not in str(host):
+                yield from ("0.0.0.0", f"::ffff:{host}")  # gRPC's sockets take IPv4 as IPv6
+    yield "::"
+
+
+def _as_in_proc(address: str, port: int) -> str:
+    """Return address and port as in /proc/net: words of 32 bits in the machine's byte order."""
+    packed = ip_address(address).packed
+    words = struct.unpack(f"={len(packed) // 4}I", packed)
+    return f"{''.join(f'{word:08X}' for word in words)}:{port:04X}"

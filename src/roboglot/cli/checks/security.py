@@ -61,7 +61,7 @@ def _listeners(config: Config) -> Iterator[Finding]:
     if config.access.on and config.access.gateway:
         places.append(("gateway", *host_and_port(config.access.gateway, "access.gateway")))
     for label, address, port in places:
-        holder = holder_of(address, port) if ":" not in address else None
+        holder = holder_of(address, port)
         now = f"open now, by {holder}" if holder else "closed now"
         yield Finding(label, True, f"{address}:{port} for {reach_of(address)}; {now}")
 
