@@ -11,8 +11,13 @@ import pytest
 from roboglot.console import http as console_http
 from roboglot.transport import http as connections
 from tests.console.conftest import ServedConsole
+from tests.console.test_studio_socket import page
 
 PATIENCE = 60.0  # s of the machine's time
+UPGRADE = (
+    "GET {path} HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+)
 
 
 async def opened(served: ServedConsole) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
@@ -50,3 +55,22 @@ async def test_slow_body_is_refused(served: ServedConsole, monkeypatch: pytest.M
     async with asyncio.timeout(PATIENCE):
         assert b" 408 " in await reader.readline()
     writer.close()
+
+
+@pytest.mark.parametrize("frame", [b"\x00\x80\0\0\0\0", b"\x89\x80\0\0\0\0", b"\x8a\x80\0\0\0\0"])
+@pytest.mark.parametrize("path", ["/live", "/studio"])
+async def test_empty_frames_without_end_are_refused(served: ServedConsole, path: str, frame: bytes) -> None:
+    """Pieces of a message, pings, pongs."""
+    reader, writer = await opened(served)
+    writer.write(UPGRADE.format(path=path, host=served.url.partition("//")[2]).encode())
+    assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
+    writer.write(b"\x01\x80\0\0\0\0" + frame * 10_000)
+    last = b""
+    async with asyncio.timeout(PATIENCE):
+        with contextlib.suppress(ConnectionError):
+            while piece := await reader.read(65536):
+                last = piece
+    assert b"keepalive" not in last  # it was not the silence that ended it
+    writer.transport.abort()
+    async with page(served):  # others are served
+        pass

@@ -86,6 +86,7 @@ class Console:
         from uvicorn.server import ServerState
 
         from roboglot.console.application import Application
+        from roboglot.console.page_socket import PageSocket
         from roboglot.console.studio.channel import MESSAGE_MAX as STUDIO_MESSAGE_MAX
         from roboglot.transport.http import BoundedConnection
 
@@ -96,7 +97,7 @@ class Console:
         self._application = Application(self._desk, browsers, classroom, login, self.address)
         config = Config(
             self._application,
-            ws="wsproto",
+            ws=PageSocket,
             lifespan="off",
             interface="asgi3",
             log_config=None,

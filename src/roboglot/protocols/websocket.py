@@ -31,7 +31,9 @@ log = logging.getLogger(__name__)
 LIBRARY = "websockets.server"
 """Loaded in the background once the port is open, so that the door starts as fast as without it."""
 CONNECTIONS_MAX = 32
-PENDING_MAX = 16  # messages of one connection in progress
+PENDING_MAX = 16  # messages of one connection in progress, beside the rest of a portion
+PORTION = 1024  # bytes that are read at a time: 170 frames, if they are empty
+READ_SECONDS = 0.002  # of reading from one connection, then others are served
 REASON_BYTES_MAX = 123  # of a close frame
 GOING_AWAY, UNSUPPORTED, NOT_UTF8, POLICY, TRY_LATER = 1001, 1003, 1007, 1008, 1013  # close codes of RFC 6455
 
@@ -105,6 +107,8 @@ class Connection(asyncio.Protocol):
         self.writer = Writer()
         self._opening = Opening(server.entrance, self.writer, self._wait_for, self._begin)
         self._protocol: ServerProtocol | None = None  # set once open
+        self._unread = bytearray()
+        self._turn: asyncio.Handle | None = None  # in which reading goes on
         self._pieces = bytearray()
         self._channel: Channel | None = None
         self._session: Session | None = None
@@ -129,12 +133,15 @@ class Connection(asyncio.Protocol):
         if self._protocol is None:
             self._opening.receive(data)
         else:
-            self._read(self._protocol, data)
+            self._unread += data
+            if self._turn is None:
+                self._read_on()
 
     def connection_lost(self, _exc: Exception | None) -> None:
         """Drop the client; its requests in progress are finished nevertheless."""
         self._opening.close()
         self._transport = None
+        self._unread.clear()
         self._server.connections.discard(self)
         session, self._session = self._session, None
         if session is not None:
@@ -195,11 +202,33 @@ class Connection(asyncio.Protocol):
             self.leave(TRY_LATER, str(full))
             return
         if opened.early:
-            self._read(opened.protocol, opened.early)
+            self.data_received(opened.early)
 
     def _open_session(self, channel: Channel) -> Session:
         set_client(self.who, self._name, self.identity)
         return channel.open(self)
+
+    def _read_on(self) -> None:
+        """Read for READ_SECONDS, and the rest in further turns of the loop; wait while PENDING_MAX are answered."""
+        self._turn, loop = None, asyncio.get_running_loop()
+        if self._transport is None or self._protocol is None:
+            return
+        until = loop.time() + READ_SECONDS
+        while self._unread and len(self._pending) < PENDING_MAX:
+            portion = bytes(self._unread[:PORTION])
+            del self._unread[:PORTION]
+            self._read(self._protocol, portion)
+            if self.writer.closing:
+                self._unread.clear()
+            if loop.time() >= until:
+                break
+        waits = len(self._pending) >= PENDING_MAX
+        if self._unread and not waits:
+            self._turn = loop.call_soon(self._read_on)
+        if self._unread or waits:
+            self._transport.pause_reading()
+        elif not self._transport.is_closing():
+            self._transport.resume_reading()
 
     def _read(self, protocol: ServerProtocol, data: bytes) -> None:
         """Handle complete messages; the library answers pings, close frames and broken frames."""
@@ -229,8 +258,6 @@ class Connection(asyncio.Protocol):
         if self._session is None:
             return
         self._in_background(self._receive(self._session, message))
-        if len(self._pending) >= PENDING_MAX and self._transport is not None:
-            self._transport.pause_reading()
 
     async def _receive(self, session: Session, message: str | bytes) -> None:
         set_client(self.who, self._name, self.identity)
@@ -254,4 +281,7 @@ class Connection(asyncio.Protocol):
             if self._protocol is None:  # it was not admitted, and would wait for ever
                 self.writer.abort()
         if self._transport is not None and not self._transport.is_closing() and len(self._pending) < PENDING_MAX:
-            self._transport.resume_reading()
+            if self._protocol is None:
+                self._transport.resume_reading()
+            elif self._turn is None:
+                self._read_on()
