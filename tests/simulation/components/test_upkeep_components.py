@@ -83,7 +83,7 @@ async def test_raw_imu_values_are_the_reading_in_counts(robot, world, forward):
 
 async def test_the_log_goes_to_the_maker(robot, forward):
     await forward(seconds=2)
-    robot[Health].set("test", True, "base", FaultLevel.WARNING, "for the log")
+    robot[Health].set("test", True, "base", FaultLevel.WARNING, "for the log \ud83d")
     assert any("FaultRaised warning test: for the log" in line for line in robot[SystemLog].lines)
     upload = robot[SystemLog].upload()
     await forward(seconds=3)

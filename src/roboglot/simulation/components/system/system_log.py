@@ -63,7 +63,7 @@ class SimulatedSystemLog(SystemLog):
 
     def upload(self, *, source: str = "") -> Action:
         async def run(action: Action) -> None:
-            text = "\n".join(self.lines).encode()
+            text = "\n".join(self.lines).encode(errors="backslashreplace")  # a text of Python's may have half a pair
             for share in range(1, 11):
                 self._reach()
                 await self._robot.clock.sleep((HANDSHAKE + len(text) / BANDWIDTH) / 10)
