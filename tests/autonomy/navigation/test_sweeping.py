@@ -14,6 +14,8 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point, Pose
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tests.autonomy.conftest import Tour
 
 pytestmark = pytest.mark.world("empty")
@@ -55,3 +57,21 @@ async def test_nonsense_is_refused(tour: Tour) -> None:
     for areas, width in (((), None), ((area,), 0.0), ((area,), float("nan")), ((nowhere,), None)):
         with pytest.raises(InvalidGoal):
             tour.robot[Sweeping].sweep(areas, width=width)
+
+
+async def test_area_beyond_map_is_swept_on_map(tour: Tour) -> None:
+    """A client may draw an area of any size: the lanes end with the map, and lie no farther apart."""
+    whole, vast = (Area(0, AreaKind.COVERAGE, Point(-far, 0.0), Point(far, 0.0), far) for far in (15.0, 1500.0))
+    sweeping = tour.robot[Sweeping]
+    ways = await sweeping.lanes((vast,), width=0.5)
+    swept, expected = (sum(_lengths(them)) for them in (ways, await sweeping.lanes((whole,), width=0.5)))
+    assert swept == pytest.approx(expected, rel=0.1)
+    assert swept > 10.0
+    beside = sorted({round(way[k].y, 2) for way in ways for k in range(0, len(way), 2)})
+    assert max(np.diff(beside)) <= 0.51
+    with pytest.raises(InvalidGoal, match="2000"):
+        await sweeping.lanes((vast,) * 100, width=0.1)
+
+
+def _lengths(ways: Sequence[Sequence[Point]]) -> list[float]:
+    return [way[k].distance_to(way[k + 1]) for way in ways for k in range(0, len(way), 2)]

@@ -11,7 +11,7 @@ from roboglot.autonomy.navigation.base_actions import start_on_base
 from roboglot.autonomy.navigation.context import Goal, NavigationContext
 from roboglot.autonomy.navigation.drive_progress import DriveProgress
 from roboglot.autonomy.navigation.navigation import GridNavigation
-from roboglot.autonomy.navigation.sweeping.lanes import Stretch, SweptPart, open_stretches, parts, zigzag
+from roboglot.autonomy.navigation.sweeping.lanes import Stretch, all_parts, open_stretches, zigzag
 from roboglot.autonomy.navigation.sweeping.swept import Swept
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.annotations import Area, AreaKind
@@ -66,9 +66,9 @@ class LaneSweeping(Sweeping):
 
         here = self._robot[Localization].pose.point
         floor, frame = await self._context.open_floor(here)
-        found: list[SweptPart] = [part for area in areas for part in parts(area, floor, frame, width)]
-        middles = [here, *(part[len(part) // 2].start for part in found)]
-        costs = np.array([[a.distance_to(b) for b in middles] for a in middles])
+        found = all_parts(areas, floor, frame, width)
+        middles = np.array([(at.x, at.y) for at in (here, *(part[len(part) // 2].start for part in found))])
+        costs = np.ascontiguousarray(np.hypot(*(middles[:, None] - middles).T))
         ways: list[list[Point]] = []
         for number in visiting_order(costs, PASSES, False).tolist()[1:]:
             ways.append(zigzag(found[number - 1], ways[-1][-1] if ways else here))

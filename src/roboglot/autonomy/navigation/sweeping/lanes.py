@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import RESOLUTION
 from roboglot.model.components.mapping.annotations import Area
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
 from roboglot.values import dataclass
 
 STRETCH_MIN = 0.15  # m; shorter open stretches are left out
-LANES_MAX = 2000
+LANES_MAX = 2000  # of a sweep
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,19 +40,58 @@ SweptPart = tuple[Stretch, ...]  # one stretch of each of its lanes, in order
 Run = tuple[int, int]  # first place of a lane that is open, and the first one that is not
 
 
-def parts(area: Area, floor: NDArray[np.bool_], frame: GridFrame, width: float) -> list[SweptPart]:
-    """Return the parts of ``area`` on open ``floor``, with lanes along its centre line, at most ``width`` m apart."""
-    length = area.start.distance_to(area.end)
+@dataclass(frozen=True, slots=True)
+class _Field:
+    """Part of an area that the map covers: ``corner`` (map, m), direction of its lanes, extents along and across, m."""
+
+    corner: Point
+    ux: float
+    uy: float
+    length: float
+    width: float
+
+    def lanes(self, apart: float) -> int:
+        """Return the number of lanes, at most ``apart`` m from each other."""
+        return max(1, math.ceil(self.width / apart))
+
+
+def _field(area: Area, frame: GridFrame) -> _Field | None:
+    """Return the part of ``area`` that the map covers: an area may be much larger than any map; None: there is none."""
+    length, height, width = area.start.distance_to(area.end), *(cells * RESOLUTION for cells in frame.shape)
     if length <= 0.0 or area.half_width <= 0.0:
-        return []
+        return None
     ux, uy = (area.end.x - area.start.x) / length, (area.end.y - area.start.y) / length
-    count = min(LANES_MAX, max(1, math.ceil(2 * area.half_width / width)))
-    along = np.arange(0.0, length + RESOLUTION / 2, RESOLUTION / 2)
+    x, y = frame.corner.x - area.start.x, frame.corner.y - area.start.y
+    corners = [(x + right, y + up) for right in (0.0, width) for up in (0.0, height)]
+    along, across = [cx * ux + cy * uy for cx, cy in corners], [cy * ux - cx * uy for cx, cy in corners]
+    first, last = max(0.0, min(along)), min(length, max(along))
+    right, left = max(-area.half_width, min(across)), min(area.half_width, max(across))
+    if first >= last or right >= left:
+        return None
+    corner = Point(area.start.x + ux * first - uy * right, area.start.y + uy * first + ux * right)
+    return _Field(corner, ux, uy, last - first, left - right)
+
+
+def all_parts(areas: Sequence[Area], floor: NDArray[np.bool_], frame: GridFrame, width: float) -> list[SweptPart]:
+    """Return the parts of ``areas`` on open ``floor``, with lanes along their centre lines, at most ``width`` m apart.
+
+    Raises InvalidGoal for more than LANES_MAX lanes.
+    """
+    fields = [field for area in areas if (field := _field(area, frame)) is not None]
+    if (count := sum(field.lanes(width) for field in fields)) > LANES_MAX:
+        raise InvalidGoal(f"{width:g} m apart these areas have {count} lanes, and {LANES_MAX} are the most")
+    return [part for field in fields for part in _parts(field, floor, frame, field.lanes(width))]
+
+
+def _parts(field: _Field, floor: NDArray[np.bool_], frame: GridFrame, count: int) -> list[SweptPart]:
+    """Return the parts of one field with ``count`` lanes."""
+    ux, uy = field.ux, field.uy
+    along = np.arange(0.0, field.length + RESOLUTION / 2, RESOLUTION / 2)
     growing: dict[Run, list[Stretch]] = {}  # the parts that reach the lane before, by its runs
     found: list[list[Stretch]] = []
     for lane in range(count):
-        beside = area.half_width * (2.0 * (lane + 0.5) / count - 1.0)
-        x, y = area.start.x - uy * beside + ux * along, area.start.y + ux * beside + uy * along
+        beside = field.width * (lane + 0.5) / count
+        x, y = field.corner.x - uy * beside + ux * along, field.corner.y + ux * beside + uy * along
         runs = _runs(_sampled(floor, frame, x, y))
         before, growing = growing, {}
         for run in runs:

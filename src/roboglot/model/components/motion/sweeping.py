@@ -28,7 +28,8 @@ class Sweeping(Component):
     def sweep(self, areas: Sequence[Area] = (), *, width: float | None = None, source: str = "") -> Action:
         """Sweep ``areas`` (by default the map's coverage areas) with lanes ``width`` m apart (by default the hull's).
 
-        Aborts with Unreachable if no lane could be driven. InvalidGoal if there is nothing to sweep.
+        Aborts with Unreachable if no lane could be driven. InvalidGoal if there is nothing to sweep, or more
+        than 2000 lanes (as the action's reason).
         """
 
     @abstractmethod
