@@ -7,6 +7,7 @@ import contextlib
 import re
 import subprocess
 import sys
+import unittest
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -19,6 +20,7 @@ from roboglot.extras import MissingExtra
 from roboglot.model.geometry import Pose
 from roboglot.recording.reader import read_recording
 from roboglot.testing.blocking import Loop
+from roboglot.testing.case import RobotTestCase
 from roboglot.testing.clients import Clients
 from roboglot.testing.server import RobotServer
 from roboglot.wire.slamware.chapters.motion import MoveOptions, MoveToOptions
@@ -145,6 +147,22 @@ def test_failed_tests_leave_recording_map_and_exchanges(tmp_path: Path) -> None:
     assert sorted(re.findall(r"^\[\[ATTACHMENT\|(.*)\]\]$", done.stdout, re.MULTILINE)) == files
     properties = ElementTree.parse(tmp_path / "junit.xml").iter("property")
     assert sorted(entry.attrib["value"] for entry in properties) == files
+
+
+def test_a_robot_that_cannot_start_is_one_error() -> None:
+    """It ended unittest's run of all tests."""
+
+    class Broken(RobotTestCase):
+        world = "emptie"
+
+        def test_it(self) -> None:
+            self.fail("there is no robot")
+
+    result = unittest.TestResult()
+    unittest.TestSuite((Broken("test_it"), unittest.FunctionTestCase(lambda: None))).run(result)
+    assert (result.testsRun, result.failures) == (2, [])
+    [(_, why)] = result.errors
+    assert "did you mean 'empty'?" in why
 
 
 @pytest.mark.slow

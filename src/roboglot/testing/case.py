@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import sys
 import unittest
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -37,14 +39,26 @@ class RobotTestCase(unittest.TestCase):
     leave: Path | None = None  # pytest's folder for them
 
     def run(self, result: unittest.TestResult | None = None) -> unittest.TestResult | None:
-        """Start the robot, run the test, save artifacts if it fails."""
+        """Start the robot, run the test, save artifacts if it fails. A robot that cannot start is the test's error."""
+        with contextlib.ExitStack() as stack:
+            try:
+                self.server = stack.enter_context(RobotServer(self._wanted()))
+            except Exception:  # noqa: BLE001 - raised here, it would end the run of all tests
+                found = result or self.defaultTestResult()
+                found.startTest(self)
+                found.addError(self, sys.exc_info())
+                found.stopTest(self)
+                return found
+            return super().run(result)
+
+    def _wanted(self) -> Wanted:
+        """Return what the class asks for. Raises ValueError."""
         names = ("world", "robots", "body", "seed", "speed", "lockstep", "recording", "doors")
         faults = tuple(
             WantedFault(fault) if isinstance(fault, str) else WantedFault(fault[0], None, tuple(fault[1].items()))
             for fault in self.faults
         )
-        with RobotServer(wanted_of({name: getattr(self, name) for name in names}, faults)) as self.server:
-            return super().run(result)
+        return wanted_of({name: getattr(self, name) for name in names}, faults)
 
     def doCleanups(self) -> None:  # noqa: N802 - unittest's name
         """Save artifacts and clean up: unittest knows here whether the test failed, and the robot is still up."""
