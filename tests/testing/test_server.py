@@ -153,7 +153,7 @@ def test_a_robot_that_cannot_start_is_one_error() -> None:
     """It ended unittest's run of all tests."""
 
     class Broken(RobotTestCase):
-        world = "emptie"
+        world = "empty_"
 
         def test_it(self) -> None:
             self.fail("there is no robot")
