@@ -109,6 +109,21 @@ def test_invalid_json_is_refused(text: str) -> None:
     assert refusal.value.state is FeedbackState.NOT_JSON
 
 
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "line 1, column 1: Expecting value"),
+        ("[" * 60_000, "it is nested too deeply"),
+        ('{"id": ' + "9" * 5000 + "}", "a number is too long"),
+        ('{"id": NaN}', "NaN is not JSON"),
+    ],
+)
+def test_invalid_json_is_refused_in_plain_words(text: str, why: str) -> None:
+    with pytest.raises(BadFrame) as refusal:
+        parse_request(text)
+    assert str(refusal.value) == f"not JSON: {why}"
+
+
 def test_a_refusal_says_whose_frame_it_was() -> None:
     with pytest.raises(BadFrame) as refusal:
         parse_request(json.dumps(SAVE | {"body": 3}))

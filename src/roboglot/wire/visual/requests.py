@@ -114,10 +114,18 @@ def _decode(text: str) -> dict[str, object]:
     try:
         fields = json.loads(text, strict=False, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
-        raise BadFrame(FeedbackState.NOT_JSON, f"not JSON: {error}"[:200], {}) from None
+        raise BadFrame(FeedbackState.NOT_JSON, f"not JSON: {_fault(error)}", {}) from None
     if not isinstance(fields, dict):
         raise BadFrame(FeedbackState.NOT_JSON, "not a JSON object", {})
     return fields
+
+
+def _fault(error: ValueError | RecursionError) -> str:
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno}, column {error.colno}: {error.msg}"
+    return "a number is too long" if "digits" in str(error) else str(error)
 
 
 def _no_constant(name: str) -> NoReturn:
