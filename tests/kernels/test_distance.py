@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from roboglot.kernels.distance import NEAR_MAX, distances, gaps
+from roboglot.kernels.distance import NEAR_MAX, distances, gaps, mark_beside
 
 
 @settings(max_examples=100, deadline=None)
@@ -58,3 +60,21 @@ def test_gaps_are_narrow_and_lead_through(
         is_gap = (one + other + 1) * step < wide and min(left, right) * step >= deep
         is_gap |= (left + right + 1) * step < wide and min(one, other) * step >= deep
         assert found[row, col] == is_gap
+
+
+PLACES = st.floats(-3, 3) | st.sampled_from([-1e5, 0.0, 1e5])
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(PLACES, PLACES), min_size=2, max_size=4), st.floats(0.03, 0.5))
+def test_cells_beside_a_line_are_those_within_reach(points: list[tuple[float, float]], reach: float) -> None:
+    mask, way = np.zeros((30, 40), np.bool_), np.array(points, np.float64)
+    mark_beside(mask, way, -1.0, -0.7, 0.05, reach)
+    x, y = -1.0 + (np.arange(40) + 0.5) * 0.05, (-0.7 + (np.arange(30) + 0.5) * 0.05)[:, None]
+    away = np.full(mask.shape, np.inf)
+    for a, b in itertools.pairwise(way):
+        dx, dy = b - a
+        share = np.clip(((x - a[0]) * dx + (y - a[1]) * dy) / max(dx * dx + dy * dy, 1e-12), 0.0, 1.0)
+        away = np.minimum(away, np.hypot(x - a[0] - share * dx, y - a[1] - share * dy))
+    sure = np.abs(away - reach) > 1e-6
+    assert (mask == (away <= reach))[sure].all()

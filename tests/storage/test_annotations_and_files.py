@@ -75,6 +75,18 @@ async def test_a_refused_change_leaves_everything(database: Database, monkeypatc
     assert stored.current is before
 
 
+async def test_curves_longer_than_a_map_are_refused(database: Database) -> None:
+    """The console and plans compute each of their points."""
+    stored = stored_in(database)
+    far = Line(0, LineKind.TRACK, Point(), Point(1, 0), (Point(1e5, 0), Point(0, 1e5)))
+    assert far.points()[0] == far.start
+    assert far.points()[-1] == far.end
+    with pytest.raises(InvalidGoal, match="more than 100000 points"):
+        await stored.change(lambda now: now.with_new(*[far] * 100))
+    assert stored.current == Annotations()
+    await stored.change(lambda now: now.with_new(*[CURVE] * 500))
+
+
 async def test_files_keep_every_byte(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     files = StoredFiles(database, "a", LockstepClock())
     await files.write("map", bytes(range(256)))

@@ -1,6 +1,6 @@
 """Distances in a grid: the exact Euclidean transform, cut off at a cap; and straight on, for gaps between obstacles.
 
-And between a robot's way and another's.
+And between a robot's way and another's; cells beside a line.
 
 Near ones are compared one by one in wide instructions, far ones by parabolas (Felzenszwalb and Huttenlocher 2012): the
 same to the last bit, since squares of whole cells are exact.
@@ -113,6 +113,33 @@ def distances(marked: ByteArray, cap: float) -> SingleArray:
         for col in range(width):
             away[row, col] = np.sqrt(column[col])
     return away
+
+
+@kernel("void(boolean[:,::1], float64[:,::1], float64, float64, float64, float64)")
+def mark_beside(mask: BoolArray, way: FloatArray, left: float, bottom: float, resolution: float, reach: float) -> None:
+    """Mark the cells whose centre lies within ``reach`` of a polyline (n, 2; m).
+
+    ``left``, ``bottom``: the corner of cell (0, 0), m.
+    """
+    height, width = mask.shape
+    for i in range(len(way) - 1):
+        ax, ay, bx, by = way[i, 0], way[i, 1], way[i + 1, 0], way[i + 1, 1]
+        dx, dy = bx - ax, by - ay
+        square = max(dx * dx + dy * dy, 1e-12)
+        low, high = (min(ay, by) - reach - bottom) / resolution, (max(ay, by) + reach - bottom) / resolution
+        for row in range(int(max(0.0, min(low, height))), int(max(0.0, min(high + 1.0, height)))):
+            y = bottom + (row + 0.5) * resolution
+            first, last = 0.0, 1.0  # shares of the piece that may be near this row
+            if dy != 0.0:
+                one, other = (y - reach - ay) / dy, (y + reach - ay) / dy
+                first, last = max(0.0, min(one, other)), min(1.0, max(one, other))
+            one, other = ax + first * dx, ax + last * dx
+            near, far = (min(one, other) - reach - left) / resolution, (max(one, other) + reach - left) / resolution
+            for col in range(int(max(0.0, min(near - 1.0, width))), int(max(0.0, min(far + 2.0, width)))):
+                x = left + (col + 0.5) * resolution
+                share = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / square))
+                if np.hypot(x - ax - share * dx, y - ay - share * dy) <= reach:
+                    mask[row, col] = True
 
 
 @kernel("void(uint8[::1], float32[::1], float32[::1], float32)")

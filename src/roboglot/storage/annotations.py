@@ -8,7 +8,14 @@ from collections.abc import Callable
 import msgspec
 
 from roboglot.model.clock import Clock
-from roboglot.model.components.mapping.annotations import AREAS_MAX, LINES_MAX, MARKS_MAX, Annotations, MapAnnotations
+from roboglot.model.components.mapping.annotations import (
+    AREAS_MAX,
+    LINES_MAX,
+    MARKS_MAX,
+    POINTS_MAX,
+    Annotations,
+    MapAnnotations,
+)
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.events import AnnotationsChanged, EventStream
 from roboglot.storage.transactions import Connection, Transactions
@@ -46,6 +53,8 @@ class StoredAnnotations(MapAnnotations):
         ):
             if len(entries) > most:
                 raise InvalidGoal(f"more than {most} {what}")
+        if sum(line.count() for line in changed.lines) > POINTS_MAX:
+            raise InvalidGoal(f"the lines have more than {POINTS_MAX} points, of which a curve has ten a metre")
         body = msgspec.json.encode(changed).decode()
         return lambda connection: connection.execute(
             "INSERT INTO annotations (robot, body) VALUES (?, ?) ON CONFLICT (robot) DO UPDATE SET body=excluded.body",

@@ -1,13 +1,12 @@
 """Annotations of the map as layers of a planning grid: closed cells, cost beside the tracks, speeds in areas.
 
-Knows no robot and no kernel.
+Knows no robot; loads the kernels when it is used.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,15 +69,11 @@ class GridFrame:
 
     def beside(self, lines: tuple[Line, ...], reach: float) -> Mask:
         """Return the mask of the cells whose centre lies within ``reach`` m of one of ``lines``."""
+        from roboglot.kernels.distance import mark_beside
+
         mask = np.zeros(self.shape, bool)
-        for a, b in _pieces(lines):
-            rows, columns = self.around((a, b), reach)
-            x, y = self.centres(rows, columns)
-            dx, dy = b.x - a.x, b.y - a.y
-            share = ((x - a.x) * dx + (y - a.y) * dy) / max(dx * dx + dy * dy, 1e-12)
-            share = np.clip(share, 0.0, 1.0)
-            away = np.hypot(x - a.x - share * dx, y - a.y - share * dy)
-            mask[rows, columns] |= away <= reach
+        for line in lines:
+            mark_beside(mask, line.polyline(), self.corner.x, self.corner.y, RESOLUTION, reach)
         return mask
 
     def near(self, point: Point, reach: float) -> Mask:
@@ -94,12 +89,6 @@ def _cells(begin: float, end: float, count: int) -> slice:
     """Return the cells of ``count`` from ``begin`` to ``end``, m from the first one."""
     first, last = int(begin // RESOLUTION), int(end // RESOLUTION) + 1
     return slice(min(max(first, 0), count), min(max(last, 0), count))
-
-
-def _pieces(lines: tuple[Line, ...]) -> Iterator[tuple[Point, Point]]:
-    for line in lines:
-        points = line.points()
-        yield from pairwise(points)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,11 +134,12 @@ def _off_tracks(
 def _distance(lines: tuple[Line, ...], point: Point) -> float:
     """Return the distance from ``point`` to the nearest of ``lines``, m."""
     nearest = math.inf
-    for a, b in _pieces(lines):
-        dx, dy = b.x - a.x, b.y - a.y
-        share = ((point.x - a.x) * dx + (point.y - a.y) * dy) / max(dx * dx + dy * dy, 1e-12)
-        share = min(1.0, max(0.0, share))
-        nearest = min(nearest, math.hypot(point.x - a.x - share * dx, point.y - a.y - share * dy))
+    for line in lines:
+        way = line.polyline() - (point.x, point.y)
+        spans = np.diff(way, axis=0)
+        shares = -(way[:-1] * spans).sum(axis=1) / np.maximum((spans**2).sum(axis=1), 1e-12)
+        feet = way[:-1] + np.clip(shares, 0.0, 1.0)[:, None] * spans
+        nearest = min(nearest, float(np.hypot(*feet.T).min()))
     return nearest
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.components.mapping.annotations import Line, LineKind
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
@@ -40,6 +41,16 @@ def test_tracks_give_the_shorter_or_only_directed_way() -> None:
     way = way_along(RING, Point(1, 0), Point(0, 1), directed=True)
     assert length(way) == pytest.approx(14)
     assert Point(4, 4) in way
+
+
+def test_tracks_of_too_many_crossings_are_refused() -> None:
+    """A graph of a million crossings took minutes, in which no robot was served."""
+    fan = [track(number, 0.0, 1000.0 - number, 1000.0) for number in range(1000)]
+    with pytest.raises(InvalidGoal, match="cross more than 3000 times"):
+        way_along(fan, Point(0, 0), Point(1, 1))
+    curve = Line(1, LineKind.TRACK, Point(), Point(1, 0), (Point(1e5, 0), Point(0, 1e5)))
+    with pytest.raises(InvalidGoal, match="3000 straight pieces"):
+        way_along([curve] * 10_000, Point(0, 0), Point(1, 1))
 
 
 def test_tracks_are_joined_where_they_cross_and_touch() -> None:

@@ -9,12 +9,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
 from roboglot.values import dataclass
 
 LINES_MAX, AREAS_MAX, MARKS_MAX = 10_000, 2_000, 2_000
+POINTS_MAX = 100_000  # of all lines: 10 km of curves
 CURVE_STEP = 0.1  # m between the points that make up a curve
 CURVE_POINTS_MAX = 1000
 
@@ -54,20 +58,22 @@ class Line:
 
     def points(self) -> tuple[Point, ...]:
         """Return the polyline: both ends, and points between them on a curve."""
+        return tuple(Point(x, y) for x, y in self.polyline().tolist())
+
+    def polyline(self) -> NDArray[np.float64]:
+        """Return the same (n, 2; map, m)."""
         if self.control is None:
-            return (self.start, self.end)
-        corners = (self.start, *self.control, self.end)
-        length = sum(a.distance_to(b) for a, b in itertools.pairwise(corners))
-        steps = min(max(math.ceil(length / CURVE_STEP), 2), CURVE_POINTS_MAX)
-        return tuple(_on_curve(corners, step / steps) for step in range(steps + 1))
+            return np.array([(self.start.x, self.start.y), (self.end.x, self.end.y)])
+        t = np.linspace(0.0, 1.0, self.count())
+        weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
+        return weights @ np.array([(p.x, p.y) for p in (self.start, *self.control, self.end)])
 
-
-def _on_curve(corners: tuple[Point, Point, Point, Point], t: float) -> Point:
-    weights = ((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3)
-    return Point(
-        sum(w * p.x for w, p in zip(weights, corners, strict=True)),
-        sum(w * p.y for w, p in zip(weights, corners, strict=True)),
-    )
+    def count(self) -> int:
+        """Return the number of points."""
+        if self.control is None:
+            return 2
+        length = sum(a.distance_to(b) for a, b in itertools.pairwise((self.start, *self.control, self.end)))
+        return min(max(math.ceil(length / CURVE_STEP), 2), CURVE_POINTS_MAX) + 1
 
 
 @dataclass(frozen=True, slots=True)

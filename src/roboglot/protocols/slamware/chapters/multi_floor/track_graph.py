@@ -16,7 +16,7 @@ from roboglot.model.geometry import Point
 
 JOIN = 0.1  # m between pieces that are joined
 SAME = 1e-6  # m between two points that count as one
-PIECES_MAX = 3000
+PIECES_MAX = CROSSINGS_MAX = 3000  # together half a second of a robot's time
 _Points = NDArray[np.float64]
 
 
@@ -25,11 +25,11 @@ def way_along(tracks: Sequence[Line], start: Point, end: Point, *, directed: boo
 
     ``directed``: every track only from its start to its end. Raises InvalidGoal for too many tracks.
     """
+    if sum(track.count() - 1 for track in tracks) > PIECES_MAX:
+        raise InvalidGoal(f"the tracks have more than {PIECES_MAX} straight pieces")
     pieces = [(a, b) for track in tracks for a, b in pairwise(track.points()) if a.distance_to(b) > SAME]
     if not pieces:
         return []
-    if len(pieces) > PIECES_MAX:
-        raise InvalidGoal(f"the tracks have more than {PIECES_MAX} straight pieces")
     begins = np.array([(a.x, a.y) for a, _ in pieces])
     spans = np.array([(b.x - a.x, b.y - a.y) for a, b in pieces])
     on, off = (_nearest(begins, spans, np.array([p.x, p.y])) for p in (start, end))
@@ -65,16 +65,22 @@ def _crossings(begins: _Points, spans: _Points) -> list[_Points]:
         u = (gap[:, 0] * r[1] - gap[:, 1] * r[0]) / safe
         hit = ~parallel & (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
         found += [a + share * r for share in t[hit]]
+        if len(found) > CROSSINGS_MAX:
+            raise InvalidGoal(f"the tracks cross more than {CROSSINGS_MAX} times")
     return found
 
 
 def _clustered(points: Sequence[_Points]) -> _Points:
     """Return the first of each cluster of points."""
-    nodes = np.empty((0, 2))
+    nodes: list[_Points] = []
+    cells: dict[tuple[int, int], list[_Points]] = {}  # the nodes within JOIN of a point lie in the cells around its own
     for point in points:
-        if not len(nodes) or np.hypot(*(nodes - point).T).min() > JOIN:
-            nodes = np.vstack([nodes, point])
-    return nodes
+        column, row = (int(at // JOIN) for at in point.tolist())
+        near = [node for c in (-1, 0, 1) for r in (-1, 0, 1) for node in cells.get((column + c, row + r), ())]
+        if all(math.dist(node, point) > JOIN for node in near):
+            nodes.append(point)
+            cells.setdefault((column, row), []).append(point)
+    return np.array(nodes)
 
 
 def _index(nodes: _Points, point: _Points) -> int:
