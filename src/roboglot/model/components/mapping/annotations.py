@@ -66,7 +66,8 @@ class Line:
             return np.array([(self.start.x, self.start.y), (self.end.x, self.end.y)])
         t = np.linspace(0.0, 1.0, self.count())
         weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
-        return weights @ np.array([(p.x, p.y) for p in (self.start, *self.control, self.end)])
+        places: NDArray[np.float64] = weights @ np.array([(p.x, p.y) for p in (self.start, *self.control, self.end)])
+        return places
 
     def count(self) -> int:
         """Return the number of points."""
