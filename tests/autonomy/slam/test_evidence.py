@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboglot.autonomy.navigation.route import SPACING, Route
+from roboglot.autonomy.navigation.rules import GridFrame
 from roboglot.autonomy.slam.evidence import CELLS_MAX, GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import RAYS_MAX, ScanPoints, ScanReader
 from roboglot.kernels.occupancy import HIT, SCANS
+from roboglot.model.components.mapping.annotations import Area, AreaKind
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.sensing import LaserScan
 
@@ -175,3 +177,35 @@ def test_every_scan_counts_however_many_there_were() -> None:
         grid.evidence[row, column] = 10
         paint(grid, scan, Pose(), fill=False)
         assert grid.evidence[row, column] == 10 + HIT
+
+
+def test_cells_outside_maintained_areas_are_protected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until those areas are gone, also after the map's origin has moved, and marked once for each change of them."""
+    looked = list[Area]()
+    inside = GridFrame.inside
+    monkeypatch.setattr(GridFrame, "inside", lambda frame, area: looked.append(area) or inside(frame, area))
+    grid, echo = EvidenceGrid(), np.array([[2.0, 0.0]])
+    scan = ScanPoints(echo, np.ones(1, np.uint8), echo, Point())
+    elsewhere = Area(1, AreaKind.MAINTENANCE, Point(1.0, 2.0), Point(2.0, 2.0), 0.5)
+
+    def wall() -> int:
+        return int(grid.evidence[-grid.first_row, math.floor(2.0 / RESOLUTION) - grid.first_column])
+
+    paint(grid, scan, Pose(), fill=False)
+    for _ in range(3):
+        paint(grid, scan, Pose(), fill=False, maintained=(elsewhere,))
+    assert (wall(), len(looked)) == (HIT, 1)
+    paint(
+        grid,
+        ScanPoints(echo * 10, np.ones(1, np.uint8), echo * 10, Point()),
+        Pose(),
+        fill=False,
+        maintained=(elsewhere,),
+    )
+    paint(grid, scan, Pose(), fill=False, maintained=(elsewhere,))
+    assert (wall(), len(looked)) == (HIT, 2)  # it has grown
+    paint(grid.copy(), scan, Pose(), fill=False, maintained=(elsewhere,))
+    assert len(looked) == 2
+    moved = grid.seen_from(20, 0)
+    paint(moved, scan, Pose(-1.0, 0.0), fill=False)
+    assert wall() == 2 * HIT

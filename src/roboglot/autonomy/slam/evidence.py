@@ -15,6 +15,7 @@ from typing import TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from roboglot.model.components.mapping.annotations import Area
 from roboglot.model.geometry import Point
 from roboglot.model.maps import OccupancyGrid
 
@@ -41,7 +42,7 @@ class EvidenceGrid:
         self.first_row = 0
         self.scans = 0
         self.given: NDArray[np.bool_] | None = None  # free floor of the loaded map, if there is one
-        self.frozen = False  # whether some cells are protected from scans
+        self.maintained: tuple[Area, ...] | None = ()  # areas outside which marks protect cells from scans; (): none
         self.full = False  # whether something was omitted because of CELLS_MAX or GRID_MAX
         self._drawn = OccupancyGrid(np.zeros((0, 0), np.int8), RESOLUTION, Point())
         self._drawn_scans = 0
@@ -93,6 +94,7 @@ class EvidenceGrid:
         if not empty:
             evidence[old], slots[old], marks[old] = self.evidence, self.slots, self.marks
         self.evidence, self.slots, self.marks = evidence, slots, marks
+        self.maintained = self._still_maintained()
         self.first_row, self.first_column = rows[0], columns[0]
         if self.given is not None:
             given = np.zeros(shape, bool)
@@ -113,20 +115,25 @@ class EvidenceGrid:
         moved.surfaces, moved.used = self.surfaces, self.used
         moved.first_column, moved.first_row = self.first_column - column, self.first_row - row
         moved.scans, moved.full, moved.given = self.scans, self.full, self.given
+        moved.maintained = self._still_maintained()
         return moved
+
+    def _still_maintained(self) -> tuple[Area, ...] | None:
+        """Return the areas of ``maintained`` after the cells have moved; None: to be marked anew."""
+        return () if self.maintained == () else None
 
     def copy(self) -> EvidenceGrid:
         """Return an independent copy."""
         copied = self.seen_from(0, 0)
         copied.evidence, copied.slots, copied.marks = self.evidence.copy(), self.slots.copy(), self.marks.copy()
-        copied.surfaces, copied.frozen = self.surfaces.copy(), self.frozen
+        copied.surfaces, copied.maintained = self.surfaces.copy(), self.maintained
         return copied
 
     def empty_like(self) -> EvidenceGrid:
         """Return an empty map of the same size and place, for ``copy_rows``."""
         copied = self.seen_from(0, 0)
         copied.evidence, copied.marks = np.zeros_like(self.evidence), np.zeros_like(self.marks)
-        copied.slots, copied.frozen = np.zeros_like(self.slots), self.frozen
+        copied.slots = np.zeros_like(self.slots)
         copied.surfaces = self.surfaces.copy()  # few: rows of cells have theirs once they are copied
         return copied
 

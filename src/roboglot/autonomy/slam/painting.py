@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from roboglot.autonomy.navigation.rules import GridFrame
@@ -14,14 +12,14 @@ from roboglot.model.components.mapping.annotations import Area
 from roboglot.model.geometry import Pose
 
 
-def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maintained: Sequence[Area] = ()) -> None:
+def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maintained: tuple[Area, ...] = ()) -> None:
     """Add ``scan``, taken with base_link at ``pose`` in map; ``fill``: clear the floor between the rays too.
 
     With ``maintained`` areas, nothing changes outside them.
     """
     ends, min_x, max_x, min_y, max_y = placed(scan.ends, pose.x, pose.y, pose.yaw)
     grid.make_room(min(min_x, pose.x), min(min_y, pose.y), max(max_x, pose.x), max(max_y, pose.y))
-    if maintained or grid.frozen:
+    if grid.maintained != maintained:
         _freeze(grid, maintained)
     corner, grid.scans = grid.corner, grid.scans + 1
     ends -= (corner.x, corner.y)
@@ -34,7 +32,7 @@ def paint(grid: EvidenceGrid, scan: ScanPoints, pose: Pose, *, fill: bool, maint
     )
 
 
-def _freeze(grid: EvidenceGrid, maintained: Sequence[Area]) -> None:
+def _freeze(grid: EvidenceGrid, maintained: tuple[Area, ...]) -> None:
     """Let scans change cells inside the areas only; without areas, all cells."""
     frame = GridFrame(grid.corner, (grid.evidence.shape[0], grid.evidence.shape[1]))
     changing = np.full(frame.shape, not maintained)
@@ -42,4 +40,4 @@ def _freeze(grid: EvidenceGrid, maintained: Sequence[Area]) -> None:
         changing |= frame.inside(area)
     grid.marks[changing & (grid.marks == FROZEN)] = 0
     grid.marks[~changing] = FROZEN
-    grid.frozen = bool(maintained)
+    grid.maintained = maintained
