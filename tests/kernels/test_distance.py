@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from roboglot.kernels.distance import NEAR_MAX, distances, gaps, mark_beside
+from roboglot.kernels.distance import NEAR_MAX, distances, gaps, mark_beside, mark_inside
 
 
 @settings(max_examples=100, deadline=None)
@@ -78,3 +78,18 @@ def test_cells_beside_a_line_are_those_within_reach(points: list[tuple[float, fl
         away = np.minimum(away, np.hypot(x - a[0] - share * dx, y - a[1] - share * dy))
     sure = np.abs(away - reach) > 1e-6
     assert (mask == (away <= reach))[sure].all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(PLACES, PLACES, PLACES, PLACES, st.floats(0.03, 4.0))
+def test_cells_inside_an_area_lie_in_its_rectangle(x1: float, y1: float, x2: float, y2: float, half: float) -> None:
+    mask, length = np.zeros((30, 40), np.bool_), float(np.hypot(x2 - x1, y2 - y1))
+    mark_inside(mask, np.array([x1, y1], np.float64), np.array([x2, y2], np.float64), half, -1.0, -0.7, 0.05)
+    if length == 0.0:
+        assert not mask.any()
+        return
+    x, y = -1.0 + (np.arange(40) + 0.5) * 0.05 - x1, (-0.7 + (np.arange(30) + 0.5) * 0.05)[:, None] - y1
+    along, beside = (x * (x2 - x1) + y * (y2 - y1)) / length, np.abs(y * (x2 - x1) - x * (y2 - y1)) / length
+    edges = np.minimum(np.minimum(np.abs(along), np.abs(along - length)), np.abs(beside - half))
+    expected = (along >= 0.0) & (along <= length) & (beside <= half)
+    assert (mask == expected)[edges > 1e-6].all()

@@ -142,6 +142,24 @@ def mark_beside(mask: BoolArray, way: FloatArray, left: float, bottom: float, re
                     mask[row, col] = True
 
 
+@kernel("void(boolean[:,::1], float64[::1], float64[::1], float64, float64, float64, float64)")
+def mark_inside(
+    mask: BoolArray, start: FloatArray, end: FloatArray, half: float, left: float, bottom: float, resolution: float
+) -> None:
+    """Mark the cells whose centre lies in a rectangle, ``half`` m to both sides of its centre line; see above."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = np.hypot(dx, dy)
+    if length == 0.0:
+        return
+    ux, uy = dx / length, dy / length
+    for row in range(mask.shape[0]):
+        y = bottom + (row + 0.5) * resolution - start[1]
+        for col in range(mask.shape[1]):
+            x = left + (col + 0.5) * resolution - start[0]
+            along, beside = x * ux + y * uy, y * ux - x * uy
+            mask[row, col] |= (along >= 0.0) & (along <= length) & (abs(beside) <= half)
+
+
 @kernel("void(uint8[::1], float32[::1], float32[::1], float32)")
 def _one_farther(occupied: ByteArray, there: SingleArray, found: SingleArray, far: np.float32) -> None:
     """Fill one row with a cell more than ``there``, or 0 where that is occupied: in wide instructions."""

@@ -56,15 +56,15 @@ class GridFrame:
 
     def inside(self, area: Area) -> Mask:
         """Return the mask of the cells whose centre lies in ``area``."""
+        from roboglot.kernels.distance import mark_inside
+
         mask = np.zeros(self.shape, bool)
         rows, columns = self.around(area.corners(), RESOLUTION)
-        x, y = self.centres(rows, columns)
-        length = area.start.distance_to(area.end)
-        if length > 0.0:
-            ux, uy = (area.end.x - area.start.x) / length, (area.end.y - area.start.y) / length
-            dx, dy = x - area.start.x, y - area.start.y
-            along, beside = dx * ux + dy * uy, dy * ux - dx * uy
-            mask[rows, columns] = (along >= 0.0) & (along <= length) & (np.abs(beside) <= area.half_width)
+        window = np.zeros((rows.stop - rows.start, columns.stop - columns.start), bool)
+        left, bottom = (self.corner.x + columns.start * RESOLUTION, self.corner.y + rows.start * RESOLUTION)
+        start, end = (np.array((point.x, point.y), np.float64) for point in (area.start, area.end))
+        mark_inside(window, start, end, area.half_width, left, bottom, RESOLUTION)
+        mask[rows, columns] = window
         return mask
 
     def beside(self, lines: tuple[Line, ...], reach: float) -> Mask:

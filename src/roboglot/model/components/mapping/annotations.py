@@ -63,7 +63,7 @@ class Line:
     def polyline(self) -> NDArray[np.float64]:
         """Return the same (n, 2; map, m)."""
         if self.control is None:
-            return np.array([(self.start.x, self.start.y), (self.end.x, self.end.y)])
+            return np.array([(self.start.x, self.start.y), (self.end.x, self.end.y)], np.float64)
         t = np.linspace(0.0, 1.0, self.count())
         weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
         places: NDArray[np.float64] = weights @ np.array([(p.x, p.y) for p in (self.start, *self.control, self.end)])
