@@ -98,12 +98,13 @@ async def test_long_names_stay_out_of_the_log(fleet: Path, caplog: pytest.LogCap
 
 async def test_a_classroom_that_hangs_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(class_link, "UNREAD_MAX", 1 << 20)
-    came = asyncio.Event()
+    came, over = asyncio.Event(), asyncio.Event()
 
     async def hang(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         came.set()
         await reader.readline()
-        await asyncio.Event().wait()
+        await over.wait()
+        writer.transport.abort()
 
     server = await asyncio.start_unix_server(hang, tmp_path / "class")
     room = LinkedRoom(tmp_path / "class", Hello("w1", ""), AsyncMock(), Mock())
@@ -112,7 +113,9 @@ async def test_a_classroom_that_hangs_is_left(tmp_path: Path, monkeypatch: pytes
     with pytest.raises(Refused, match="out of reach"):
         _draw(seat, 40)
     await room.end()
+    over.set()
     server.close()
+    await server.wait_closed()
 
 
 def _draw(seat: LinkedSeat, times: int) -> None:

@@ -147,7 +147,7 @@ async def test_without_a_robot_it_happens_to_all(sim):
         (lambda faults: faults.inject("low_battery", chrge=0.1), "did you mean 'charge'"),
         (lambda faults: faults.inject("low_battery", charge=3.0), "between 0 and 1"),
         (lambda faults: faults.inject("low_battery", charge="x"), "^low_battery.charge must be a number, not text$"),
-        (lambda faults: faults.inject("slow_answers", seconds=math.nan), "seconds must be a number, not nan"),
+        (lambda faults: faults.inject("slow_answers", seconds=math.nan), "seconds must be finite, not nan"),
         (lambda faults: faults.inject("low_battery", duration="x"), "^duration must be a number, not text$"),
         (lambda faults: faults.inject("low_battery", duration=0.0), "more than 0 s"),
         (lambda faults: faults.inject("lift_out_of_service", "a"), "affects the building, not a robot"),

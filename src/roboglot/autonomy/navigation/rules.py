@@ -73,7 +73,7 @@ class GridFrame:
 
         mask = np.zeros(self.shape, bool)
         for line in lines:
-            mark_beside(mask, line.polyline(), self.corner.x, self.corner.y, RESOLUTION, reach)
+            mark_beside(mask, _polyline(line), self.corner.x, self.corner.y, RESOLUTION, reach)
         return mask
 
     def near(self, point: Point, reach: float) -> Mask:
@@ -89,6 +89,16 @@ def _cells(begin: float, end: float, count: int) -> slice:
     """Return the cells of ``count`` from ``begin`` to ``end``, m from the first one."""
     first, last = int(begin // RESOLUTION), int(end // RESOLUTION) + 1
     return slice(min(max(first, 0), count), min(max(last, 0), count))
+
+
+def _polyline(line: Line) -> NDArray[np.float64]:
+    """Return the points of a line (n, 2; map, m)."""
+    if line.control is None:
+        return np.array([(line.start.x, line.start.y), (line.end.x, line.end.y)], np.float64)
+    t = np.linspace(0.0, 1.0, line.count())
+    weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
+    places: NDArray[np.float64] = weights @ np.array([(p.x, p.y) for p in (line.start, *line.control, line.end)])
+    return places
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +145,7 @@ def _distance(lines: tuple[Line, ...], point: Point) -> float:
     """Return the distance from ``point`` to the nearest of ``lines``, m."""
     nearest = math.inf
     for line in lines:
-        way = line.polyline() - (point.x, point.y)
+        way = _polyline(line) - (point.x, point.y)
         spans = np.diff(way, axis=0)
         shares = -(way[:-1] * spans).sum(axis=1) / np.maximum((spans**2).sum(axis=1), 1e-12)
         feet = way[:-1] + np.clip(shares, 0.0, 1.0)[:, None] * spans

@@ -161,7 +161,7 @@ def _checked(name: str, value: object, kind: type[T]) -> T:
     except msgspec.ValidationError as error:
         raise ValueError(why_invalid(error, field=name)) from None
     if isinstance(converted, float) and not math.isfinite(converted):
-        raise ValueError(f"{name} must be a number, not {converted}")
+        raise ValueError(f"{name} must be finite, not {converted}")
     return converted
 
 

@@ -9,9 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
 from roboglot.model.components.component import Component
 from roboglot.model.geometry import Point, Pose
 from roboglot.model.maps import PointOfInterest
@@ -58,16 +55,10 @@ class Line:
 
     def points(self) -> tuple[Point, ...]:
         """Return the polyline: both ends, and points between them on a curve."""
-        return tuple(Point(x, y) for x, y in self.polyline().tolist())
-
-    def polyline(self) -> NDArray[np.float64]:
-        """Return the same (n, 2; map, m)."""
         if self.control is None:
-            return np.array([(self.start.x, self.start.y), (self.end.x, self.end.y)], np.float64)
-        t = np.linspace(0.0, 1.0, self.count())
-        weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
-        places: NDArray[np.float64] = weights @ np.array([(p.x, p.y) for p in (self.start, *self.control, self.end)])
-        return places
+            return (self.start, self.end)
+        corners, steps = (self.start, *self.control, self.end), self.count() - 1
+        return tuple(_on_curve(corners, step / steps) for step in range(steps + 1))
 
     def count(self) -> int:
         """Return the number of points."""
@@ -75,6 +66,14 @@ class Line:
             return 2
         length = sum(a.distance_to(b) for a, b in itertools.pairwise((self.start, *self.control, self.end)))
         return min(max(math.ceil(length / CURVE_STEP), 2), CURVE_POINTS_MAX) + 1
+
+
+def _on_curve(corners: tuple[Point, Point, Point, Point], t: float) -> Point:
+    weights = ((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3)
+    return Point(
+        sum(w * p.x for w, p in zip(weights, corners, strict=True)),
+        sum(w * p.y for w, p in zip(weights, corners, strict=True)),
+    )
 
 
 @dataclass(frozen=True, slots=True)
