@@ -1,4 +1,4 @@
-"""The build step of wheels: stores the console's texts compressed, as ``roboglot/console/assets.py`` reads them.
+"""The build step of wheels: stores pages and tables compressed, as ``roboglot.text_files.content_of`` reads them.
 
 Loaded by setuptools alone, before the package is there: it imports nothing of it.
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from setuptools.command.build_py import build_py  # type: ignore[import-untyped]
 
-PAGES = "roboglot/console/web"
+FOLDERS = ("roboglot/console/web", "roboglot/protocols/slamware/page", "roboglot/wire/contracts")
 LABELS = "roboglot/console/studio/labels.toml"
 TEXTS = {".html", ".js", ".css", ".json", ".svg"}
 
@@ -19,11 +19,11 @@ class BuildPackage(build_py):  # type: ignore[misc]
     """Copies the package to the build folder; an editable installation keeps the files of the sources."""
 
     def run(self) -> None:
-        """Copy everything, then compress the pages and the labels of the studio's blocks."""
+        """Copy everything, then compress the texts in FOLDERS and the labels of the studio's blocks."""
         super().run()
         if self.editable_mode:
             return
-        pages = [path for path in Path(self.build_lib, PAGES).rglob("*") if path.suffix in TEXTS]
-        for path in (*pages, Path(self.build_lib, LABELS)):
+        texts = [path for folder in FOLDERS for path in Path(self.build_lib, folder).rglob("*") if path.suffix in TEXTS]
+        for path in (*texts, Path(self.build_lib, LABELS)):
             path.with_name(f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes(), 9, mtime=0))
             path.unlink()

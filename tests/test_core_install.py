@@ -103,11 +103,14 @@ def test_pages_in_a_wheel_equal_the_sources(core: Path) -> None:
     assert json.loads(done.stdout) == {path: asset.tag for path, asset in Assets().all()}
 
 
-def test_labels_in_a_wheel_equal_the_sources(core: Path) -> None:
-    code = "from roboglot.console.assets import content_of; from roboglot.console import studio"
-    read = "sys.stdout.buffer.write(content_of(Path(studio.__file__).with_name('labels.toml')))"
-    done = run(core, "-c", f"import sys; from pathlib import Path; {code}; {read}")
-    assert done.stdout == (ROOT / "src/roboglot/console/studio/labels.toml").read_text("utf-8"), done.stderr
+@pytest.mark.parametrize(
+    "name", ["console/studio/labels.toml", "protocols/slamware/page/page.js", "wire/contracts/slamware.json"]
+)
+def test_texts_in_a_wheel_equal_the_sources(core: Path, name: str) -> None:
+    code = "import sys, roboglot; from pathlib import Path; from roboglot.text_files import content_of"
+    read = f"sys.stdout.buffer.write(content_of(Path(roboglot.__file__).parent / {name!r}))"
+    done = run(core, "-c", f"{code}; {read}")
+    assert done.stdout == (ROOT / "src/roboglot" / name).read_text("utf-8"), done.stderr
 
 
 def test_the_start_screen_names_an_installed_file(core: Path) -> None:

@@ -1,7 +1,8 @@
-"""Reads text from untrusted sources; malformed text raises ValueError with the reason in plain words."""
+"""Reads files: text of untrusted sources, raising ValueError with the reason if malformed; and our own data."""
 
 from __future__ import annotations
 
+import gzip
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -42,6 +43,12 @@ def text_of(path: Path, most: int = TEXT_MAX, encoding: str = "utf-8") -> str:
     if len(text) > most:
         raise ValueError(f"longer than {most} characters")
     return text
+
+
+def content_of(path: Path) -> bytes:
+    """Return the content of a file of the package; a wheel stores some compressed (``wheel_pages``)."""
+    packed = path.with_name(f"{path.name}.gz")
+    return gzip.decompress(packed.read_bytes()) if packed.exists() else path.read_bytes()
 
 
 def bytes_of(path: Path, most: int) -> bytes:

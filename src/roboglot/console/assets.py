@@ -50,12 +50,6 @@ def _paths() -> dict[str, Path]:
     return found
 
 
-def content_of(path: Path) -> bytes:
-    """Return a file's content; in a wheel, some are stored compressed (``wheel_pages``)."""
-    packed = path.with_name(f"{path.name}.gz")
-    return gzip.decompress(packed.read_bytes()) if packed.exists() else path.read_bytes()
-
-
 @cache
 def _read(path: Path) -> Asset:
     plain, packed, kind = path.read_bytes(), b"", Path(path.name.removesuffix(".gz")).suffix

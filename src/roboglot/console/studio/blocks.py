@@ -16,7 +16,6 @@ from typing import Any
 
 import msgspec
 
-from roboglot.console.assets import content_of
 from roboglot.console.studio.ranges import choices_of, limit_of
 from roboglot.operations import Operation
 from roboglot.programs.functions.enums import ENUMS
@@ -24,6 +23,7 @@ from roboglot.programs.functions.prelude import ability_set
 from roboglot.programs.functions.records import RECORDS
 from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.language.names import BUILTINS, MODULES
+from roboglot.text_files import content_of
 from roboglot.values import dataclass
 
 LABELS = Path(__file__).with_name("labels.toml")

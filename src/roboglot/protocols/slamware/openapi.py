@@ -20,6 +20,7 @@ from roboglot.protocols.slamware.chapters.system.system import SLEEP_MODES
 from roboglot.protocols.slamware.routes import ALIASES, BEYOND, SHORTHANDS
 from roboglot.protocols.slamware.table import TABLE, NoContent, Text
 from roboglot.protocols.slamware.vocabulary import RIDE_STAGES
+from roboglot.text_files import content_of
 from roboglot.wire.contracts import contract
 
 BODIES = (bytes, Upload)  # not JSON
@@ -78,7 +79,7 @@ def document() -> Schema:
 
 def summaries() -> Mapping[str, str]:
     """Return the Chinese summaries by the operation's name."""
-    data = Path(__file__).with_name("page").joinpath("summaries.zh.json").read_bytes()
+    data = content_of(Path(__file__).with_name("page") / "summaries.zh.json")
     return msgspec.json.decode(data, type=dict[str, str])
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from roboglot.protocols.slamware.openapi import document
+from roboglot.text_files import content_of
 
 FILES = {
     "/": ("index.html", "text/html; charset=utf-8"),
@@ -28,7 +29,7 @@ class Pages:
         if path not in FILES:
             return None
         name, content_type = FILES[path]
-        return content_type, Path(__file__).with_name("page").joinpath(name).read_bytes()
+        return content_type, content_of(Path(__file__).with_name("page") / name)
 
     @cached_property
     def _description(self) -> bytes:

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import msgspec
 
+from roboglot.text_files import content_of
+
 
 class Row(NamedTuple):
     """One operation, command, message code or function of a protocol."""
@@ -24,7 +26,7 @@ class Row(NamedTuple):
 @cache
 def contract(protocol: str) -> tuple[Row, ...]:
     """Return all rows of ``protocol``, in the manual's order."""
-    data = Path(__file__).with_name(f"{protocol}.json").read_bytes()
+    data = content_of(Path(__file__).with_name(f"{protocol}.json"))
     chapters = msgspec.json.decode(data, type=list[tuple[str, list[str | tuple[str, str]]]])
     return tuple(
         Row(row, chapter, row) if isinstance(row, str) else Row(row[0], chapter, row[1])
