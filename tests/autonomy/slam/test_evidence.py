@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboglot.autonomy.navigation.route import SPACING, Route
-from roboglot.autonomy.navigation.rules import GridFrame
+from roboglot.autonomy.navigation.rules import GridFrame, Mask
 from roboglot.autonomy.slam.evidence import CELLS_MAX, GRID_MAX, RESOLUTION, EvidenceGrid
 from roboglot.autonomy.slam.painting import paint
 from roboglot.autonomy.slam.scan_points import RAYS_MAX, ScanPoints, ScanReader
@@ -183,7 +183,12 @@ def test_cells_outside_maintained_areas_are_protected(monkeypatch: pytest.Monkey
     """Until those areas are gone, also after the map's origin has moved, and marked once for each change of them."""
     looked = list[Area]()
     inside = GridFrame.inside
-    monkeypatch.setattr(GridFrame, "inside", lambda frame, area: looked.append(area) or inside(frame, area))
+
+    def noted(frame: GridFrame, area: Area) -> Mask:
+        looked.append(area)
+        return inside(frame, area)
+
+    monkeypatch.setattr(GridFrame, "inside", noted)
     grid, echo = EvidenceGrid(), np.array([[2.0, 0.0]])
     scan = ScanPoints(echo, np.ones(1, np.uint8), echo, Point())
     elsewhere = Area(1, AreaKind.MAINTENANCE, Point(1.0, 2.0), Point(2.0, 2.0), 0.5)
