@@ -105,7 +105,7 @@ async def test_only_owners_get_in_invalid_requests_are_reported(desk: Path) -> N
     assert await say(desk, b"x" * (LINE_MAX * 4) + b"\n") is None
     waiting = [await asyncio.open_unix_connection(desk / NAME) for _ in range(CALLERS_MAX)]
     await asyncio.sleep(0)
-    assert (await say(desk, b"{}\n"))["robots"]  # those that ask nothing lock nobody out
+    assert (await say(desk, b"{}\n"))["robots"]  # callers that ask nothing lock no other out
     assert await waiting[0][0].read() == b""  # the longest idle one gave way
     for _, writer in waiting:
         writer.close()

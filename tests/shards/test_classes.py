@@ -1,4 +1,4 @@
-"""The socket of a fleet's classes: whatever a console sends or leaves unread stays bounded, and within the folder."""
+"""The socket of a fleet's classes: what consoles send and leave unread is bounded, and stays within the folder."""
 
 from __future__ import annotations
 

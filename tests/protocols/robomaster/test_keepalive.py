@@ -1,4 +1,4 @@
-"""Peers that vanished are disconnected, those that are there and do not read are not; nobody is there to refuse."""
+"""Peers that vanished are disconnected or were never accepted; those that are there but do not read stay."""
 
 from __future__ import annotations
 

@@ -93,12 +93,7 @@ def _cells(begin: float, end: float, count: int) -> slice:
 
 def _polyline(line: Line) -> NDArray[np.float64]:
     """Return the points of a line (n, 2; map, m)."""
-    if line.control is None:
-        return np.array([(line.start.x, line.start.y), (line.end.x, line.end.y)], np.float64)
-    t = np.linspace(0.0, 1.0, line.count())
-    weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
-    places: NDArray[np.float64] = weights @ np.array([(p.x, p.y) for p in (line.start, *line.control, line.end)])
-    return places
+    return np.array([(point.x, point.y) for point in line.points()], np.float64)
 
 
 @dataclass(frozen=True, slots=True)

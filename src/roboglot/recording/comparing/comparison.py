@@ -105,7 +105,7 @@ class Comparison:
 
     @property
     def doors(self) -> list[str]:
-        """IdMap of the doors, sorted."""
+        """Names of the doors, sorted."""
         return sorted({row.door for row in self.rows})
 
 

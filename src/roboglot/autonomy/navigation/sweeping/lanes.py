@@ -56,7 +56,7 @@ class _Field:
 
 
 def _field(area: Area, frame: GridFrame) -> _Field | None:
-    """Return the part of ``area`` that the map covers: an area may be much larger than any map; None: there is none."""
+    """Return the part of ``area`` on the map, as an area may be much larger than any map; None: there is none."""
     length, height, width = area.start.distance_to(area.end), *(cells * RESOLUTION for cells in frame.shape)
     if length <= 0.0 or area.half_width <= 0.0:
         return None
@@ -73,7 +73,7 @@ def _field(area: Area, frame: GridFrame) -> _Field | None:
 
 
 def all_parts(areas: Sequence[Area], floor: NDArray[np.bool_], frame: GridFrame, width: float) -> list[SweptPart]:
-    """Return the parts of ``areas`` on open ``floor``, with lanes along their centre lines, at most ``width`` m apart.
+    """Return the parts of ``areas`` on open ``floor``, with lanes along them, at most ``width`` m apart.
 
     Raises InvalidGoal for more than LANES_MAX lanes.
     """
