@@ -37,6 +37,7 @@ class Stand:
         self.world.equip(self.robot)
         self.alignment = SeenStairAlignment(self.robot)
         self.robot.add(Driving, OdometryDriving(self.robot))
+        self.world._use_kernels()
         self.world.start()
 
     async def put(self, before: float, degrees: float, aside: float, way: StairDirection = UP) -> None:

@@ -33,13 +33,20 @@ class Simulation:
         return self.world.truth.pose_of("a")
 
     @classmethod
-    def of(cls, description: WorldDescription, placements: list[RobotPlacement], seed: int) -> Self:
-        """Build a world with its robots; it is not started."""
+    def of(
+        cls, description: WorldDescription, placements: list[RobotPlacement], seed: int, *, compiled: bool = True
+    ) -> Self:
+        """Build a world with its robots, and the kernels that a fleet waits for; it is not started.
+
+        Without these (``compiled``) a second takes five times as long.
+        """
         clock = LockstepClock()
         world = World(description, placements, clock=clock, seed=seed)
         robots = {name: Robot(name, world.description_of(name), clock) for name in [p.name for p in placements]}
         for robot in robots.values():
             world.equip(robot)
+        if compiled:
+            world._use_kernels()
         return cls(world, clock, robots)
 
 
@@ -59,9 +66,10 @@ def simulate() -> Iterator[Simulate]:
         seed: int = 1,
         robots: tuple[str, ...] = ("a",),
         body: str = "universal",
+        compiled: bool = True,
     ) -> Simulation:
         placements = [RobotPlacement(n, body, start=start if n == "a" else None, floor=floor) for n in robots]
-        built = Simulation.of(load_world(name) if isinstance(name, str) else name, placements, seed)
+        built = Simulation.of(load_world(name) if isinstance(name, str) else name, placements, seed, compiled=compiled)
         opened.append(built.world)
         return built
 

@@ -48,7 +48,6 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
 @pytest.mark.slow  # compares two worlds; in short: test_robot_at_rest_feels_obstacles
 async def test_skipped_contact_searches_miss_no_contact(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
     simulation = simulate("office", robots=("a", "b"), seed=3)
-    simulation.world._physics.load_kernels()
     monkeypatch.setattr(FreeMotion, "step", lambda *_: False)  # equals MuJoCo's steps up to rounding only
     sparing, calm, touched = await lived(simulation)
     monkeypatch.setattr(ContactSwitch, "look", lambda *_, **__: None)
@@ -62,7 +61,6 @@ async def test_skipped_contact_searches_miss_no_contact(simulate: Simulate, monk
 async def test_alone_no_contact_is_looked_for(simulate: Simulate) -> None:
     simulation = simulate("empty")
     options = simulation.world._physics._model.opt
-    simulation.world._physics.load_kernels()
     simulation.world.start()
     simulation.robot[Base].set_velocity(Twist(0.2))  # away from walls
     await simulation.clock.advance(2.0)
@@ -76,7 +74,6 @@ async def test_alone_no_contact_is_looked_for(simulate: Simulate) -> None:
 async def test_robot_in_its_dock_sleeps(simulate: Simulate) -> None:
     simulation = simulate("office")
     physics = simulation.world._physics
-    await simulation.world.prepare(wait=True)
     simulation.world.start()
     await simulation.clock.advance(2.0)
     assert physics._contact_switch.off
@@ -85,7 +82,6 @@ async def test_robot_in_its_dock_sleeps(simulate: Simulate) -> None:
 
 async def test_robot_at_rest_feels_obstacles(simulate: Simulate) -> None:
     simulation = simulate("empty", start=Pose(4.0, 5.0))
-    simulation.world._physics.load_kernels()
     simulation.world.start()
     await simulation.clock.advance(1.0)
     assert simulation.world._physics._contact_switch.off

@@ -31,7 +31,6 @@ STEPS = 3
 
 
 async def settled(simulation: Simulation) -> None:
-    simulation.world._physics.load_kernels()
     simulation.world.start()
     await simulation.clock.advance(0.5)
 
@@ -176,9 +175,7 @@ async def test_rising_robot_meets_what_hangs_above(simulate: Simulate, *, compil
     world = load_world("empty")
     board = Box(at=(4.0, 5.0), size=(0.6, 0.6, 0.05), base=0.3)
     room = replace(world.floors[0], furniture=(board,))
-    simulation = simulate(replace(world, floors=(room,)), start=Pose(6.0, 5.0), body="cyberdog2")
-    if compiled:
-        simulation.world._physics.load_kernels()
+    simulation = simulate(replace(world, floors=(room,)), start=Pose(6.0, 5.0), body="cyberdog2", compiled=compiled)
     simulation.world.start()
     simulation.robot[Legs].lie_down()
     await simulation.clock.advance(5.0)

@@ -18,8 +18,7 @@ def asleep(simulation: Simulation) -> bool:
 
 
 async def resting(simulation: Simulation) -> bool:
-    """Let time pass with the kernels, enough to come to rest."""
-    simulation.world._physics.load_kernels()
+    """Let time pass, enough to come to rest."""
     await simulation.clock.advance(3.0)
     return asleep(simulation)
 

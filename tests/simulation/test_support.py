@@ -21,6 +21,7 @@ class Scene:
         self.world = World(load_world(world), [RobotPlacement("a", "universal", start)], clock=self.clock, seed=1)
         self.robot = Robot("a", self.world.description_of("a"), self.clock)
         self.world.equip(self.robot)
+        self.world._use_kernels()
         self.world.start()
         self.hull = self.world._population.hull("a")
 

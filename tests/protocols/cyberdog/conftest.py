@@ -106,6 +106,7 @@ async def walker(clock: LockstepClock) -> AsyncIterator[tuple[World, Robot]]:
     robot = Robot("a", world.description_of("a"), clock)
     world.equip(robot)
     robot.add(Driving, OdometryDriving(robot))
+    await world.prepare(wait=True)
     world.start()
     yield world, robot
     world.close()

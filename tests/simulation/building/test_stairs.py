@@ -25,6 +25,7 @@ async def put(body, pose, world="stairs"):
     made = World(load_world(world), [RobotPlacement("a", body)], clock=clock, seed=1)
     robot = Robot("a", made.description_of("a"), clock)
     made.equip(robot)
+    await made.prepare(wait=True)
     made.start()
     made.stage.place("a", pose)
     await clock.advance(0.5)

@@ -27,7 +27,7 @@ async def test_drives_where_it_should(simulate):
 
 
 async def test_repeated_command_costs_nothing_once_robot_moves_so(simulate):
-    sim = simulate(start=Pose(5, 5))
+    sim = simulate(start=Pose(5, 5), compiled=False)
     base = sim.robot[Base]
     sim.world.start()
     base.set_velocity(Twist(yaw=1.0))
@@ -45,10 +45,8 @@ async def test_repeated_command_costs_nothing_once_robot_moves_so(simulate):
 
 async def test_kernel_ramps_as_the_base_does(simulate):
     async def speeds(*, compiled):
-        sim = simulate(start=Pose(5, 5))
+        sim = simulate(start=Pose(5, 5), compiled=compiled)
         base, seen = sim.robot[Base], []
-        if compiled:
-            sim.world._physics.tables.load_kernels()
         sim.world.start()
         for twist in (Twist(0.3, 0.2, 1.0), Twist(-0.2, 0.1, -2.0), Twist(0.1), STILL):
             base.set_velocity(twist)

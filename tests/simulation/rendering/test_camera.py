@@ -45,6 +45,8 @@ async def lab(world, *, start=START, clock=None, seed=1, others=(), body="univer
     for placement in placements:
         robots.append(Robot(placement.name, built.description_of(placement.name), clock))
         built.equip(robots[-1])
+    if isinstance(clock, LockstepClock):
+        await built.prepare(wait=True)
     built.start()
     if isinstance(clock, LockstepClock):
         await clock.advance(0.2)
