@@ -109,7 +109,9 @@ async def test_it_holds_after_crash_while_people_load_it(tmp_path: Path) -> None
         assert status_of(robot, order) is OrderStatus.CANCELED
 
 
-@pytest.mark.parametrize("part", ["sleep", "base", "reboot"])
+@pytest.mark.parametrize(
+    "part", ["sleep", *(pytest.param(part, marks=pytest.mark.slow) for part in ("base", "reboot"))]
+)
 async def test_orders_wait_until_the_robot_is_awake(tmp_path: Path, part: str) -> None:
     async with running(tmp_path / "robot.db") as (robot, clock):
         await robot[Places].put(ROOM)

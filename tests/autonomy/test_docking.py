@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
 
+@pytest.mark.slow  # in short: test_go_home of tests/protocols/slamware/motion
 @pytest.mark.world("office", seed=3)
 async def test_it_finds_back_to_its_dock(tour: Tour) -> None:
     docking, reported, charging = tour.robot[Docking], [], []
@@ -86,7 +87,7 @@ def _xy(tour: Tour, x: float, y: float) -> tuple[float, float]:
     return point.x, point.y
 
 
-@pytest.mark.parametrize("aside", [0.28, -0.28])
+@pytest.mark.parametrize("aside", [0.28, pytest.param(-0.28, marks=pytest.mark.slow)])
 @pytest.mark.world("office")
 async def test_dock_that_was_moved_a_little_is_found(tour: Tour, aside: float) -> None:
     await tour.go((20.0, 10.0))
@@ -113,6 +114,7 @@ async def test_undocking_leaves_contacts_and_dock_is_found_again(tour: Tour) -> 
     assert (await tour.end_of(docking.dock())).status is ActionStatus.SUCCEEDED
 
 
+@pytest.mark.slow  # in short: test_dock_that_was_moved_a_little_is_found
 @pytest.mark.world("office")
 async def test_an_unknown_dock_is_found_nearby(tour: Tour) -> None:
     docking = tour.robot[Docking]

@@ -76,6 +76,7 @@ async def followed(tour: Tour, action: object, seconds: float) -> list[float]:
     return gaps
 
 
+@pytest.mark.slow  # in short: test_it_keeps_near_who_walks
 @pytest.mark.parametrize(
     "body",
     [
@@ -106,6 +107,7 @@ async def test_a_person_is_followed_round_the_corner(tour: Tour) -> None:
     assert not tour.bumps
 
 
+@pytest.mark.slow  # in short: test_without_anybody_it_gives_up
 @pytest.mark.world(BRACELET, body="cyberdog2")
 async def test_without_a_connected_tag_it_gives_up(tour: Tour) -> None:
     assert isinstance((await tour.end_of(tour.robot[Following].follow_tag())).error, NotFound)

@@ -53,6 +53,7 @@ def test_the_only_pose_that_fits():
     assert pose_by_landmarks(square, square) is None  # four ways to see it
 
 
+@pytest.mark.slow  # in short: test_the_only_pose_that_fits
 @pytest.mark.world(STRIPS_WORLD)
 async def test_a_lost_robot_finds_itself_by_them(tour):
     await tour.go((4.0, 4.6), deg=90)

@@ -30,6 +30,7 @@ async def dock(tour, goal):
     return action
 
 
+@pytest.mark.slow  # in short: test_up_to_it_and_away_again
 @pytest.mark.world(WORLD)
 @pytest.mark.parametrize("backward", [True, pytest.param(False, marks=pytest.mark.slow)])
 async def test_at_a_printed_tag(tour, backward):

@@ -124,6 +124,7 @@ async def test_a_lidar_sees_no_gap_in_a_robot(looking: str) -> None:
     database.close()
 
 
+@pytest.mark.slow  # in short: test_a_robot_in_the_way_is_driven_around
 async def test_robots_below_the_lidar_are_not_touched() -> None:
     """Two low robots leave no gap; the dog, which sees them from in front only, looks for one."""
     clock, database, bodies = LockstepClock(), Database(":memory:"), ("cyberdog2", "robomaster_ep", "robomaster_ep")

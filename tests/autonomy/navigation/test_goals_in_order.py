@@ -95,7 +95,15 @@ def _reached(now: Twist, asked: Twist, limits: BaseLimits) -> Twist:
     ids=["and back", "1", "2"],
 )
 @pytest.mark.parametrize(
-    "body", [pytest.param(body, marks=pytest.mark.world("empty", body=body), id=body) for body in BODIES]
+    "body",
+    [
+        pytest.param(
+            body,
+            id=body,
+            marks=[pytest.mark.world("empty", body=body), *([pytest.mark.slow] if body != "universal" else [])],
+        )
+        for body in BODIES
+    ],
 )
 async def test_success_means_every_goal_was_reached(tour: Tour, body: str, spots: list[tuple[float, float]]) -> None:
     wanted = [Point(*spot) for spot in spots]

@@ -58,6 +58,7 @@ async def test_one_at_a_time(fleet, world, clock):
     assert all(robot[TrafficRadio].claims == frozenset() for robot in fleet.robots.values())
 
 
+@pytest.mark.slow  # in short: test_one_at_a_time
 @pytest.mark.world("empty", robots=("a", "b"))
 async def test_two_may_enter(fleet, world, clock):
     crowd, waited = await cross(fleet, world, clock, 2)

@@ -70,6 +70,7 @@ async def watched(tour: Tour, action: Action) -> list[Pose]:
     return seen
 
 
+@pytest.mark.slow  # in short: test_a_wall_is_gone_around
 async def test_a_virtual_wall_is_driven_around(tour: Tour) -> None:
     await draw(tour, wall(5.0, 0.0, 5.0, 7.5))
     action = tour.head_for((8.0, 4.0))
@@ -106,6 +107,7 @@ async def test_forbidden_areas_may_be_left_but_not_entered(tour: Tour) -> None:
     assert_pose(tour.truth, x=8.5, y=5.0)
 
 
+@pytest.mark.slow  # in short: test_a_dangerous_area_is_crossed_slowly
 async def test_dangerous_areas_are_passed_slowly(tour: Tour) -> None:
     await draw(tour, area(AreaKind.DANGEROUS, 5.0, 5.0, 1.5, speed_max=0.2))
     action, inside, outside = tour.head_for((8.5, 5.0)), 0.0, 0.0
@@ -121,7 +123,7 @@ async def test_dangerous_areas_are_passed_slowly(tour: Tour) -> None:
     assert outside > 0.6
 
 
-@pytest.mark.parametrize("mode", [Tracks.STRICT, Tracks.PREFERRED])
+@pytest.mark.parametrize("mode", [Tracks.STRICT, pytest.param(Tracks.PREFERRED, marks=pytest.mark.slow)])
 async def test_tracks_are_followed_around_bends(tour: Tour, mode: Tracks) -> None:
     await draw(tour, track(1.5, 5.0, 8.5, 5.0, (1.5, 9.5), (8.5, 9.5)))  # an arc whose top is at y = 8.375
     await tour.go((1.6, 5.0))

@@ -70,7 +70,7 @@ async def searches(tour: Tour, monkeypatch: pytest.MonkeyPatch) -> Searches:
     return made
 
 
-@pytest.mark.parametrize("places", [[], [match(20.0), match(30.0)]])
+@pytest.mark.parametrize("places", [[], pytest.param([match(20.0), match(30.0)], marks=pytest.mark.slow)])
 async def test_fruitless_searches_become_rarer(searches: Searches, places: list[Match]) -> None:
     searches.found = [list(places) for _ in range(100)]
     await searches.during(STOOD)

@@ -60,6 +60,7 @@ async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
         assert jumps[-1].pose.distance_to(tour.robot[Localization].pose) < 0.01
 
 
+@pytest.mark.slow  # in short: test_a_kidnapped_robot_says_so_and_recovers
 @pytest.mark.world("office")
 @pytest.mark.parametrize(
     ("x", "y", "deg", "towards"),
@@ -181,6 +182,7 @@ async def test_robot_stays_lost_while_only_other_places_fit(
     assert tour.robot[Localization].lost is None
 
 
+@pytest.mark.slow  # in short: test_robot_stays_lost_while_only_other_places_fit
 @pytest.mark.world("empty")
 async def test_lost_robot_keeps_saying_that_places_look_alike(tour: Tour) -> None:
     await tour.go((8.5, 5.0))
@@ -191,6 +193,7 @@ async def test_lost_robot_keeps_saying_that_places_look_alike(tour: Tour) -> Non
         await tour.clock.advance(0.1)
 
 
+@pytest.mark.slow  # in short: test_a_place_found_once_replaces_none
 @pytest.mark.world("office")
 @pytest.mark.parametrize("along", [0.8, pytest.param(-1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("x", [16.0, pytest.param(25.0, marks=pytest.mark.slow)])

@@ -82,6 +82,7 @@ def drive(dice: random.Random) -> DriveLog:
     return DriveLog("round", scans, {})
 
 
+@pytest.mark.slow  # in short: test_gyro_drift_and_wrong_wheels_are_learnt_fast
 @pytest.mark.parametrize("seed", [SEEDS[0], *(pytest.param(seed, marks=pytest.mark.slow) for seed in SEEDS[1:])])
 def test_bad_wheels_are_believed_less(seed: int) -> None:
     log = drive(random.Random(seed))

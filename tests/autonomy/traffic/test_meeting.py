@@ -20,6 +20,7 @@ async def building() -> OccupancyGrid:
     return await survey(TIGHT)
 
 
+@pytest.mark.slow  # in short: test_two_change_places
 @pytest.mark.parametrize(
     "bodies", [("universal", "hermes"), pytest.param(("cyberdog2", "cyberdog2"), marks=pytest.mark.slow)]
 )
@@ -67,7 +68,7 @@ async def test_three_cross_at_one_place(building: OccupancyGrid) -> None:
     assert max(outcome.seconds.values()) < LONG
 
 
-@pytest.mark.slow  # in short: test_two_pass_a_corridor_for_one
+@pytest.mark.slow  # in short: test_two_change_places
 @pytest.mark.asyncio(loop_scope="module")
 async def test_robot_in_a_doorway_lets_others_out(building: OccupancyGrid) -> None:
     """Two want out of the room with one door; the third, who goes second, is on its way in."""
