@@ -41,6 +41,16 @@ def seeds(quick: int, slow: int) -> list[Any]:
     return [*range(quick), *(pytest.param(number, marks=pytest.mark.slow) for number in range(quick, slow))]
 
 
+def walks(rounds: int, slow: int) -> list[Any]:
+    """Return seeds and rounds: the beginning of a walk for every run, whole ones for ``--slow``; or those of ``WALKS``.
+
+    The whole ones take seconds each.
+    """
+    if CHOSEN:
+        return [(number, rounds) for number in seeds(0, 0)]
+    return [(0, rounds // 5), *(pytest.param(number, rounds, marks=pytest.mark.slow) for number in range(slow))]
+
+
 class Diary(list[tuple[object, ...]]):
     """Lines about what was asked and answered on a walk."""
 

@@ -23,7 +23,7 @@ from roboglot.testing import Forward
 from roboglot.wire.cyberdog.codes import Feedback, TaskState, TaskType
 from tests.drivers.settling import settle
 from tests.protocols.cyberdog.phone import Client, Messages, Pems
-from tests.protocols.witness import Witness, has_keys, seeds
+from tests.protocols.witness import Witness, has_keys, walks
 
 ROUNDS = 22
 PAUSES = [0, 0.02, 0.06, 0.1, 0.3, 1, 3, 6]  # s
@@ -244,11 +244,17 @@ class Walk:
             assert off < OFF, f"{call} succeeded {off:.2f} m from its goal"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", seeds(1, 60))
+@pytest.mark.parametrize(("seed", "rounds"), walks(ROUNDS, 60))
 @pytest.mark.world("empty", body="cyberdog2")
 async def test_random_calls_end_at_rest(
-    seed: int, robot: Robot, world: World, door: CyberDogDoor, pems: Pems, messages: Messages, forward: Forward
+    seed: int,
+    rounds: int,
+    robot: Robot,
+    world: World,
+    door: CyberDogDoor,
+    pems: Pems,
+    messages: Messages,
+    forward: Forward,
 ) -> None:
     """After an emergency stop nothing but 111 has the dog get up; when its clients are gone, it comes to rest."""
     draw = random.Random(seed)
@@ -259,7 +265,7 @@ async def test_random_calls_end_at_rest(
             walk = Walk(draw, [Client(first, messages), Client(second, messages)], robot, witness)
             walk.open(TASK, {"type": 7})  # once: a dog that has moved much searches the whole map for minutes
             await pass_time(walk, witness, 2.0)
-            for _ in range(ROUNDS):
+            for _ in range(rounds):
                 walk.step()
                 await settle()
                 await pass_time(walk, witness, draw.choice(PAUSES))

@@ -32,7 +32,7 @@ from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
 from tests.protocols.held_fairness import PATIENCE, until
 from tests.protocols.slamware.conftest import PLATE, serve
-from tests.protocols.witness import Diary, seeds
+from tests.protocols.witness import Diary, walks
 
 ROUNDS = 25
 API = "/api/core/artifact/v1"
@@ -223,14 +223,13 @@ async def shelf(clock: LockstepClock, tmp_path: Path) -> AsyncIterator[Shelf]:
     database.close()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", seeds(1, 8))
-async def test_requests_at_once_count_one_by_one(seed: int, shelf: Shelf) -> None:
+@pytest.mark.parametrize(("seed", "rounds"), walks(ROUNDS, 8))
+async def test_requests_at_once_count_one_by_one(seed: int, rounds: int, shelf: Shelf) -> None:
     draw, diary, client = random.Random(seed), Diary(), shelf.client
     drawn = Draw(draw)
     state: State = {name: {} for name in ("pois", "marks", *LINES, *AREAS)} | {"last": 0}
     with diary.writing():
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             asks = [drawn.ask(state) for _ in range(draw.randint(1, 3))]
             statuses = await shelf.at_once(asks)
             diary.extend((ask.method, ask.path, ask.body, status) for ask, status in zip(asks, statuses, strict=True))

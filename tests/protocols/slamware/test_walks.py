@@ -21,7 +21,7 @@ from roboglot.model.robot import Robot
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from tests.protocols.slamware.judge import Judge
-from tests.protocols.witness import GRACE, Witness, seeds
+from tests.protocols.witness import GRACE, Witness, walks
 
 ROUNDS = 25
 PAUSES = [0, 0.02, 0.1, 0.3, 0.6, 1.0, 3.0, 8.0, 15.0]  # s
@@ -260,11 +260,10 @@ class Walk:
         await step()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", seeds(1, 40))
+@pytest.mark.parametrize(("seed", "rounds"), walks(ROUNDS, 40))
 @pytest.mark.world("empty", body="hermes")
 async def test_random_requests_end_at_rest(
-    seed: int, robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward
+    seed: int, rounds: int, robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward
 ) -> None:
     """The door says what is true all the time; after an abort nothing runs and nothing moves."""
     draw = random.Random(seed)
@@ -272,7 +271,7 @@ async def test_random_requests_end_at_rest(
     with witness.writing():
         await witness.pass_time(1.0)
         walk = Walk(draw, await Judge.of(client), world, robot, witness)
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             await walk.step()
             await witness.pass_time(draw.choice(PAUSES))
             await walk.check()

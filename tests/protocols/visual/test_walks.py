@@ -16,7 +16,7 @@ from roboglot.programs.tasks.states import DEBUG, TaskState
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward
 from tests.protocols.visual.front_end import FrontEnd, alive
-from tests.protocols.witness import Witness, seeds
+from tests.protocols.witness import Witness, walks
 
 ROUNDS = 25
 LOOKS = [1, 2, 5, 10, 30]  # tenths of a second between two operations
@@ -97,11 +97,10 @@ class Walk:
             assert TaskState(said).alive == (id in runs and runs[id].alive), (id, said, runs)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", seeds(1, 40))
+@pytest.mark.parametrize(("seed", "rounds"), walks(ROUNDS, 40))
 @pytest.mark.world("empty", body="cyberdog2")
 async def test_random_operations_end_at_rest(
-    seed: int, robot: Robot, world: World, forward: Forward, connect: Connect
+    seed: int, rounds: int, robot: Robot, world: World, forward: Forward, connect: Connect
 ) -> None:
     """A suspended program's robot stands; when all are shut down, no process and no action is left."""
     draw = random.Random(seed)
@@ -110,7 +109,7 @@ async def test_random_operations_end_at_rest(
     witness = Witness(world, robot, forward)
     walk = Walk(draw, app, witness)
     with witness.writing():
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             await walk.step()
             await walk.pass_time(draw.choice(LOOKS))
             await walk.check()
