@@ -62,7 +62,13 @@ async def test_nothing_is_read_without_input() -> None:
 
 @pytest.mark.parametrize(
     ("given", "lines"),
-    [("< /dev/null", []), ("< {file}", LINES), ("< <(cat {file})", LINES), ("<&-", []), ("<&- >&2 2>&-", [])],
+    [
+        ("< /dev/null", []),
+        pytest.param("< {file}", LINES, marks=pytest.mark.slow),
+        ("< <(cat {file})", LINES),
+        pytest.param("<&-", [], marks=pytest.mark.slow),
+        ("<&- >&2 2>&-", []),
+    ],
 )
 def test_standard_input_of_any_kind_aborts_no_loop(given: str, lines: list[str], tmp_path: Path) -> None:
     """A socket with its number, if it were closed or never open, would abort uvloop or stay open for good."""

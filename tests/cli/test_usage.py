@@ -32,7 +32,7 @@ def test_usage_names_the_command_as_it_is_installed(name: str) -> None:
     assert f"Usage: roboglot {name} " in done.stderr
 
 
-@pytest.mark.parametrize("words", [("--help",), ("--version",), ("coverage",)])
+@pytest.mark.parametrize("words", [("--help",), ("--version",), pytest.param(("coverage",), marks=pytest.mark.slow)])
 def test_reader_that_goes_is_no_error_worth_traceback(words: tuple[str, ...]) -> None:
     assert ended(*words, reader="true").stderr == ""
 

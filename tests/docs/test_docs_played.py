@@ -32,6 +32,7 @@ def inline(page: Path, words: str) -> str:
     return str(found)
 
 
+@pytest.mark.slow  # in short: test_slamware of test_docs_first_calls.py
 @pytest.mark.parametrize(  # the Chinese page has the same commands
     "page",
     [STARTS[0], *(pytest.param(page, marks=pytest.mark.slow) for page in STARTS[1:])],

@@ -31,6 +31,7 @@ from tests.drivers.rig import Rig
 pytestmark = pytest.mark.world("office")
 
 
+@pytest.mark.slow  # in short: test_task_begun_with_lost_answer_is_stopped_too
 @pytest.mark.parametrize("back", ["slamware"])
 async def test_task_still_running_at_reconnection_is_stopped(
     back: str, way: Rig, connect: Connect, world: World

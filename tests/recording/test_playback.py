@@ -117,6 +117,7 @@ async def test_front_end_of_programs_ends_with_same_result(tmp_path: Path) -> No
     assert [block["id"] for *_, block in first[0][:-1] if block and block["type"] == "begin"] == ["one", "two"]
 
 
+@pytest.mark.slow  # in short: test_front_end_of_programs_ends_with_same_result
 async def test_front_end_repeats_its_result_on_busy_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Playback is late by 0.2 s of the robot at every step; ten times as fast as otherwise, so that it costs little."""
 

@@ -49,7 +49,7 @@ def test_beyond_reach_is_nothing():
     assert np.isinf(sweep(SQUARE, NOTHING, 5.0, 5.0, 0.0, 360, 4.9)).all()
 
 
-@pytest.mark.parametrize("name", ["office", "tests/data/maps/depot.yaml"])
+@pytest.mark.parametrize("name", ["office", pytest.param("tests/data/maps/depot.yaml", marks=pytest.mark.slow)])
 async def test_agrees_with_mujoco(simulate, request, name):
     path = str(request.config.rootpath / name) if "/" in name else name
     sim = simulate(path, robots=("a", "b"))

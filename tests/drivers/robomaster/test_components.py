@@ -36,9 +36,9 @@ from tests.narrowing import of_kind
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
-@pytest.fixture(params=["spec", "fw70"])
+@pytest.fixture(params=["spec", pytest.param("fw70", marks=pytest.mark.slow)])
 def profile(request: pytest.FixtureRequest) -> str:
-    """Both profiles: the manual's, and robots'."""
+    """Both profiles: the manual's, and robots', of which test_senses.py has more."""
     return str(request.param)
 
 

@@ -31,7 +31,7 @@ from tests.drivers.settling import settle
 pytestmark = pytest.mark.world("empty", body="robomaster_ep")
 
 
-@pytest.fixture(params=["spec", "fw70"])
+@pytest.fixture(params=["fw70", pytest.param("spec", marks=pytest.mark.slow)])
 def profile(request: pytest.FixtureRequest) -> str:
     """Both profiles: the manual's, and robots'."""
     return str(request.param)

@@ -43,7 +43,7 @@ def started(robot: socket.socket, doing: str) -> tuple[subprocess.Popen[bytes], 
     return program, connection
 
 
-@pytest.mark.parametrize("blow", [signal.SIGSTOP, signal.SIGKILL])
+@pytest.mark.parametrize("blow", [signal.SIGSTOP, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
 def test_program_that_hangs_or_dies_loses_its_connection(robot: socket.socket, blow: int) -> None:
     program, connection = started(robot, "drives")
     try:

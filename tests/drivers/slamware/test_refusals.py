@@ -34,7 +34,7 @@ class Broken:
         return asked
 
 
-@pytest.mark.parametrize("status", [404, 500, 502])
+@pytest.mark.parametrize("status", [404, *(pytest.param(status, marks=pytest.mark.slow) for status in (500, 502))])
 async def test_robot_that_only_refuses_is_lost(
     driven: Robot, until: Until, monkeypatch: pytest.MonkeyPatch, status: int
 ) -> None:

@@ -42,7 +42,15 @@ async def test_every_motion_of_the_table_is_performed(caller: Caller) -> None:
     assert len({number for _, number, _ in RESULT_MOTIONS}) == len({m for *_, m in RESULT_MOTIONS}) == 51
 
 
-@pytest.mark.parametrize("name", ["back_flip", "jump3d_left90deg", "jump3d_forward60cm", "space_walk", "bow"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "back_flip",
+        "jump3d_left90deg",
+        "bow",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("jump3d_forward60cm", "space_walk")),
+    ],
+)
 async def test_a_motion_ends_where_its_name_says(caller: Caller, world: World, name: str) -> None:
     number, motion = next((number, motion) for known, number, motion in RESULT_MOTIONS if known == name)
     await off_the_dock(caller)
@@ -56,7 +64,9 @@ async def test_a_motion_ends_where_its_name_says(caller: Caller, world: World, n
     assert caller.clock.time() - start == pytest.approx(spec.duration, abs=1.5)
 
 
-@pytest.mark.parametrize("name", ["bow", "jump3d_forward60cm", "space_walk"])
+@pytest.mark.parametrize(
+    "name", ["jump3d_forward60cm", *(pytest.param(name, marks=pytest.mark.slow) for name in ("bow", "space_walk"))]
+)
 async def test_pausing_holds_a_motion(caller: Caller, world: World, name: str) -> None:
     await off_the_dock(caller)
     performing, start = caller.start(f"cyberdog.motion.{name}"), caller.clock.time()

@@ -106,6 +106,7 @@ async def test_gestures_that_cannot_be_recognised(caller: Caller, name: str, arg
 # -- exercises ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow  # in short: test_repetitions_are_counted
 async def test_squats_are_counted_while_the_program_goes_on(caller: Caller, anna: Actor) -> None:
     result = await caller("cyberdog.skeleton.turn_on_recognition", ENUMS["SkeletonType"]["squat"], 3, 60)
     assert (field(result, "state.code"), field(result, "response.result")) == (0, 0)

@@ -125,7 +125,7 @@ async def test_lost_and_found_and_its_update(client, app: App, robot, gadget, pa
     assert await client.ask(8009) == {"success": False, "message": "there is no newer firmware"}
 
 
-@pytest.mark.parametrize(("stage", "failed"), [(3, 4), (5, 6), (7, 8), (9, 10)])
+@pytest.mark.parametrize(("stage", "failed"), [(3, 4), (5, 6), (7, 8), pytest.param(9, 10, marks=pytest.mark.slow)])
 async def test_a_device_lost_during_its_update(client, app, gadget, passing, forward, stage, failed) -> None:
     await client.ask(10001)
     await passing(lambda: app.connected)

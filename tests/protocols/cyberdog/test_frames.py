@@ -108,6 +108,7 @@ def in_pairs(count: int) -> list[tuple[str, str]]:
     return [(kind, str(number)) for number in range(count) for kind in ("begin", "end")]
 
 
+@pytest.mark.slow  # in short: test_each_kind_keeps_its_order
 async def test_every_block_of_quick_program_arrives_in_order(phone: Phone) -> None:
     phone.app.slowness = 0.002
     await phone.start("t", "for n in range(40): cyberdog.task.block(str(n))")

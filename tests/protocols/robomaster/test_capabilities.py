@@ -60,7 +60,19 @@ def commands() -> Iterator[tuple[str, str]]:
             yield key, " ".join(filter(None, (name, WORDS.get(key, ""), mark.strip())))
 
 
-@pytest.mark.parametrize("body", [pytest.param(b, marks=pytest.mark.world("office", body=b)) for b in BODIES])
+@pytest.mark.parametrize(
+    "body",
+    [
+        pytest.param(
+            b,
+            marks=[
+                pytest.mark.world("office", body=b),
+                *([] if b in ("hermes", "robomaster_ep") else [pytest.mark.slow]),
+            ],
+        )
+        for b in BODIES
+    ],
+)
 async def test_every_command_answers_as_the_page_says(body: str, robot: Robot) -> None:
     kind = RobotKind(body, frozenset(robot.interfaces), {})
     context = Context(robot, PROFILES["spec"], Outlets(robot))  # type: ignore[arg-type]

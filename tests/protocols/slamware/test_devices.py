@@ -291,7 +291,7 @@ async def test_stops_and_limits_during_a_restart_hold(
         robot[Driving].move_by(Pose(0.5))
 
 
-@pytest.mark.parametrize("ends", ["reboot", "power off"])
+@pytest.mark.parametrize("ends", ["reboot", pytest.param("power off", marks=pytest.mark.slow)])
 async def test_a_stop_during_a_start_holds(robot: Robot, forward: Forward, ends: str) -> None:
     robot[Firmware].reboot() if ends == "reboot" else robot[Power].shut_down(restart_after=3.0)
     await forward(seconds=2)

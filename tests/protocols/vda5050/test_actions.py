@@ -66,6 +66,7 @@ async def test_a_load_is_picked_reported_and_dropped(yard: Opened) -> None:
     assert one.control.errors.count("ACTION_FAILED") == 1
 
 
+@pytest.mark.slow  # in short: test_a_load_is_picked_reported_and_dropped
 async def test_load_set_down_by_others_is_forgotten(yard: Opened) -> None:
     one = await yard(**robot_at(7.5, 6.0))
     one.control.send("order", here(action("pick", "p", loadId="L1")))
@@ -211,6 +212,7 @@ async def test_hibernation_is_silent_until_it_ends(yard: Opened) -> None:
     assert one.robot[Power].mode is PowerMode.AWAKE
 
 
+@pytest.mark.slow  # in short: test_hibernation_is_silent_until_it_ends
 async def test_wakes_up_by_itself_at_the_set_time(yard: Opened) -> None:
     one = await yard()
     control = one.control

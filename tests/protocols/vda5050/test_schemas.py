@@ -40,7 +40,9 @@ def complaints(version: str, name: str, message: dict[str, Any]) -> list[str]:
     return [f"{error.json_path}: {error.message}" for error in ours[name].iter_errors(message)]
 
 
-@pytest.mark.parametrize(("version", "number"), [("2.1", "2.1.0"), ("3.0", "3.0.0")])
+@pytest.mark.parametrize(
+    ("version", "number"), [pytest.param("2.1", "2.1.0", marks=pytest.mark.slow), ("3.0", "3.0.0")]
+)
 async def test_all_that_a_robot_says_fits_the_schemas(yard: Opened, version: str, number: str) -> None:
     one = await yard(version)
     made = order("one", [(0, 0), (0.6, 0), (1.2, 0)], released=2, version=number)

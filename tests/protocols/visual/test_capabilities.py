@@ -68,7 +68,19 @@ async def ask(caller: Caller, name: str) -> Answer:
     return Answer(str(result), failed=found is not None and found.fields["code"] != StateCode.SUCCESS)
 
 
-@pytest.mark.parametrize("body", [pytest.param(b, marks=pytest.mark.world("office", body=b)) for b in BODIES])
+@pytest.mark.parametrize(
+    "body",
+    [
+        pytest.param(
+            b,
+            marks=[
+                pytest.mark.world("office", body=b),
+                *([] if b in ("hermes", "robomaster_ep") else [pytest.mark.slow]),
+            ],
+        )
+        for b in BODIES
+    ],
+)
 async def test_functions_are_refused_as_the_page_says(body: str, robot: Robot, clock: LockstepClock) -> None:
     kind = RobotKind(body, frozenset(robot.interfaces), {})
     caller, wrong = Caller(robot, clock), {}

@@ -179,7 +179,7 @@ async def test_polling_program_ends_in_lockstep(app: FrontEnd) -> None:
     assert await app.printed("t") == ["999"]  # and one before the loop
 
 
-@pytest.mark.parametrize("module", Module)
+@pytest.mark.parametrize("module", [Module.BASE, pytest.param(Module.SOFTWARE, marks=pytest.mark.slow)])
 async def test_stop_during_a_restart_ends_the_program(
     connect: Connect, robot: Robot, world: World, module: Module
 ) -> None:

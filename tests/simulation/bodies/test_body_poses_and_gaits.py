@@ -94,7 +94,9 @@ async def test_holds_its_pose_while_walking_but_not_lying(dog):
     assert isinstance(refused.error, Refused)
 
 
-@pytest.mark.parametrize("gait", Gait)
+@pytest.mark.parametrize(
+    "gait", [pytest.param(one, marks=[pytest.mark.slow] if n % 3 else []) for n, one in enumerate(Gait)]
+)
 async def test_a_gait_cuts_velocities_axis_by_axis(dog, gait):
     spec, base = GAITS[gait], dog.robot[Base]
     dog.robot[Legs].walk(gait)

@@ -33,6 +33,12 @@ def dog(simulate):
     return sim
 
 
+WAYS = [  # to restart
+    lambda robot: robot[Firmware].reboot(),
+    pytest.param(lambda robot: robot[Power].shut_down(restart_after=1), marks=pytest.mark.slow),
+]
+
+
 def package(**changes):
     values = {"version": "2.0", "size": 200_000_000, "digest": DIGEST, "modules": {"motors.MCU_Motor": "2.0"}}
     return FirmwarePackage(**{**values, "url": "http://x/p", **changes})
@@ -242,7 +248,7 @@ async def test_a_download_outlives_a_restart(dog):
     assert (firmware.progress.state, firmware.version) == (FirmwareState.IDLE, "2.0")
 
 
-@pytest.mark.parametrize("way", [lambda robot: robot[Firmware].reboot(), lambda r: r[Power].shut_down(restart_after=1)])
+@pytest.mark.parametrize("way", WAYS)
 async def test_a_restart_ends_what_clients_switched(simulate, way):
     """A restart of the robot leaves what a start of this program does."""
     sim = simulate(start=Pose(5, 5), body="universal")
@@ -270,7 +276,7 @@ def switches(robot):
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("way", [lambda robot: robot[Firmware].reboot(), lambda r: r[Power].shut_down(restart_after=1)])
+@pytest.mark.parametrize("way", WAYS)
 async def test_every_restart_ends_awake_and_lying(dog, way):
     robot = dog.robot
     robot[Legs].go_limp()

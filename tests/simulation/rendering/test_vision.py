@@ -125,7 +125,9 @@ async def test_a_face_must_look_here_and_be_near():
         assert len(await hall.see("people")) == 1
 
 
-@pytest.mark.parametrize("gesture", Gesture)
+@pytest.mark.parametrize(
+    "gesture", [pytest.param(one, marks=[pytest.mark.slow] if n % 4 else []) for n, one in enumerate(Gesture)]
+)
 async def test_every_gesture_is_reported_after_a_moment(gesture):
     with lab(people=[ANNA]) as room:
         room.world.stage.person("anna").gesture(gesture, seconds=2.0)

@@ -122,6 +122,7 @@ async def test_a_broken_transfer_loses_nothing(client, robot, folder, monkeypatc
     assert len(chunk.buffer) == chunk.file_size
 
 
+@pytest.mark.slow  # in short: test_a_broken_transfer_loses_nothing
 async def test_file_swallowed_after_the_last_byte_is_kept(
     client, app, door, pems, messages, folder, passing, monkeypatch
 ) -> None:

@@ -128,7 +128,9 @@ async def test_a_goal_that_is_nowhere(client, robot, forward, passing: Passing) 
 
 
 @pytest.mark.world("tests/autonomy/worlds/closed_room.toml")
-@pytest.mark.parametrize("x", [6.0, 8.0], ids=["in the wall", "in a closed room"])
+@pytest.mark.parametrize(
+    "x", [pytest.param(6.0, id="in the wall"), pytest.param(8.0, id="in a closed room", marks=pytest.mark.slow)]
+)
 async def test_goal_that_no_way_leads_to_is_306(client, clock, world, forward, passing: Passing, x: float) -> None:
     await forward(seconds=1)
     await localized(client, passing)

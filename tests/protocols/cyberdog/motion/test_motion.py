@@ -195,6 +195,7 @@ async def test_a_motion_follows_own_servo_at_once(client, robot, world, forward,
     assert robot[Base].velocity.speed < 0.01
 
 
+@pytest.mark.slow  # in short: test_one_motion_at_a_time
 async def test_frames_that_come_during_a_motion_are_refused(client, app, robot, world, forward, passing) -> None:
     await client.ask(1002, WALK)
     lying = asyncio.ensure_future(client.ask(1004, {"motion_id": 101}))
@@ -229,7 +230,13 @@ async def test_only_standing_leads_out_of_emergency_stop(client, robot, world, f
     assert robot[Legs].posture is Posture.STANDING
 
 
-@pytest.mark.parametrize("motion", [{"motion_id": 111}, {"motion_id": 308, "vel_des": [0.5, 0, 0], "duration": 900}])
+@pytest.mark.parametrize(
+    "motion",
+    [
+        {"motion_id": 111},
+        pytest.param({"motion_id": 308, "vel_des": [0.5, 0, 0], "duration": 900}, marks=pytest.mark.slow),
+    ],
+)
 async def test_emergency_stop_ends_a_motion_that_waits(client, robot, world, forward, motion) -> None:
     for _ in range(5):
         await client.ask(1002, WALK)

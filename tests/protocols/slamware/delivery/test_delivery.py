@@ -133,6 +133,7 @@ async def test_cancel_brakes_and_finish_ends_as_succeeded(screen: Screen) -> Non
     assert (await screen.task(three))["status"] == "CANCELED"
 
 
+@pytest.mark.slow  # in short: test_takeout_from_door_of_box_to_way_home
 async def test_stops_on_the_way_wait_for_the_operation(screen: Screen) -> None:
     await screen.prepare(A01=(1.0, 0.0, "ROOM"), A02=(1.0, 1.5, "ROOM"), end=(2.5, 1.5, "TABLE"))
     await screen.wait_for_pickups(seconds=40)

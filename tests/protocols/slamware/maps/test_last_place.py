@@ -116,6 +116,7 @@ async def test_robot_in_the_car_is_on_its_floor() -> None:
     database.close()
 
 
+@pytest.mark.slow  # in short: test_robot_off_its_dock_is_before_it
 async def test_robot_on_its_dock_is_on_start_floor(stored: Database) -> None:
     async with running(stored, None) as run:
         assert await run.floor() == "ground"

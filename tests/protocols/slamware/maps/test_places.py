@@ -45,6 +45,7 @@ async def test_a_lost_robot_is_placed_by_name(robot: Robot, client: httpx.AsyncC
     assert (await client.put(dock, json={"dock_id": "unknown"})).status_code == 404
 
 
+@pytest.mark.slow  # in short: test_places_are_ordered_by_ways_that_lead_there
 @pytest.mark.world("empty")
 async def test_places_are_ordered_by_the_ways_between_them(client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)

@@ -194,7 +194,7 @@ async def test_parking_at_the_nearest_place_of_that_type(
 
 
 @pytest.mark.world("office")
-@pytest.mark.parametrize("move", ["NoMove", "RotateOnly"])
+@pytest.mark.parametrize("move", ["NoMove", pytest.param("RotateOnly", marks=pytest.mark.slow)])
 async def test_a_carried_robot_finds_itself(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, move: str
 ) -> None:

@@ -23,6 +23,7 @@ def crossing(seed: int) -> list[tuple[float, float]]:
     return [places[0], places[1], places[1], places[2], places[0], places[3], places[0]]
 
 
+@pytest.mark.slow  # in short: test_through_several_points
 @pytest.mark.parametrize(
     ("name", "spots"),
     [

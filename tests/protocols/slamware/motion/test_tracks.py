@@ -106,6 +106,7 @@ async def test_searching_through_the_door(robot: Robot, client: httpx.AsyncClien
     assert (await client.post(SEARCH, json={**back, "floor": "9F"})).status_code == 400
 
 
+@pytest.mark.slow  # in short: test_tracks_give_the_shorter_or_only_directed_way
 @pytest.mark.world("empty")
 async def test_moving_along_the_tracks_direction_only(
     robot: Robot, client: httpx.AsyncClient, forward: Forward
