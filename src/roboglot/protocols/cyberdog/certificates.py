@@ -9,6 +9,7 @@ import logging
 import ssl
 from collections.abc import Collection, Sequence
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 
 from roboglot.protocols.cyberdog.pem_files import CA_CERT, SERVER_CERT, SERVER_KEY, write
@@ -49,7 +50,7 @@ def ensure_certificates(folder: Path) -> Certificates:
         make(tls)
     try:
         ca, certificate, key = ((tls / name).read_bytes() for name in (CA_CERT, SERVER_CERT, SERVER_KEY))
-        expires = _proven(tls) or _checked(ca, certificate, key)
+        expires = _expiry(tls, ca, certificate, key)
     except (OSError, ValueError) as error:
         raise BadCertificates(f"the certificates in {tls} are broken ({error}); remove it to have new ones") from error
     if expires < datetime.now(UTC):
@@ -131,6 +132,12 @@ def ensure_site(folder: Path, names: Collection[str]) -> tuple[Path, Path]:
     write(pair[1], key, private=True)
     write(pair[0], certificate)
     return pair
+
+
+@lru_cache(maxsize=8)  # a fleet's robots have the same ones, and a handshake takes 5 ms
+def _expiry(tls: Path, ca: bytes, certificate: bytes, key: bytes) -> datetime:
+    """Return the end of the time of certificates in ``tls``. Raises ValueError or OSError."""
+    return _proven(tls) or _checked(ca, certificate, key)
 
 
 def _proven(tls: Path) -> datetime | None:
