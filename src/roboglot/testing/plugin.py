@@ -42,6 +42,7 @@ MARKERS = (
     "recording(file): the robots of robot_server answer as in that recording",
 )
 OPTION = "--roboglot-failures"
+_COMPILED = pytest.StashKey[bool]()
 _SERVER = pytest.StashKey["RobotServer"]()
 _SHARED = pytest.StashKey[dict["Wanted", "RobotServer"]]()
 
@@ -109,7 +110,8 @@ def _compile_kernels(config: pytest.Config) -> None:
     """Compile missing kernels at the first start after an installation, with a line for each."""
     from roboglot.kernels.ahead import compile_ahead, missing
 
-    if not missing():
+    if config.stash.get(_COMPILED, False) or not missing():
+        config.stash[_COMPILED] = True  # a look takes 1 ms, and each test would take one
         return
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     capture = config.pluginmanager.get_plugin("capturemanager")
