@@ -18,7 +18,9 @@ from roboglot.model.tap import Direction, Exchange
 from roboglot.protocols import sections
 from roboglot.recording.comparing.behaviour import compare_behaviour
 from roboglot.recording.comparing.masks import ComparisonMode, Mask, Rule
+from roboglot.recording.lines import Target
 from roboglot.recording.probing import questions
+from roboglot.recording.proxy.relay import ExchangeWriter
 from roboglot.runtime import Runtime
 from tests.recording.test_playback import ADDRESS, SECOND
 
@@ -140,3 +142,14 @@ async def test_robots_are_compared_by_their_urls(tmp_path: Path) -> None:
         assert 0.5 < other.fidelity < 1.0
     finally:
         await runtime.close()
+
+
+def test_recordings_of_commands_alone_are_not_compared(tmp_path: Path) -> None:
+    file = tmp_path / "drive.mcap"
+    writer = ExchangeWriter(file, Target("slamware://127.0.0.1"), "0")
+    drive = "POST /api/core/motion/v1/actions"
+    writer.note("127.0.0.1:5", Direction.REQUEST, drive, f"{drive}\n\n{{}}".encode(), "", None)
+    writer.note("127.0.0.1:5", Direction.REPLY, drive, b"{}", "200", None)
+    writer.close()
+    found = CliRunner().invoke(loaded("compare"), [str(file), "slamware://127.0.193.99:9"])
+    assert (found.exit_code, "--commands" in found.output) == (2, True)

@@ -177,3 +177,15 @@ def test_differences_are_shown_in_one_line() -> None:
     (row,) = compare([session()[0]], [], Mask()).rows
     assert row.differences
     assert not any("\n" in part for found in row.differences for part in (found.one, found.other))
+
+
+@pytest.mark.parametrize("row", [[], [Row("slamware", "GET /x")]])
+def test_comparing_nothing_does_not_pass(row: list[Row]) -> None:
+    nothing = Comparison(row)
+    assert not nothing.passes(0.0)
+    assert "100 %" not in reports.table(nothing).splitlines()[-1]
+    assert "Nothing was compared" in reports.page(nothing, ("one", "other"))
+
+
+def test_equal_sessions_pass() -> None:
+    assert compare(session(), session()).passes(100.0)

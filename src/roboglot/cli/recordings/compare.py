@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -46,7 +46,10 @@ def command(
     html: Annotated[Path | None, typer.Option(help="Write an HTML report to this file.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write a JUnit report to this file.")] = None,
     at_least: Annotated[
-        float, typer.Option(min=0, max=100, callback=finite, help="Exit with 1 if fewer percent agree.")
+        float,
+        typer.Option(
+            min=0, max=100, callback=finite, help="Exit with 1 if fewer percent agree, or nothing was compared."
+        ),
     ] = 100.0,
 ) -> None:
     """Compare two recordings or robots. A robot gets the recording's requests, or all that change nothing."""
@@ -65,7 +68,7 @@ def command(
         print(f"roboglot compare: {in_words(error)}", file=sys.stderr)
         raise typer.Exit(2) from None
     print(reports.table(comparison))
-    sys.exit(comparison.fidelity * 100 < at_least)
+    sys.exit(not comparison.passes(at_least))
 
 
 async def compared(
@@ -95,7 +98,7 @@ async def _sessions(
     from roboglot.cli.recordings.read_only import askable, reads
     from roboglot.model.clock import RealClock
     from roboglot.recording.lines import Target
-    from roboglot.recording.probing import asked_again, probe, reads_only
+    from roboglot.recording.probing import asked_again, probe
     from roboglot.recording.reader import read_recording
     from roboglot.recording.replaying import sendable
 
@@ -109,7 +112,7 @@ async def _sessions(
     if targets:
         recorded = {name: sendable(session)[0] for name, session in recorded.items()}
     if targets and not commands:
-        recorded = {name: reads_only(session, reads(door)) for name, session in recorded.items()}
+        recorded = {name: _reads_only(name, session, reads(door)) for name, session in recorded.items()}
     clock = RealClock()
 
     async def session(name: str) -> Sequence[Exchange]:
@@ -120,3 +123,13 @@ async def _sessions(
         return await probe(targets[name], askable(door), clock)
 
     return [await session(name) for name in names]
+
+
+def _reads_only(name: str, session: Sequence[Exchange], reads: Collection[str]) -> Sequence[Exchange]:
+    """Return the read-only part of a recording. Raises ValueError if only the rest has requests."""
+    from roboglot.recording.probing import reads_only
+
+    kept = reads_only(session, reads)
+    if session and not kept:
+        raise ValueError(f"{name} has only requests that move or change the robot; --commands sends them, too")
+    return kept

@@ -28,7 +28,10 @@ def command(
     html: Annotated[Path | None, typer.Option(help="Write an HTML report to this file.")] = None,
     junit: Annotated[Path | None, typer.Option(help="Write a JUnit report to this file.")] = None,
     at_least: Annotated[
-        float, typer.Option(min=0, max=100, callback=finite, help="Exit with 1 if fewer percent agree.")
+        float,
+        typer.Option(
+            min=0, max=100, callback=finite, help="Exit with 1 if fewer percent agree, or nothing was compared."
+        ),
     ] = 100.0,
 ) -> None:
     """Send the requests of a recording to a robot, in order and on time. It obeys them: mind where it stands."""
@@ -62,4 +65,4 @@ def command(
     except OSError as error:
         sys.exit(f"roboglot replay: {in_words(error)}")
     print(reports.table(comparison))
-    sys.exit(comparison.fidelity * 100 < at_least)
+    sys.exit(not comparison.passes(at_least))

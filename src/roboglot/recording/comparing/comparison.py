@@ -95,6 +95,15 @@ class Comparison:
         return min(self.messages, self.driven)
 
     @property
+    def empty(self) -> bool:
+        """True if nothing was compared."""
+        return not any(row.checks for row in (*self.rows, *self.drive))
+
+    def passes(self, least: float) -> bool:
+        """Return whether anything was compared, and at least ``least`` percent of it agree."""
+        return not self.empty and self.fidelity * 100 >= least
+
+    @property
     def differs(self) -> bool:
         """True if any comparison does not agree."""
         return any(row.agreed < row.checks for row in (*self.rows, *self.drive))

@@ -30,8 +30,13 @@ def table(comparison: Comparison) -> str:
         lines += [in_line(f"{'':24}{d.what}: {d.one} | {d.other}") for d in row.differences[:5]]
     lines += [f"{in_line(door)}: {percent(comparison.of(door).fidelity)}" for door in comparison.doors]
     lines += [in_line(line) for line in _drive_lines(comparison)]
-    lines.append(f"fidelity: {percent(comparison.fidelity)}")
+    lines.append(f"fidelity: {_total(comparison) or 'unknown, as nothing was compared'}")
     return "\n".join(lines)
+
+
+def _total(comparison: Comparison) -> str:
+    """Return how much agrees; empty if nothing was compared."""
+    return "" if comparison.empty else percent(comparison.fidelity)
 
 
 def _drive_lines(comparison: Comparison) -> list[str]:
@@ -50,10 +55,11 @@ def _drive_lines(comparison: Comparison) -> list[str]:
 
 def page(comparison: Comparison, names: tuple[str, str]) -> str:
     """Return a self-contained HTML page."""
+    total = _total(comparison)
     parts = [
         '<!doctype html><html lang="en"><meta charset=utf-8><title>roboglot compare</title>',
         '<meta name="viewport" content="width=device-width">',
-        f"<style>{STYLE}</style><h1>{percent(comparison.fidelity)} agree</h1>",
+        f"<style>{STYLE}</style><h1>{f'{total} agree' if total else 'Nothing was compared'}</h1>",
         f"<p>{escape(names[0])} and {escape(names[1])}</p>",
     ]
     for door in comparison.doors:
