@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 from roboglot.clients.slamware import SlamwareClient
 from roboglot.model.robot import Robot
+from roboglot.protocols.cyberdog.certificates import export_client
+from roboglot.protocols.cyberdog.config import CyberDogConfig
+from roboglot.protocols.cyberdog.server import CyberDogDoor
 from roboglot.protocols.robomaster.config import RoboMasterConfig
 from roboglot.protocols.robomaster.server import RoboMasterDoor
+from roboglot.protocols.slamware.config import SlamwareConfig
+from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.testing import Forward
 from roboglot.testing.addresses import free_addresses, free_port
 
@@ -66,6 +73,31 @@ def ep_config() -> RoboMasterConfig:
         push_port=free_port(),
         broadcast_port=free_port(),
     )
+
+
+@asynccontextmanager
+async def served(vendor: str, robot: Robot, folder: Path) -> AsyncIterator[str]:
+    """Put a vendor's door in front of a robot; yield the door's URL, as the command line takes it."""
+    door: SlamwareDoor | RoboMasterDoor | CyberDogDoor
+    match vendor:
+        case "slamware":
+            door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
+        case "robomaster":
+            door = RoboMasterDoor(robot, EP_ADDRESS, ep_config())
+        case _:
+            door = CyberDogDoor(robot, "127.0.0.1", CyberDogConfig(port=0, app_port=free_port()), folder / "back")
+            export_client(folder / "back" / "cyberdog", folder / "driver")
+    await door.start()
+    try:
+        match door:
+            case RoboMasterDoor():
+                yield url_of(door)
+            case SlamwareDoor():
+                yield f"slamware://127.0.0.1:{door.port}"
+            case _:
+                yield f"cyberdog://127.0.0.1:{door.port}?certs={folder / 'driver'}&app={door._config.app_port}"
+    finally:
+        await door.close()
 
 
 def url_of(door: RoboMasterDoor) -> str:

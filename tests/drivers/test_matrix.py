@@ -11,16 +11,10 @@ from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.system.link import Link, LinkState
 from roboglot.model.geometry import Pose
 from roboglot.model.robot import Robot
-from roboglot.protocols.cyberdog.certificates import export_client
-from roboglot.protocols.cyberdog.config import CyberDogConfig
-from roboglot.protocols.cyberdog.server import CyberDogDoor
-from roboglot.protocols.robomaster.server import RoboMasterDoor
-from roboglot.protocols.slamware.config import SlamwareConfig
-from roboglot.protocols.slamware.server import SlamwareDoor
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 from roboglot.testing.addresses import free_port
-from tests.drivers.clients import EP_ADDRESS, Drive, ep_config, url_of
+from tests.drivers.clients import Drive, served
 from tests.drivers.fronts import Front, front
 from tests.drivers.rig import time_passes
 
@@ -56,22 +50,8 @@ async def agree(client: Front, reported_start: Pose, real: Pose) -> None:
 @pytest.fixture
 async def url(back: str, robot: Robot, tmp_path: Path) -> AsyncIterator[str]:
     """The simulated robot behind the vendor's door."""
-    door: SlamwareDoor | RoboMasterDoor | CyberDogDoor
-    if back == "slamware":
-        door = SlamwareDoor(robot, "127.0.0.1", SlamwareConfig(port=0))
-    elif back == "robomaster":
-        door = RoboMasterDoor(robot, EP_ADDRESS, ep_config())
-    else:
-        door = CyberDogDoor(robot, "127.0.0.1", CyberDogConfig(port=0, app_port=free_port()), tmp_path / "back")
-        export_client(tmp_path / "back" / "cyberdog", tmp_path / "driver")
-    await door.start()
-    if isinstance(door, RoboMasterDoor):
-        yield url_of(door)
-    elif isinstance(door, SlamwareDoor):
-        yield f"slamware://127.0.0.1:{door.port}"
-    else:
-        yield f"cyberdog://127.0.0.1:{door.port}?certs={tmp_path / 'driver'}&app={door._config.app_port}"
-    await door.close()
+    async with served(back, robot, tmp_path) as at:
+        yield at
 
 
 @pytest.fixture

@@ -35,8 +35,9 @@ APPROXIMATIONS: dict[type[Component], str] = {
     Base: "",
     Driving: "",  # autonomy's, over the wheels and odometry
     Odometry: "",
-    Imu: "angles are the robot's; rates are worked out from them, and of accelerations only gravity is known",
-    MotionStatus: "",
+    Imu: "only where the robot has one; angles are the robot's; rates are worked out from them, and of accelerations "
+    "only gravity is known",
+    MotionStatus: "only where the robot has one",
     Battery: "the charge alone: no volts, and not whether it is charged",
     Gimbal: "only where the robot has one, as all that follows; changes by other clients are not visible",
     Arm: "its reach and where it begins are those of an EP as it is delivered; asked ten times a second",

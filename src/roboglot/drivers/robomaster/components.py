@@ -9,6 +9,7 @@ from roboglot.drivers.robomaster.chapters.arm import RoboMasterArm
 from roboglot.drivers.robomaster.chapters.armor import RoboMasterArmor
 from roboglot.drivers.robomaster.chapters.blaster import RoboMasterBlaster
 from roboglot.drivers.robomaster.chapters.camera import RoboMasterCamera, RoboMasterVideo, video_feed
+from roboglot.drivers.robomaster.chapters.chassis import RoboMasterImu, RoboMasterMotionStatus
 from roboglot.drivers.robomaster.chapters.game import RoboMasterInput
 from roboglot.drivers.robomaster.chapters.gimbal import RoboMasterGimbal
 from roboglot.drivers.robomaster.chapters.gripper import RoboMasterGripper
@@ -24,7 +25,7 @@ from roboglot.drivers.robomaster.chapters.sound import (
     audio_feed,
 )
 from roboglot.drivers.robomaster.state import ReportedState
-from roboglot.drivers.robomaster.telemetry import Refresh
+from roboglot.drivers.robomaster.telemetry import PushedParts, Refresh
 from roboglot.drivers.supervisor import Supervisor
 from roboglot.media.audio import AudioStream
 from roboglot.media.recorder import Recorder
@@ -36,10 +37,12 @@ from roboglot.model.components.interaction.light import Light
 from roboglot.model.components.motion.arm import Arm
 from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.motion.gripper import Gripper
+from roboglot.model.components.motion.motion_status import MotionStatus
 from roboglot.model.components.motion.servo import Servos
 from roboglot.model.components.sensing.adapter import SensorAdapters
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.sensing.hearing import Hearing
+from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.microphone import Microphone
 from roboglot.model.components.sensing.range_sensor import RangeSensors
 from roboglot.model.components.sensing.vision import Vision
@@ -53,6 +56,8 @@ class OptionalComponents:
     def __init__(self, robot: Robot, client: RoboMasterClient, supervisor: Supervisor, reported: ReportedState) -> None:
         clock = robot.clock
         self._robot, self._supervisor = robot, supervisor
+        self._imu = RoboMasterImu(client, reported)
+        self._status = RoboMasterMotionStatus(client, reported)
         self._gimbal = RoboMasterGimbal(robot, client, supervisor, reported)
         self._arm = RoboMasterArm(robot, client, supervisor)
         self._gripper = RoboMasterGripper(robot, client, supervisor)
@@ -75,10 +80,12 @@ class OptionalComponents:
         self._recorder = Recorder(self._video, clock)
         self.refreshed: list[Refresh] = []
 
-    async def probe(self) -> bool:
-        """Probe every component; return True if there is a gimbal. Raises ClientError if the robot is gone."""
+    async def probe(self) -> PushedParts:
+        """Probe every component; return those that are pushed. Raises ClientError if the robot is gone."""
         robot = self._robot
         self.refreshed.clear()
+        attitude = await add_if_present(robot, Imu, self._imu, self._imu.probe())
+        status = await add_if_present(robot, MotionStatus, self._status, self._status.probe())
         gimbal = await add_if_present(robot, Gimbal, self._gimbal, self._gimbal.probe())
         if await add_if_present(robot, Arm, self._arm, self._arm.refresh()):
             self.refreshed.append(self._arm.refresh)
@@ -105,4 +112,4 @@ class OptionalComponents:
         if self._supervisor.touches and await add_if_present(robot, Camera, self._camera, self._camera.probe()):
             await add_if_present(robot, VideoStream, self._video)
             await add_if_present(robot, Recorder, self._recorder)
-        return gimbal
+        return PushedParts(attitude, status, gimbal)

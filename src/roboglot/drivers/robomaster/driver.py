@@ -13,8 +13,8 @@ from roboglot.clients.errors import LinkLost, RefusedByRobot
 from roboglot.clients.robomaster.client import Ports, RoboMasterClient
 from roboglot.clients.robomaster.datagrams import PushPort, discover
 from roboglot.drivers.driver import Driver
-from roboglot.drivers.reported import ReportedBattery, ReportedImu, ReportedOdometry
-from roboglot.drivers.robomaster.chapters.chassis import RoboMasterBase, RoboMasterMotionStatus
+from roboglot.drivers.reported import ReportedBattery, ReportedOdometry
+from roboglot.drivers.robomaster.chapters.chassis import RoboMasterBase
 from roboglot.drivers.robomaster.components import OptionalComponents
 from roboglot.drivers.robomaster.state import ReportedState
 from roboglot.drivers.robomaster.telemetry import TelemetryListener
@@ -23,8 +23,6 @@ from roboglot.drivers.robomaster.watchdog import Watchdog
 from roboglot.model.clock import RealClock
 from roboglot.model.components.energy.battery import Battery
 from roboglot.model.components.motion.base import Base
-from roboglot.model.components.motion.motion_status import MotionStatus
-from roboglot.model.components.sensing.imu import Imu
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.robot import Robot
 from roboglot.values import dataclass
@@ -73,8 +71,6 @@ class RoboMasterDriver(Driver):
         self._base = RoboMasterBase(self._client, robot.clock, self.link, reported, bounded=endpoint.bounded)
         robot.add(Base, self._base)
         robot.add(Odometry, ReportedOdometry(lambda: reported.odometry, "robomaster"))
-        robot.add(Imu, ReportedImu(lambda: reported.imu))
-        robot.add(MotionStatus, RoboMasterMotionStatus(reported))
         robot.add(Battery, ReportedBattery(lambda: reported.battery))
 
     def _new_client(self) -> RoboMasterClient:
@@ -102,7 +98,7 @@ class RoboMasterDriver(Driver):
         if isinstance(self.robot.clock, RealClock):
             self._unwatch = self._watchdog.watch(self._client.descriptor, lambda: bool(self.robot.actions.running()))
         await self._client.learn_build()  # sets the units that it uses
-        self._telemetry.has_gimbal = await self._optional.probe()
+        self._telemetry.parts = await self._optional.probe()
         await self._telemetry.begin()
         version = await self._version()
         self.robot.description = replace(

@@ -26,6 +26,7 @@ from roboglot.model.events import ArmorHit, BatteryChanged
 from roboglot.model.geometry import ORIGIN, Orientation, Pose, Vector3, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState, ImuReading, OdometryReading
+from roboglot.values import dataclass
 from roboglot.wire.robomaster import telemetry
 from roboglot.wire.robomaster.telemetry import Telemetry
 
@@ -39,8 +40,17 @@ SILENCE_MAX = 0.4  # s without any push until the link counts as lost
 GRAVITY = 9.81  # m/s2
 
 
+@dataclass(frozen=True, slots=True)
+class PushedParts:
+    """Optional pushes that the robot sends: our door in front of another robot may lack some."""
+
+    attitude: bool = True
+    status: bool = True
+    gimbal: bool = True
+
+
 class TelemetryListener:
-    """Telemetry of one robot."""
+    """Telemetry of one robot. ``parts``: what it pushes besides its position."""
 
     def __init__(
         self,
@@ -60,20 +70,23 @@ class TelemetryListener:
         self._forget: Callable[[], None] = lambda: None
         self._yaw = 0.0  # yaw of the position minus that of the attitude
         self._pushed = False  # whether this connection has received any push
-        self.has_gimbal = True
+        self.parts = PushedParts()
 
     async def begin(self) -> None:
         """Subscribe to pushes and poll everything once. Raises ClientError."""
-        client = self._client
+        client, parts = self._client, self.parts
         self._forget()
         self._forget = client.listen(self._on_push)
         self._pushed = False
         await self._ask_battery()
-        self._on_attitude(await client.chassis.get_attitude())
+        if parts.attitude:
+            self._on_attitude(await client.chassis.get_attitude())
         self._moved(await self._ask_heading())
         await self._ask_speed()
-        await client.chassis.push(position=True, attitude=True, status=True, freq=PUSH_RATE)
-        if self.has_gimbal:
+        await client.chassis.push(
+            position=True, attitude=parts.attitude or None, status=parts.status or None, freq=PUSH_RATE
+        )
+        if parts.gimbal:
             await client.gimbal.push(True, PUSH_RATE)
 
     async def run(self) -> None:
@@ -89,7 +102,8 @@ class TelemetryListener:
                 for refresh in self._refreshed:
                     with contextlib.suppress(RefusedByRobot):  # the sensor is unplugged: its last reading ages
                         await refresh()
-            if count % HEADING_EVERY == 0 and abs(self._reported.twist.yaw) < STEADY:
+            steady = count % HEADING_EVERY == 0 and abs(self._reported.twist.yaw) < STEADY
+            if steady or not self.parts.attitude:
                 await self._ask_heading()
             if count % BATTERY_EVERY == 0:
                 await self._ask_battery()
@@ -118,7 +132,8 @@ class TelemetryListener:
     async def _ask_heading(self) -> Pose:
         """Measure the yaw between position and attitude: they are zeroed at different times and the attitude drifts.
 
-        Odometry uses the frame of the position. Its pushes carry no yaw, so the yaw comes from the attitude.
+        Odometry uses the frame of the position. Its pushes carry no yaw, so the yaw comes from the attitude; from a
+        robot without one it is polled.
         """
         pose = pose_of(await self._client.chassis.get_position())
         self._yaw = wrap_angle(pose.yaw - self._reported.imu.orientation.yaw)

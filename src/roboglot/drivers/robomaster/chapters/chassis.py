@@ -14,6 +14,7 @@ import math
 from roboglot.clients.errors import ClientError
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.linked_base import LinkedBase
+from roboglot.drivers.reported import ReportedImu
 from roboglot.drivers.robomaster.state import ReportedState
 from roboglot.drivers.robomaster.vocabulary import speed_words, wheel_words
 from roboglot.model.clock import Clock
@@ -135,11 +136,27 @@ class RoboMasterBase(LinkedBase):
         )
 
 
+class RoboMasterImu(ReportedImu):
+    """Attitude of the chassis."""
+
+    def __init__(self, client: RoboMasterClient, reported: ReportedState) -> None:
+        super().__init__(lambda: reported.imu)
+        self._client = client
+
+    async def probe(self) -> None:
+        """Ask for the attitude. Raises ClientError."""
+        await self._client.chassis.get_attitude()
+
+
 class RoboMasterMotionStatus(MotionStatus):
     """Flags of ``chassis push status``."""
 
-    def __init__(self, reported: ReportedState) -> None:
-        self._reported = reported
+    def __init__(self, client: RoboMasterClient, reported: ReportedState) -> None:
+        self._client, self._reported = client, reported
+
+    async def probe(self) -> None:
+        """Subscribe to the pushes. Raises ClientError."""
+        await self._client.chassis.push(status=True)
 
     @property
     def flags(self) -> MotionFlags:
