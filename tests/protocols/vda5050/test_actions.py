@@ -20,6 +20,7 @@ from roboglot.model.errors import NotFound
 from roboglot.model.geometry import Twist
 from roboglot.model.tap import Direction
 from roboglot.protocols.vda5050.chapters.sensing import REPORTS, REPORTS_MAX
+from roboglot.protocols.vda5050.context import UNDER_WAY_MAX
 from tests.protocols.held_fairness import held
 from tests.protocols.vda5050.conftest import ADDRESS, Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
@@ -146,6 +147,21 @@ async def test_a_failed_action_waits_to_be_tried_again(yard: Opened) -> None:
     one.control.send("instantActions", instant(action("retry", "late", actionId="p")))
     await one.until(lambda: states(one).get("late", ("", ""))[0] == "FAILED")
     assert "INVALID_INSTANT_ACTION" in one.control.errors
+
+
+async def test_instant_actions_under_way_are_limited(yard: Opened) -> None:
+    """Each state lists those that wait to be tried again; without a limit it grew until all robots stood."""
+    one = await yard()
+    waiting = [action("deleteMap", f"w{number}", mapId="no") | {"retriable": True} for number in range(200)]
+    for few in (waiting[:50], waiting[50:100], waiting[100:150], waiting[150:]):
+        one.control.send("instantActions", instant(*few))
+    refused = "FAILED", f"at most {UNDER_WAY_MAX} instant actions are under way"
+    await one.until(lambda: states(one).get("w199") == refused)
+    assert "INVALID_INSTANT_ACTION" in one.control.errors
+    one.control.send("instantActions", instant(action("stateRequest", "s"), action("skipRetry", "r", actionId="w0")))
+    await one.until(lambda: states(one).get("r", ("", ""))[0] == "FINISHED")
+    assert states(one)["s"][0] == "FINISHED"
+    assert sum(status == "RETRIABLE" for status, _ in states(one).values()) == UNDER_WAY_MAX - 1
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from roboglot.model.components.system.lease import PERSON, Lease
 from roboglot.model.geometry import Twist
 from roboglot.protocols.vda5050 import vocabulary
 from roboglot.protocols.vda5050.server import Vda5050Door
+from roboglot.wire.vda5050.orders import NODES_MAX
 from tests.protocols.vda5050.conftest import Opened, Yard
 from tests.protocols.vda5050.orders import action, instant, order
 
@@ -46,6 +47,15 @@ async def test_an_order_is_driven_node_by_node(yard: Opened) -> None:
     assert set(seen) >= {0, 2, 4}
     for said in one.control.heard["state"]:  # the rest continues the passed part
         assert all(node["sequenceId"] > said["lastNodeSequenceId"] for node in said["nodeStates"])
+
+
+async def test_an_order_of_most_nodes_is_driven(yard: Opened) -> None:
+    """The robot's navigation takes fewer goals at once than an order may have nodes."""
+    one = await yard()
+    one.control.send("order", order("long", [(0.0, 0.0)] * NODES_MAX))
+    await one.until(lambda: one.control.state["orderId"] == "long" and not one.control.state["nodeStates"])
+    assert one.control.state["lastNodeId"] == f"n{NODES_MAX - 1}"
+    assert one.control.errors == []
 
 
 async def test_robot_waits_at_the_decision_point_for_more(yard: Opened) -> None:

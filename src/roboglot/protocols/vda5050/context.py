@@ -28,13 +28,14 @@ from roboglot.protocols.vda5050.order_book import ActionState, ActionStatus, Ord
 from roboglot.protocols.vda5050.order_check import check_order
 from roboglot.protocols.vda5050.performing import Performer
 from roboglot.protocols.vda5050.route import Route
-from roboglot.protocols.vda5050.table import INSTANT, operation_of
+from roboglot.protocols.vda5050.table import INSTANT, PROMPT, operation_of
 from roboglot.protocols.vda5050.vocabulary import DOOR
 from roboglot.wire.vda5050.orders import Edge, InstantActions, Malformed, Node, OrderMessage, read
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
 log = logging.getLogger(__name__)
 SOURCE = DOOR
+UNDER_WAY_MAX = 128  # instant actions, which each state lists; two messages may have so many
 START_REACH = 0.5  # m from an order's first node that count as being there
 
 
@@ -126,7 +127,14 @@ class Context:
                 continue
             state = self.instant[action.action_id] = ActionState(action)
             forget_oldest(self.instant)
-            self.run_beside(self._do_instantly(state))
+            if action.action_type not in PROMPT and self._under_way > UNDER_WAY_MAX:
+                self._fail_instantly(state, f"at most {UNDER_WAY_MAX} instant actions are under way")
+            else:
+                self.run_beside(self._do_instantly(state))
+
+    @property
+    def _under_way(self) -> int:
+        return sum(not state.status.ended for state in self.instant.values())
 
     def run_beside(self, work: Awaitable[None]) -> asyncio.Future[None]:
         """Run ``work`` until it ends or the door closes."""
@@ -149,13 +157,16 @@ class Context:
         name = state.action.action_type
         operation = operation_of(name, self.version.level) if name in INSTANT else None
         if operation is None:
-            state.status, state.result = ActionStatus.FAILED, "no such instant action"
-            why = f"this robot has no instant action {name}"
-            self.errors.report(
-                ErrorKind.INSTANT_ACTION, Level.WARNING, why, {"actionId": state.action.action_id}, order=False
-            )
-            return
-        await self.performer.perform(state, operation, instant=True)
+            self._fail_instantly(state, f"this robot has no instant action {name}")
+        else:
+            await self.performer.perform(state, operation, instant=True)
+
+    def _fail_instantly(self, state: ActionState, why: str) -> None:
+        """Have an instant action fail that cannot begin."""
+        state.status, state.result = ActionStatus.FAILED, why
+        self.errors.report(
+            ErrorKind.INSTANT_ACTION, Level.WARNING, why, {"actionId": state.action.action_id}, order=False
+        )
 
     def speed_ratio(self, edge: Edge | None) -> float:
         """Return the share of the robot's top speed that an edge allows."""

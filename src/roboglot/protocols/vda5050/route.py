@@ -24,6 +24,7 @@ from roboglot.wire.vda5050.versions import ErrorKind, Level
 
 log = logging.getLogger(__name__)
 TOLERANCE = 0.05  # m: tolerance where the order allows no deviation
+LEG_MAX = 100  # nodes; no robot's navigation takes fewer goals at once
 STANDS = ("SOFT", "HARD")  # blocking types of actions that require standstill
 ALONE = ("SINGLE", "HARD")  # blocking types of actions that exclude all others
 
@@ -133,11 +134,11 @@ class Route:
         self._context.touch()
 
     def _next_leg(self) -> Leg | None:
-        """Return the nodes up to the next one with actions, a heading or another speed."""
+        """Return the nodes up to the next one with actions, a heading or another speed, LEG_MAX at most."""
         leg = Leg()
         for edge, node in self._context.book.base:
             speed = self._context.speed_ratio(edge)
-            if leg.nodes and speed != leg.speed:
+            if leg.nodes and (speed != leg.speed or len(leg.nodes) == LEG_MAX):
                 break
             leg.nodes.append(node)
             leg.speed = speed

@@ -57,6 +57,21 @@ INSTANT = frozenset(
         "stopCharging",
     }
 )
+# Instant actions that are done at once; at the limit of those under way they help, so they are taken.
+PROMPT = frozenset(
+    {
+        "startPause",
+        "stopPause",
+        "cancelOrder",
+        "stateRequest",
+        "factsheetRequest",
+        "clearInstantActions",
+        "trigger",
+        "retry",
+        "skipRetry",
+        "stopHibernation",
+    }
+)
 MESSAGES = ("state", "visualization", "connection", "factsheet")
 FIELDS = (
     "order.nodes.nodePosition",
