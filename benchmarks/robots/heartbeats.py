@@ -21,6 +21,7 @@ import tempfile
 import time
 from importlib.util import find_spec
 from pathlib import Path
+from typing import cast
 
 from _claim import Claims
 
@@ -132,7 +133,7 @@ def look_by_ray(claims: Claims, plan: FleetPlan, seconds: float) -> None:
     import ray
 
     from roboglot.shards.actor import Condition
-    from roboglot.shards.cluster import ClusterFleet, joined
+    from roboglot.shards.cluster import Actor, ClusterFleet, joined
 
     said = [ready_of(plan, number) for number in range(len(plan.shards))]
 
@@ -163,7 +164,7 @@ def look_by_ray(claims: Claims, plan: FleetPlan, seconds: float) -> None:
         return share
 
     with joined("local"):
-        actor = ray.remote(Shard).options(max_concurrency=4, num_cpus=0).remote()
+        actor = cast(Actor, ray.remote(Shard).options(max_concurrency=4, num_cpus=0).remote())
         claims.at_most("coordinator of heartbeats, on Ray", asyncio.run(look()) * 100, 10.0, "% of a core")
 
 

@@ -16,10 +16,10 @@ NAMES = "raylet", "gcs_server"
 
 
 class RayProcesses:
-    """Those that run when it is made; none where Ray was started elsewhere."""
+    """Those that run when it is made, not those of an earlier Ray; none where Ray was started elsewhere."""
 
     def __init__(self) -> None:
-        self._pids = {pid: name for pid, name in _children() if name in NAMES}
+        self._pids = {pid: name for pid, name in _children() if name in NAMES and not has_ended(pid)}
 
     def why_lost(self) -> str:
         """Return why Ray no longer works; "" if it works."""
