@@ -201,32 +201,32 @@ async def test_refusals_say_why(served: ServedConsole) -> None:
             assert "start it with `roboglot up`" in await refusal(lost, "robots")
 
 
-@pytest.mark.parametrize(
-    ("tool", "values", "why"),
-    [
-        ("go_to", {}, "x is missing; y is missing"),
-        ("go_to", {"x": True, "y": "1"}, "x must be a number, not true or false; y must be a number, not text"),
-        ("go_to", {"x": 1e9, "y": None}, "x must be at most 10000; y must be a number, not null"),
-        ("drive", {"seconds": 0, "robt": "a"}, "seconds must be above 0; robt is unknown; did you mean 'robot'?"),
-        ("robots", {"x": 1}, "x is unknown"),
-        ("where_am_i", {"robot": 7}, "robot must be text, not a whole number"),
-        ("where_am_i", {"robot": "a/program"}, "robot must match ^[^/]+$"),
-        ("run_program", {"source": ""}, "source must have at least 1 characters"),
-        ("rehearse", {"plan": {}}, "plan must be a list, not an object"),
-        ("rehearse", {"plan": [5]}, "plan[0] must be an object, not a whole number"),
-        ("rehearse", {"plan": [{"x": 1}]}, "plan[0].do is missing"),
-        ("rehearse", {"plan": [{"do": "fly"}]}, "plan[0].do cannot be 'fly'; use go_to or drive"),
-        (
-            "rehearse",
-            {"plan": [{"do": "go_to", "x": 1}, {"do": "drive", "z": 1}]},
-            "plan[0].y is missing; plan[1].z is unknown; there are do, seconds, x, y, yaw",
-        ),
-        ("go_too", {}, "there is no tool 'go_too'; did you mean 'go_to'?"),
-    ],
-)
-async def test_wrong_arguments_are_named_in_words(tool: str, values: dict[str, Any], why: str) -> None:
+WRONG: list[tuple[str, dict[str, Any], str]] = [
+    ("go_to", {}, "x is missing; y is missing"),
+    ("go_to", {"x": True, "y": "1"}, "x must be a number, not true or false; y must be a number, not text"),
+    ("go_to", {"x": 1e9, "y": None}, "x must be at most 10000; y must be a number, not null"),
+    ("drive", {"seconds": 0, "robt": "a"}, "seconds must be above 0; robt is unknown; did you mean 'robot'?"),
+    ("robots", {"x": 1}, "x is unknown"),
+    ("where_am_i", {"robot": 7}, "robot must be text, not a whole number"),
+    ("where_am_i", {"robot": "a/program"}, "robot must match ^[^/]+$"),
+    ("run_program", {"source": ""}, "source must have at least 1 characters"),
+    ("rehearse", {"plan": {}}, "plan must be a list, not an object"),
+    ("rehearse", {"plan": [5]}, "plan[0] must be an object, not a whole number"),
+    ("rehearse", {"plan": [{"x": 1}]}, "plan[0].do is missing"),
+    ("rehearse", {"plan": [{"do": "fly"}]}, "plan[0].do cannot be 'fly'; use go_to or drive"),
+    (
+        "rehearse",
+        {"plan": [{"do": "go_to", "x": 1}, {"do": "drive", "z": 1}]},
+        "plan[0].y is missing; plan[1].z is unknown; there are do, seconds, x, y, yaw",
+    ),
+    ("go_too", {}, "there is no tool 'go_too'; did you mean 'go_to'?"),
+]
+
+
+async def test_wrong_arguments_are_named_in_words() -> None:
     async with tools_of("http://127.0.0.1:1") as client:
-        assert await refusal(client, tool, **values) == why
+        for tool, values, why in WRONG:
+            assert await refusal(client, tool, **values) == why, values
 
 
 async def test_a_flood_of_arguments_has_a_short_refusal() -> None:

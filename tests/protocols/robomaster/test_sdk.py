@@ -38,44 +38,44 @@ async def test_quit_resets_and_leaves(client) -> None:
     assert await client.ask("robot mode ?;") == "chassis_lead;"
 
 
-@pytest.mark.parametrize(
-    ("text", "reply"),
-    [
-        ("robot mode ? seq 7;", "chassis_lead seq 7 ;"),
-        ("chassis stop seq 0x10;", "ok seq 16 ;"),
-        ("chassis speed x 9 seq 3;", "fail seq 3 ;"),
-        ("nonsense seq 3;", PARSE_ERROR.replace(";", " seq 3 ;")),
-        ("robot mode ? seq;", "command format error: no seq value;"),
-        ("robot mode ? seq x;", "command format error: seq parse error;"),
-    ],
-)
-async def test_the_sequence_number_comes_back(client, text: str, reply: str) -> None:
-    assert await client.ask(text) == reply
+NUMBERED = [
+    ("robot mode ? seq 7;", "chassis_lead seq 7 ;"),
+    ("chassis stop seq 0x10;", "ok seq 16 ;"),
+    ("chassis speed x 9 seq 3;", "fail seq 3 ;"),
+    ("nonsense seq 3;", PARSE_ERROR.replace(";", " seq 3 ;")),
+    ("robot mode ? seq;", "command format error: no seq value;"),
+    ("robot mode ? seq x;", "command format error: seq parse error;"),
+]
 
 
-@pytest.mark.parametrize(
-    ("text", "reply"),
-    [
-        ("robot mode free;", "ok;"),
-        ("robot mode chassis_lead;", "ok;"),
-        ("robot mode mode free;", "ok;"),
-        ("robot mode gimbal_lead;", "ok;"),
-        ("robot mode FREE;", "fail;"),
-        ("robot mode 1;", "fail;"),
-        ("robot mode;", PARSE_ERROR),
-        ("robot battery;", PARSE_ERROR),
-        ("robot;", PARSE_ERROR),
-        ("Robot mode ?;", PARSE_ERROR),
-        ("command ?;", PARSE_ERROR),
-        ("chassis move ?;", PARSE_ERROR),
-        ("hello;", PARSE_ERROR),
-        ("?;", PARSE_ERROR),
-        ("\xff\x00;", PARSE_ERROR),
-        ("robot mode free\nrobot battery ?;", PARSE_ERROR),
-    ],
-)
-async def test_robot_mode_and_bad_texts(client, text: str, reply: str) -> None:
-    assert await client.ask(text) == reply
+async def test_the_sequence_number_comes_back(client) -> None:
+    for text, reply in NUMBERED:
+        assert await client.ask(text) == reply, text
+
+
+MODES_AND_BAD_TEXTS = [
+    ("robot mode free;", "ok;"),
+    ("robot mode chassis_lead;", "ok;"),
+    ("robot mode mode free;", "ok;"),
+    ("robot mode gimbal_lead;", "ok;"),
+    ("robot mode FREE;", "fail;"),
+    ("robot mode 1;", "fail;"),
+    ("robot mode;", PARSE_ERROR),
+    ("robot battery;", PARSE_ERROR),
+    ("robot;", PARSE_ERROR),
+    ("Robot mode ?;", PARSE_ERROR),
+    ("command ?;", PARSE_ERROR),
+    ("chassis move ?;", PARSE_ERROR),
+    ("hello;", PARSE_ERROR),
+    ("?;", PARSE_ERROR),
+    ("\xff\x00;", PARSE_ERROR),
+    ("robot mode free\nrobot battery ?;", PARSE_ERROR),
+]
+
+
+async def test_robot_mode_and_bad_texts(client) -> None:
+    for text, reply in MODES_AND_BAD_TEXTS:
+        assert await client.ask(text) == reply, text
 
 
 async def test_mode_that_needs_gimbal_is_refused_without_one(client, robot) -> None:

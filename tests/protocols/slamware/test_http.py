@@ -171,13 +171,14 @@ async def test_a_head_alone_is_answered_at_once(bare_client: httpx.AsyncClient) 
         assert (reply.status_code, reply.content) == (200, b"")
 
 
-@pytest.mark.parametrize(
-    "body", [b"", b"{", b"[]", b"null", b"7", b'"x"', b"\xff\xfe", b"[" * 50_000, b'{"id": 5}', b'{"id": ""}']
-)
-async def test_bad_bodies_are_400(bare_client: httpx.AsyncClient, body: bytes) -> None:
-    reply = await bare_client.post(POIS, content=body)
-    assert (reply.status_code, reply.reason_phrase) == (400, "Bad Request")
-    assert (await bare_client.get(POIS)).json() == []
+BAD_BODIES = [b"", b"{", b"[]", b"null", b"7", b'"x"', b"\xff\xfe", b"[" * 50_000, b'{"id": 5}', b'{"id": ""}']
+
+
+async def test_bad_bodies_are_400(bare_client: httpx.AsyncClient) -> None:
+    for body in BAD_BODIES:
+        reply = await bare_client.post(POIS, content=body)
+        assert (reply.status_code, reply.reason_phrase) == (400, "Bad Request"), body[:20]
+        assert (await bare_client.get(POIS)).json() == [], body[:20]
 
 
 async def test_the_error_names_the_field(bare_client: httpx.AsyncClient) -> None:

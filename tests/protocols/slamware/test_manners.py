@@ -143,28 +143,26 @@ async def test_one_obstacle_is_reported_once(
     assert [event["timestamp"] for event in events if event["type"] == "PATH_OCCUPIED"] == ["0", "3000", "8100"]
 
 
-@pytest.mark.parametrize(
-    ("request_line", "body", "reason"),
-    [
-        ("DELETE /api/core/system/v1/robot/health/x", None, "Invalid Error Code"),
-        ("DELETE /api/core/system/v1/robot/health/7", None, "Invalid Error Code"),
-        ("GET /api/core/system/v1/parameter?param=gravity", None, "Parameter is required"),
-        ("GET /api/delivery/v1/cargos/a/boxes/x", None, "Invalid BoxId"),
-        ("GET /api/multi-floor/map/v1/pois?floor=99", None, "Invalid floor or building"),
-        ("POST /api/core/motion/v1/actions", {"action_name": "Fly"}, "Can not create action"),
-        ("POST /api/core/system/v1/aeb/control", "Perhaps", "Invalid JSON data"),
-        ("POST /api/core/system/v1/jack/status", "Sideways", "Invalid JSON data"),
-        ("POST /api/core/system/v1/light/control", {}, "Invalid JSON data"),
-        ("PUT /api/core/slam/v1/localization/pose", {"x": 9e4, "y": 0}, "Invalid Argument"),
-        ("PUT /api/core/system/v1/network/route", {"priority": "5g"}, "Invalid JSON data"),
-        ("PUT /api/core/system/v1/parameter", {"param": "gravity", "value": "1"}, "Bad Request"),
-        ("PUT /api/delivery/v1/cargos/a/boxes/0/:kick", None, "Invalid Operation"),
-    ],
-)
-async def test_a_bad_request_has_the_manuals_reason(
-    client: httpx.AsyncClient, request_line: str, body: object, reason: str
-) -> None:
-    method, _, path = request_line.partition(" ")
-    reply = await client.request(method, path, json=body)
-    assert (reply.status_code, reply.reason_phrase) == (400, reason), reply.text
-    assert reply.text.startswith(f"{reason}: ")
+BAD_REQUESTS = [
+    ("DELETE /api/core/system/v1/robot/health/x", None, "Invalid Error Code"),
+    ("DELETE /api/core/system/v1/robot/health/7", None, "Invalid Error Code"),
+    ("GET /api/core/system/v1/parameter?param=gravity", None, "Parameter is required"),
+    ("GET /api/delivery/v1/cargos/a/boxes/x", None, "Invalid BoxId"),
+    ("GET /api/multi-floor/map/v1/pois?floor=99", None, "Invalid floor or building"),
+    ("POST /api/core/motion/v1/actions", {"action_name": "Fly"}, "Can not create action"),
+    ("POST /api/core/system/v1/aeb/control", "Perhaps", "Invalid JSON data"),
+    ("POST /api/core/system/v1/jack/status", "Sideways", "Invalid JSON data"),
+    ("POST /api/core/system/v1/light/control", {}, "Invalid JSON data"),
+    ("PUT /api/core/slam/v1/localization/pose", {"x": 9e4, "y": 0}, "Invalid Argument"),
+    ("PUT /api/core/system/v1/network/route", {"priority": "5g"}, "Invalid JSON data"),
+    ("PUT /api/core/system/v1/parameter", {"param": "gravity", "value": "1"}, "Bad Request"),
+    ("PUT /api/delivery/v1/cargos/a/boxes/0/:kick", None, "Invalid Operation"),
+]
+
+
+async def test_a_bad_request_has_the_manuals_reason(client: httpx.AsyncClient) -> None:
+    for request_line, body, reason in BAD_REQUESTS:
+        method, _, path = request_line.partition(" ")
+        reply = await client.request(method, path, json=body)
+        assert (reply.status_code, reply.reason_phrase) == (400, reason), reply.text
+        assert reply.text.startswith(f"{reason}: "), request_line
