@@ -106,6 +106,7 @@ async def names(served: ServedConsole, *cookies: str) -> list[str]:
     return [await asyncio.to_thread(me, served.url, cookie) for cookie in cookies]
 
 
+@pytest.mark.slow  # in short: test_consoles_class_takes_pupils_after_a_restart
 async def test_a_class_goes_on_after_a_restart(tmp_path: Path) -> None:
     add_admins(tmp_path / "w", "mx", "gone", "changed")
     async with world(tmp_path, "w", ADDRESS, shared=False, access=ASKING) as served:

@@ -30,6 +30,7 @@ from tests.programs.staging import Act, Stage
 
 EXAMPLES = examples()
 # s that a figure takes here; tests/simulation/bodies/test_performing.py has its real time, up to two minutes.
+PARTS = 12  # of the examples of motions, the first of which is for every run
 FIGURE = 2.0
 MOTIONS = [f"cyberdog.motion.{name}" for name, _, _ in RESULT_MOTIONS]
 WITH_PEOPLE = [
@@ -90,12 +91,12 @@ def test_every_function_has_an_example_that_uses_it() -> None:
 
 
 @pytest.mark.world("empty", body="cyberdog2")
-@pytest.mark.parametrize("part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in (1, 2, 3))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in range(1, PARTS))])
 async def test_examples_of_motions(player: Player, part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for motion, spec in MOTION_SPECS.items():
         if not spec.jumps:
             monkeypatch.setitem(cast(dict[Motion, MotionSpec], MOTION_SPECS), motion, replace(spec, duration=FIGURE))
-    for name in MOTIONS[part::4]:
+    for name in MOTIONS[part::PARTS]:
         await player.stand_at(5.0, 5.0)
         await player.play(name, EXAMPLES[name])
 

@@ -214,6 +214,7 @@ async def test_replaced_map_switches_navigation_off(home: Caller) -> None:
     assert result_of(await home("cyberdog.navigation.navigation_to_preset", "kitchen")) == (0, 0)
 
 
+@pytest.mark.slow  # in short: test_going_to_a_preset
 async def test_a_tour_of_presets_passes_them_in_turn(caller: Caller, world: World) -> None:
     await caller.clock.advance(3.0)
     spots = {"a": Point(1.2, 0.8), "b": Point(1.2, -0.2), "c": Point(1.8, 0.3)}

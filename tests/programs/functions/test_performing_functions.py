@@ -193,6 +193,7 @@ async def test_walking_on_a_leash_begins_standing(caller: Caller) -> None:
     assert (legs.posture, legs.gait, legs.foot_lift) == (Posture.STANDING, Gait.TROT_PASSIVE, FootLift(0.04, 0.05))
 
 
+@pytest.mark.slow  # in short: test_walking_on_a_leash_begins_standing
 async def test_dog_on_leash_goes_where_it_is_pulled(caller: Caller, world: World) -> None:
     legs = caller.robot[Legs]
     await off_the_dock(caller)

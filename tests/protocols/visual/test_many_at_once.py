@@ -23,6 +23,7 @@ BODIES = (
 IDS = ("t", "t1", "t10", "t2")
 
 
+@pytest.mark.slow  # in short: test_random_operations_end_at_rest
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 async def test_states_agree_after_random_operations(app: FrontEnd, seed: int) -> None:
     dice = random.Random(seed)

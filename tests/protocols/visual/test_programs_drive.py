@@ -211,6 +211,7 @@ async def test_stop_holds_when_the_restart_is_called_off(connect: Connect, robot
     assert world.truth.pose_of("a").distance_to(held) < 0.02
 
 
+@pytest.mark.slow  # in short: test_stop_holds_when_the_restart_is_called_off
 async def test_suspended_during_a_restart_waits_for_recovery(connect: Connect, robot: Robot, world: World) -> None:
     app = await connect(robot)
     await app.start("t", WALK)

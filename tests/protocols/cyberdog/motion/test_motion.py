@@ -140,6 +140,7 @@ async def test_a_walk_with_a_duration(client, robot, world, forward) -> None:
     assert robot[Base].velocity.speed < 0.05
 
 
+@pytest.mark.slow  # in short: test_a_walk_with_a_duration
 async def test_a_lying_robot_walks_its_whole_duration(client, robot, world, forward) -> None:
     robot[Legs].lie_down()
     await forward(seconds=5)
@@ -150,22 +151,24 @@ async def test_a_lying_robot_walks_its_whole_duration(client, robot, world, forw
     assert world.truth.pose_of("a").distance_to(before) > 0.7
 
 
-@pytest.mark.parametrize(
-    ("params", "code"),
-    [
-        ({"motion_id": 180}, 3031),  # an empty place for a gait
-        ({"motion_id": 121, "duration": 500}, 3010),
-        ({"motion_id": 211, "rpy_des": [0, 0.1, 0]}, 3010),
-        ({"motion_id": 99999}, 3008),
-        ({"motion_id": 111, "duration": 500}, 3010),
-        ({"motion_id": 303, "vel_des": [0.1, 0, 0]}, 3010),
-        ({"motion_id": 303, "duration": -5}, 3010),
-        ({"motion_id": 303, "duration": 2_000_000_000}, 3010),
-    ],
-)
-async def test_refused_motions(client, robot, world, params, code) -> None:
-    assert await client.ask(1004, params) == {"motion_id": params["motion_id"], "result": False, "code": code}
-    assert robot.actions.running() == []
+REFUSED: list[tuple[dict[str, object], int]] = [
+    ({"motion_id": 180}, 3031),  # an empty place for a gait
+    ({"motion_id": 121, "duration": 500}, 3010),
+    ({"motion_id": 211, "rpy_des": [0, 0.1, 0]}, 3010),
+    ({"motion_id": 99999}, 3008),
+    ({"motion_id": 111, "duration": 500}, 3010),
+    ({"motion_id": 303, "vel_des": [0.1, 0, 0]}, 3010),
+    ({"motion_id": 303, "duration": -5}, 3010),
+    ({"motion_id": 303, "duration": 2_000_000_000}, 3010),
+]
+
+
+async def test_refused_motions(client, robot, world) -> None:
+    for params, code in REFUSED:
+        assert await client.ask(1004, params) == {"motion_id": params["motion_id"], "result": False, "code": code}, (
+            params
+        )
+        assert robot.actions.running() == [], params
 
 
 async def test_a_motion_without_its_number_is_no_request(client, robot, world) -> None:

@@ -53,6 +53,7 @@ async def test_up_it_aligns_after_the_answer(stands, client, robot, world, forwa
     assert_pose(world.truth.pose_of("a"), x=FOOT - BEFORE, deg=0, within=0.03, within_deg=3)
 
 
+@pytest.mark.slow  # in short: test_it_ends_square_before_the_first_step
 async def test_down_it_looks_for_the_landings_edge(client, robot, world, forward) -> None:
     world.stage.place("a", Pose(5.55, 4.0, math.pi - 0.2))
     await forward(seconds=0.5)
@@ -89,6 +90,7 @@ async def test_it_is_stopped_midway(stands, client, robot, world, forward) -> No
     assert await client.ask(1101) == {"success": True}  # it is standing already
 
 
+@pytest.mark.slow  # in short: test_it_is_stopped_midway
 async def test_other_motions_take_over(stands, client, robot, forward) -> None:
     frame = {"motion_id": 303, "cmd_type": 1, "vel_des": [-0.1, 0.0, 0.0]}
     sit = {"motion_id": 143, "duration": 0}

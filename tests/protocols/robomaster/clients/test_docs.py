@@ -33,7 +33,11 @@ def transcripts(page: str) -> list[list[str]]:
     return [block.splitlines() for block in TRANSCRIPT.findall(PAGES[page].read_text())]
 
 
-CASES = [(page, index) for page in PAGES for index in range(len(transcripts(page)))]
+CASES = [
+    pytest.param(page, index, marks=[pytest.mark.slow] if ".zh" in page else [])  # the same commands
+    for page in PAGES
+    for index in range(len(transcripts(page)))
+]
 
 
 def alike(reported: str, got: str) -> bool:

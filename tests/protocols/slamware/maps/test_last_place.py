@@ -145,6 +145,7 @@ async def test_robot_off_its_dock_is_before_it() -> None:
     database.close()
 
 
+@pytest.mark.slow  # in short: test_robot_continues_at_its_place
 async def test_place_is_in_the_frame_of_the_file(stored: Database) -> None:
     at = StartConfig(x=13.5, y=10.0, yaw=0.0, floor=1)
     async with running(stored, at) as run:

@@ -61,6 +61,7 @@ async def test_pose_and_masks_set_during_a_restart_stay(
     assert robot[SensorMasks].masked == {masked: False}
 
 
+@pytest.mark.slow  # in short: test_pose_and_masks_set_during_a_restart_stay
 async def test_a_driving_robot_keeps_its_place(
     robot: Robot, world: World, client: httpx.AsyncClient, forward: Forward, drawn: None
 ) -> None:
