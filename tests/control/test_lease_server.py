@@ -15,6 +15,7 @@ from roboglot.cli.control.lease import command, in_words
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
 from roboglot.control.lease_server import NAME, Answer, Control, LeaseServer, Request
 from roboglot.hosting.local_socket import CALLERS_MAX, LINE_MAX
+from roboglot.model.action import Action
 from roboglot.model.client_context import acting_for
 from roboglot.model.clock import LockstepClock
 from roboglot.model.components.energy.battery import Battery
@@ -251,6 +252,23 @@ async def test_refusing_robots_are_named_and_delay_no_other(
         await forward(seconds=0.1)
     assert (await stopping)["error"] == "robot a: its link is gone; robot d: its link is gone"
     assert max(abs(world.robot(name)[Base].velocity.x) for name in ("b", "c")) < 0.02
+
+
+async def test_a_real_robot_is_not_reset(world: World, clock: LockstepClock, tmp_path: Path) -> None:
+    real = Robot("b", world.robot("a").description, clock)
+    real.add(Lease, Lease(real))
+
+    async def drive(_: Action) -> None:
+        await asyncio.Event().wait()
+
+    driving = real.actions.start("drive", drive, resources=(BASE,))
+    server = LeaseServer(tmp_path, {**world.robots, "b": real}, world.stage)
+    await server.open()
+    assert (await _ask(tmp_path / NAME, Request("reset", "b"))).error == "robot b is in no simulated world"
+    assert real.actions.running() == [driving]  # a refusal stops nothing
+    await server.close()
+    driving.cancel()
+    await driving.done()
 
 
 @pytest.mark.world("empty", robots=("a", "b"))

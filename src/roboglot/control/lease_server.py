@@ -107,7 +107,7 @@ class LeaseServer(LocalServer):
             case "stop":
                 await robot.actions.cancel(reason="stopped by the owner of this machine")
             case "reset":
-                if self._stage is None:
+                if self._stage is None or robot.id not in {placed.name for placed in self._stage.robots}:
                     raise LookupError(f"robot {robot.id} is in no simulated world")
                 await robot.actions.cancel(reason="reset by the owner of this machine")
                 self._stage.reset(robot.id)
