@@ -133,6 +133,8 @@ class Plan(msgspec.Struct, forbid_unknown_fields=True):
         ({"steps": [{"do": "sit", "zzz": 1}]}, "steps[0].zzz is unknown; there are topSpeed, later, gear, sides"),
         ({"steps": [{"do": "walk", "topSped": 1}]}, "steps[0].topSped is unknown; did you mean 'topSpeed'?"),
         ({"zzz": 1}, "zzz is unknown; there are steps, named"),
+        ({"topSpeed": "slow"}, "topSpeed is unknown; it belongs in steps"),
+        ({"steps": [{"do": "sit", "named": {}}]}, "steps[0].named is unknown; it belongs in the outermost object"),
         ({"named": 1}, "named must be an object, not a whole number"),
     ],
 )

@@ -79,6 +79,8 @@ def _remedy(error: str, wanted: object) -> str:
     if unknown := re.search(r"unknown field `([^`]+)`", error):
         kinds = [kind for kind in _at(wanted, path) if isinstance(kind, inspect.StructType)]
         fields = list(dict.fromkeys(field.encode_name for kind in kinds for field in kind.fields))
+        if home := _home_of(unknown[1], wanted):
+            return f"; it belongs in {home}"
         near = meant(unknown[1], _fields_of(wanted))
         return near or (f"; there are {', '.join(fields)}" if 0 < len(fields) <= CHOICES_MAX else "")
     if not error.startswith(("Invalid value", "Invalid enum value")):
@@ -136,6 +138,24 @@ def _fields_of(kind: object) -> set[str]:
     """Return the names of all fields that may occur anywhere in a value of a type."""
     _, structures = msgspec.json.schema_components([kind])
     return {name for each in structures.values() for name in each.get("properties", ())}
+
+
+def _home_of(name: str, wanted: object) -> str:
+    """Return the path of the first object in a value of a type that has a field of this name; empty if none has."""
+    left, seen = [("", kind) for kind in _choices(inspect.type_info(wanted))], set[type]()
+    while left:
+        (path, kind), *left = left
+        match kind:
+            case inspect.StructType(cls=cls, fields=fields) | inspect.DataclassType(cls=cls, fields=fields):
+                if cls in seen:
+                    continue
+                if name in {field.encode_name for field in fields}:
+                    return path or "the outermost object"
+                seen.add(cls)
+                left += [(f"{path}.{f.encode_name}".strip("."), inner) for f in fields for inner in _choices(f.type)]
+            case inspect.DictType(value_type=inner) | inspect.CollectionType(item_type=inner):
+                left += [(path, each) for each in _choices(inner)]
+    return ""
 
 
 def _plain(error: Exception, whole: str, field: str, kinds: Mapping[str, str]) -> str:

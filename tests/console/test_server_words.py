@@ -30,6 +30,8 @@ WORDS = {
     "; {}",
     "; use {}",
     "; use one of {}",
+    "; it belongs in {}",
+    "; it belongs in the outermost object",
     EDGE,
     GAP,
     ROBOT,
