@@ -73,8 +73,7 @@ def warm() -> None:
             importlib.import_module(f"roboglot.kernels.{name}")
     _rehearse()
     make_initialisers()
-    gc.collect()
-    gc.freeze()
+    gc.freeze()  # garbage too: some thousand objects, which a collection would take a tenth of the time to find
     gc.enable()
     refuse_threads()
 
