@@ -137,7 +137,6 @@ async def test_repetitions_are_counted(sport, facing):
     assert {other.sport: other.count for other in others if other.count > 1} == {}
 
 
-@pytest.mark.slow
 async def test_a_plank_is_timed():
     from roboglot.model.components.sensing.vision import Vision
 

@@ -106,7 +106,6 @@ def test_a_body_without_a_pad_cannot_be_touched(simulate):
         simulate(body="hermes").world.stage.touch("a")
 
 
-@pytest.mark.slow
 async def test_gps_under_the_open_sky(simulate):
     sim = simulate("yard", start=Pose(20, 10), body="cyberdog2")
     sim.world.start()

@@ -50,7 +50,6 @@ async def downloaded(dog, **changes):
     return action
 
 
-@pytest.mark.slow
 async def test_an_update_from_the_download_to_the_reboot(dog):
     firmware, events = dog.robot[Firmware], dog.robot.events.subscribe(FirmwareChanged, Rebooting, Rebooted)
     assert (firmware.version, firmware.modules["motors.MCU_Motor"]) == ("1.3.0.0", "1.1.0")
@@ -120,7 +119,6 @@ async def test_updates_that_are_refused(dog):
     assert isinstance(weak.error, Refused)
 
 
-@pytest.mark.slow
 async def test_given_up_an_installation_leaves_the_old_version(dog):
     firmware = dog.robot[Firmware]
     await downloaded(dog)
@@ -192,7 +190,6 @@ async def test_asleep_the_lidar_stands_still(dog):
     assert dog.robot[Lidar].scan is not None
 
 
-@pytest.mark.slow
 async def test_low_power_comes_by_itself_if_set(dog):
     power = dog.robot[Power]
     dog.robot[Legs].lie_down()
