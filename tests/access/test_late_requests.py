@@ -134,7 +134,7 @@ async def test_open_streams_end_with_the_right(runtime: Runtime, store: AccessSt
         assert await answers.code() is grpc.StatusCode.OK
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_open_streams_end_with_the_right
 async def test_orders_end_with_their_own_clients_right(runtime: Runtime, store: AccessStore) -> None:
     robot, clock = runtime.fleet.robots["a"], runtime.clock
     assert isinstance(clock, LockstepClock)

@@ -137,7 +137,7 @@ async def test_the_text_protocol_does_what_the_right_allows(runtime: Runtime, re
             assert {"quit", "blaster fire", "chassis stop"} <= reached
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_cyberdog_checks_the_right_before_the_parameters
 async def test_cyberdog_does_what_the_right_allows(runtime: Runtime, reached: set[object], data: Path) -> None:
     codes = [int(operation.key) for operation in DOG]
     for caller in CALLERS:
@@ -238,7 +238,7 @@ def _noting(seen: set[str], key: str) -> Callable[..., Any]:
     return handler
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_viewers_do_what_the_right_allows
 async def test_the_console_does_what_the_right_allows(runtime: Runtime, monkeypatch: pytest.MonkeyPatch) -> None:
     assert runtime.console is not None
     await runtime.console.ready()
@@ -290,7 +290,7 @@ async def test_programs_do_what_the_right_allows(runtime: Runtime) -> None:
             assert ("has no right" in words) == (right not in caller.rights), (caller.name, frame)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_page_learns_nothing_of_others_world
 async def test_wire_view_shows_every_row_on_a_wire(runtime: Runtime, reached: set[object], data: Path) -> None:
     """Asks every door everything, as one who may do all and as one who may only see, and reads the console's feed."""
     assert runtime.console is not None

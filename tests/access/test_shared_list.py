@@ -225,7 +225,7 @@ def test_folders_list_is_copied_and_replaces_no_one(db_server: PostgreSQLServer,
         assert there.identities() == [*kept, local.identities()[1]]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_rows_are_kept_once_where_connection_breaks
 @needs_postgresql
 async def test_server_away_rights_stay_and_rows_are_kept(
     db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture

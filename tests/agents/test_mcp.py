@@ -78,7 +78,7 @@ def tools_of(console: str) -> Client:
     return Client(make_server(ConsoleClient(console)))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_over_streamable_http
 async def test_over_standard_input(served: ServedConsole) -> None:
     from mcp import Client, StdioServerParameters
 

@@ -69,7 +69,7 @@ def status_of(robot: Robot, order: Order) -> OrderStatus:
     return next(known.status for known in robot[Delivery].orders if known.id == order.id)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_it_holds_after_crash_while_people_load_it
 async def test_orders_and_rules_survive_crash_and_go_on(tmp_path: Path) -> None:
     file, image = tmp_path / "robot.db", tmp_path / "crashed.db"
     policy = Policy(work_mode=WorkMode.MANUAL, hours=((0, 3600),), delivery_speed=0.8, words={"mode": 0})

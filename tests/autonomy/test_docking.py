@@ -49,7 +49,7 @@ async def test_on_the_dock_there_is_nothing_to_do(tour: Tour) -> None:
     assert tour.truth.distance_to(tour.start) < 0.005
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_an_unknown_dock_far_away_is_reported
 @pytest.mark.world("empty")
 async def test_no_dock_is_found_in_an_empty_place(tour: Tour) -> None:
     await tour.go((5.0, 5.0))

@@ -38,7 +38,7 @@ async def test_it_keeps_near_who_walks(tour: Tour, side: FollowSide) -> None:
     assert action.status is ActionStatus.CANCELED
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_without_anybody_it_gives_up
 @pytest.mark.world("playground", body="cyberdog2")
 async def test_it_stands_still_near_a_person_unseen(tour: Tour) -> None:
     anna = tour.world.stage.person("anna")

@@ -38,7 +38,7 @@ async def fleet(clock: LockstepClock, request: pytest.FixtureRequest) -> AsyncIt
     database.close()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_ride_from_within_the_car_comes_first
 async def test_each_has_its_turn(fleet: Fleet, clock: LockstepClock) -> None:
     seen = list[str]()
 

@@ -47,7 +47,7 @@ async def test_at_a_printed_tag(tour, backward):
     assert turned < 3.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_up_to_it_and_away_again
 @pytest.mark.world(WORLD, body="hermes")
 async def test_at_a_board_and_off_it(tour):
     await dock(tour, MarkGoal(mark=Mark.BOARD, start=start(tour, 6.8, 2.0, -90)))
@@ -61,7 +61,7 @@ async def test_at_a_board_and_off_it(tour):
     assert turned < 3.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_up_to_it_and_away_again
 @pytest.mark.world(WORLD, body="hermes")
 async def test_at_reflectors(tour):
     goal = MarkGoal(

@@ -32,7 +32,7 @@ async def test_lines_of_a_file_are_read(tmp_path: Path) -> None:
     assert [line async for line in lines_of(os.open(file, os.O_RDONLY))] == LINES
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_standard_input_of_any_kind_aborts_no_loop
 @pytest.mark.asyncio
 async def test_too_long_file_is_refused_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "steps"

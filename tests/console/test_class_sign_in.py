@@ -128,7 +128,7 @@ async def test_rights_that_are_gained_reach_open_pages(tmp_path: Path) -> None:
     store.close()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_a_code_lets_pupils_into_their_worlds
 async def test_one_list_lets_people_into_all_worlds(tmp_path: Path) -> None:
     plan = plan_fleet(2, 1, {"access": {"local": False}}, tmp_path)
     asking = checked(plan.shards[1]).access

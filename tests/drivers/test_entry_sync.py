@@ -92,7 +92,7 @@ async def test_map_is_loaded_through_the_door_with_places(
     assert (robot[Mapping].grid.log_odds > 0).sum() == pytest.approx(walls, rel=0.2)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_changes_on_either_side_reach_the_other
 async def test_walls_and_areas_are_heeded_by_the_robot(
     robot: Robot, driven: Robot, rest: OpenRest, until: Until, forward: Forward
 ) -> None:

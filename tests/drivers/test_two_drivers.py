@@ -25,7 +25,7 @@ CELLS = [*product(VENDORS, VENDORS)]
 SETTLES = {(near, far) for near, far in CELLS if near != "slamware" or far == near}
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_a_cell
 @pytest.mark.world("office")
 @pytest.mark.parametrize(("near", "far"), CELLS)
 async def test_a_driven_robot_is_driven_again(

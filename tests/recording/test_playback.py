@@ -135,7 +135,7 @@ async def test_front_end_repeats_its_result_on_busy_machines(tmp_path: Path, mon
         hogging.cancel()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_calls_end_with_the_status_of_the_recording
 async def test_app_of_dog_ends_with_the_same_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tests.recording.test_playback.SPEED", 1.5)  # it drives, on a busy machine, too
     ensure_certificates(tmp_path / "data" / "cyberdog")

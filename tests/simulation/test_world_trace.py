@@ -31,7 +31,7 @@ async def digests(hash_seed: str, *worlds: str) -> list[list[bytes]]:
     return [line.split() for line in output.splitlines()]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_the_same_seed_sees_the_same
 async def test_processes_sense_the_same_other_seeds_differ():
     long = f"7:{SECONDS}"
     (first, other), (second,) = await asyncio.gather(digests("1", long, "8:1"), digests("2", long))

@@ -20,7 +20,7 @@ from roboglot.storage.database import Database
 from tests.crowd import CORRIDOR, SHOVED, SURE, crowd, leave
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_a_robot_in_the_way_is_driven_around
 async def test_nothing_that_stands_is_shoved() -> None:
     outcome = await crowd(6, seconds=18.0)
     assert outcome.shoved <= SHOVED, outcome.worst

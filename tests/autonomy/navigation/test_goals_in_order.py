@@ -154,7 +154,7 @@ async def test_goal_on_way_that_is_walled_in_fails(tour: Tour) -> None:
     assert isinstance(action.error, Blocked), (action.reason, track)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_success_means_every_goal_was_reached
 @pytest.mark.world("office", body="hermes")
 async def test_a_middle_goal_at_the_dock_itself(tour: Tour) -> None:
     wanted = [Point(1.0, 0.0), Point(0.0, 0.0), Point(1.0, 0.3)]

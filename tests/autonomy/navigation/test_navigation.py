@@ -50,7 +50,7 @@ async def test_goals_are_reached_with_other_luck_too(tour: Tour) -> None:
     await visits_three_places(tour)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_success_means_every_goal_was_reached
 @pytest.mark.world("empty")
 async def test_several_goals_in_turn_are_all_passed(tour: Tour) -> None:
     spots = [(3.0, 5.0), (5.0, 7.0), (7.0, 5.0), (5.0, 3.0)]
@@ -98,7 +98,7 @@ async def test_brakes_before_new_obstacle_and_drives_around_it(tour: Tour) -> No
     assert tour.blocks[0].action is action
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_it_gives_up_after_half_a_minute
 @pytest.mark.world(CORRIDOR)
 async def test_waits_where_there_is_no_way_around(tour: Tour) -> None:
     action = tour.head_for((8.5, 1.2))

@@ -140,7 +140,7 @@ async def test_free_navigation_ignores_tracks(tour: Tour) -> None:
     assert max(abs(pose.y - 5.0) for pose in places) < 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_tracks_are_followed_around_bends
 async def test_waits_on_strict_tracks_reporting_after_three_minutes(
     tour: Tour, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -89,14 +89,14 @@ async def test_carried_robot_searches_again_at_once(searches: Searches) -> None:
     assert await searches.during(2.2) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_carried_robot_searches_again_at_once
 async def test_driving_robot_searches_each_second(searches: Searches) -> None:
     await searches.during(STOOD)
     searches.tour.robot[Driving].drive(Twist(yaw=0.3), source="test")
     assert await searches.during(5.2) == 5
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_carried_robot_searches_again_at_once
 async def test_changed_map_is_searched_at_once(searches: Searches) -> None:
     await searches.during(STOOD)
     mapping = searches.tour.robot[Mapping]

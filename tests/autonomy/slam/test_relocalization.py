@@ -41,7 +41,7 @@ async def confirmed(*_: object) -> bool:
     return True
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_a_kidnapped_robot_says_so_and_recovers
 @pytest.mark.world("office")
 async def test_a_robot_carried_elsewhere_finds_itself(tour: Tour) -> None:
     await tour.go((12.0, 9.8))
@@ -209,7 +209,7 @@ async def test_place_a_metre_along_corridors_is_found(tour: Tour, x: float, alon
     assert tour.error[0] < 0.05 or tour.robot[Localization].lost
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_no_region_is_refused
 @pytest.mark.world("office")
 async def test_in_a_region_it_looks_only_there(tour: Tour) -> None:
     await tour.go((12.0, 9.8))

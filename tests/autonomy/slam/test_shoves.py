@@ -41,7 +41,7 @@ async def test_shoved_standing_robot_reports_it(tour: Tour) -> None:
     assert tour.error[0] < 0.04
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_shoved_standing_robot_reports_it
 @pytest.mark.world("office")
 async def test_robot_shoved_while_driving_waits_until_localized(tour: Tour) -> None:
     await tour.go((20.0, 10.0))

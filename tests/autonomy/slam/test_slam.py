@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tests.autonomy.conftest import Tour
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_goals_are_reached_within_5_cm_2_degrees
 @pytest.mark.world("office", seed=5)
 async def test_office_tour_keeps_within_3_cm_1_degree(tour: Tour) -> None:
     errors = []

@@ -56,7 +56,7 @@ async def test_two_change_places(building: OccupancyGrid, bodies: tuple[str, ...
     assert max(outcome.stood.values()) < LONG
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_two_change_places
 @pytest.mark.asyncio(loop_scope="module")
 async def test_three_cross_at_one_place(building: OccupancyGrid) -> None:
     starts = (Pose(2.0, 5.5), Pose(4.5, 8.0, -math.pi / 2), Pose(6.0, 4.5, 2.5))

@@ -126,7 +126,7 @@ def asked(client: CyberDogClient, monkeypatch) -> set[int]:
     return codes
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_every_push_arrives_as_its_value
 async def test_every_code_of_the_contract_once(client, door: CyberDogDoor, robot, world, asked: set[int]) -> None:
     world.stage.place("a", Pose(9.0, 6.0))
     gadget = world.gadgets.get(BRACELET.mac)

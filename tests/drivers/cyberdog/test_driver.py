@@ -119,7 +119,7 @@ async def test_it_drives_an_asymmetric_path(driven: Robot, until: Until, world: 
     assert_pose(driven[Localization].pose, x=here.x, y=here.y, deg=math.degrees(here.yaw), within=0.05, within_deg=2)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_up_it_aligns_after_the_answer
 @pytest.mark.world("stairs", body="cyberdog2")
 async def test_it_stands_square_before_stairs(
     driven: Robot, robot: Robot, until: Until, forward: Forward, world: World
@@ -259,7 +259,7 @@ async def test_follows_and_docks_by_own_skills_when_localized(
     await until(lambda: docking.status.ended)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_task_begun_with_lost_answer_is_stopped_too
 async def test_unowned_task_is_stopped_when_the_link_returns(
     driven: Robot, robot: Robot, until: Until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -286,7 +286,7 @@ async def test_it_announces_what_it_adds(driven: Robot, until: Until) -> None:
     assert set(driven.interfaces) - kept_here == APPROXIMATIONS.keys()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_both_ends_of_text_note_the_same
 async def test_drivers_tap_equals_the_dogs_tap(driven: Robot, robot: Robot, until: Until) -> None:
     here: list[Exchange] = []
     there: list[Exchange] = []

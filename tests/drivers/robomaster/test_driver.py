@@ -64,7 +64,7 @@ async def test_rest_drives_an_asymmetric_path(driven_ep: Robot, rest: OpenRest, 
     assert (reported.x, reported.y, reported.yaw) == pytest.approx((here.x, here.y, here.yaw), abs=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_rest_drives_an_asymmetric_path
 async def test_square_and_side_step_end_where_they_should(driven_ep: Robot, world: World, forward: Forward) -> None:
     start = world.truth.pose_of("a")
 

@@ -205,7 +205,7 @@ async def test_it_navigates_by_the_robots_own_skill(driven: Robot, world: World,
     assert_pose(world.truth.pose_of("a").relative_to(start), x=1.0, y=0.5, deg=math.degrees(-1.0))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_it_navigates_by_the_robots_own_skill
 async def test_navigation_fails_in_model_words_stops_when_cancelled(
     driven: Robot, world: World, forward: Forward
 ) -> None:
@@ -222,7 +222,7 @@ async def test_navigation_fails_in_model_words_stops_when_cancelled(
     assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_it_navigates_by_the_robots_own_skill
 async def test_a_paused_way_goes_on(driven: Robot, world: World, forward: Forward) -> None:
     action = driven[Navigation].navigate_to([Point(1.5, 0.0)], NavigationOptions(), source="test")
     await forward(seconds=2)

@@ -219,7 +219,7 @@ async def test_workers_die_with_the_server() -> None:
         await until(partial(lambda pid: process_state(pid) in {"", "Z"}, pid))
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_nothing_is_left_after_close
 async def test_many_programs_at_once() -> None:
     async with Engine() as engine:
         played = await asyncio.gather(*(play(engine, f"print(cyberdog.echo({i}) + 1)") for i in range(60)))

@@ -180,7 +180,7 @@ class Ledger:
         self.first, self.more = Cost(), Cost()
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_greedy_programs_get_turns_one_by_one
 async def test_hostile_programs_together_keep_to_the_share(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     """The server's thread keeps most of its time for others, no matter what programs send.
 

@@ -89,7 +89,7 @@ async def test_it_goes_around_what_stands_between(caller: Caller, world: World, 
     assert world.truth.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_another_clients_motion_ends_following
 async def test_own_motion_of_the_program_comes_first(caller: Caller, world: World, anna: Actor) -> None:
     await caller("cyberdog.follow.add_personnel", "Anna")
     await caller("cyberdog.follow.follow_personnel", "Anna", 1.2)
@@ -102,7 +102,7 @@ async def test_own_motion_of_the_program_comes_first(caller: Caller, world: Worl
     assert world.truth.pose_of("a").distance_to(Pose(5.4, 6.8)) == pytest.approx(1.2, abs=0.25)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_without_anybody_it_gives_up
 async def test_out_of_sight_it_gives_up(caller: Caller, world: World, anna: Actor) -> None:
     anna.place(1.5, 1.0, 0)
     await caller("cyberdog.follow.add_personnel", "Anna")

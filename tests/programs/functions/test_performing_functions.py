@@ -26,7 +26,7 @@ async def off_the_dock(caller: Caller) -> None:
     await caller.clock.advance(1.5)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_a_motion_ends_where_its_name_says
 async def test_every_motion_of_the_table_is_performed(caller: Caller) -> None:
     legs = caller.robot[Legs]
     await off_the_dock(caller)

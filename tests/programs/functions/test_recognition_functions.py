@@ -172,7 +172,7 @@ async def test_counting_ends_when_asked_and_with_the_program(caller: Caller, ann
 # -- people ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_members_are_known_by_their_voices
 async def test_members_are_known_by_their_faces(caller: Caller, world: World, anna: Actor) -> None:
     members = caller.robot[Members]
     assert field(await caller("cyberdog.personnel.face_recognized", []), "state.code") == 1  # no face is known

@@ -103,7 +103,7 @@ async def test_absent_devices_cannot_be_connected(client, robot, gadget, forward
     assert await client.ask(8009) == {"success": False, "message": "no device is connected"}
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_a_device_lost_during_its_update
 async def test_lost_and_found_and_its_update(client, app: App, robot, gadget, passing, forward) -> None:
     await client.ask(10001)
     await passing(lambda: app.connected)

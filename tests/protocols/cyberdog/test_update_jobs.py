@@ -33,7 +33,7 @@ def work(client: Client, passing: PassTime) -> Callable[..., Awaitable[list[dict
     return run
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_fetched_and_installed_update_survives_a_crash
 async def test_from_what_is_offered_to_what_runs(client, work, robot, forward, app, passing) -> None:
     firmware, gone = robot[Firmware], list[Rebooting]()
     robot.events.listen(Rebooting, gone.append)

@@ -107,7 +107,7 @@ async def test_it_switches_off_after_the_answer(client, robot, forward) -> None:
     assert (await client.ask(10001))["state_switch_status"]["state"] == 4
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_update_as_in_the_manual_is_downloaded
 async def test_an_update_from_download_to_reboot(client, app: App, robot, data, passing, forward, door) -> None:
     assert await client.ask(5001) == {"status": "idle", "code": 0}
     await passing(lambda: app.connected)

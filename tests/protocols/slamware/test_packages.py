@@ -23,7 +23,7 @@ SYSTEM, FIRMWARE = "/api/core/system/v1", "/api/core/firmware/v1"
 DATA = Path(__file__).parents[2] / "data" / "packages"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_an_uploaded_update
 async def test_an_update_from_the_maker(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
     await forward(seconds=1)
     offered = (await client.get(f"{FIRMWARE}/newversion")).json()

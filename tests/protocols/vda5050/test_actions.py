@@ -263,7 +263,7 @@ async def test_earlier_wake_up_time_wakes_no_later_sleep(yard: Opened) -> None:
     assert connection() == "HIBERNATING"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_hibernation_is_silent_until_it_ends
 async def test_hibernation_ends_when_others_wake_the_robot(yard: Opened) -> None:
     one = await yard()
     control = one.control

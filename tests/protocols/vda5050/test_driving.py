@@ -241,7 +241,7 @@ async def test_an_order_whose_driving_breaks_is_reported(yard: Opened, monkeypat
     assert one.control.state["errors"][0]["errorLevel"] == "CRITICAL"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_pause_holds_and_cancel_ends
 async def test_pause_holds_driving_actions_too(yard: Opened) -> None:
     one = await yard()
     made = order("one", [(0, 0), (2, 0)])

@@ -55,7 +55,7 @@ async def test_an_app_like_program_drives_a_square(connect: Connect, robot: Robo
     assert [id for kind, id in blocks if kind == "begin"] == ["stand~1", *["walk`2", "turn|3"] * 4, "say;4"]
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_pausing_holds_a_motion
 async def test_suspend_stops_the_robot_and_recover_goes_on(connect: Connect, robot: Robot, world: World) -> None:
     app = await connect(robot)
     before = world.truth.pose_of("a")
@@ -162,7 +162,7 @@ print(calls)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_polling_program_ends_in_lockstep
 async def test_endless_calls_let_lockstep_time_pass(connect: Connect, robot: Robot, world: World) -> None:
     """A call that waits for nothing takes a millisecond, as on a real robot, or time would stand."""
     app = await connect(robot)

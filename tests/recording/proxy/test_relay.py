@@ -100,7 +100,7 @@ async def test_proxy_and_the_robots_tap_agree(url: str, script: Any, tmp_path: P
     assert seen == reported
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_proxy_and_the_robots_tap_agree
 async def test_a_phone_and_its_dog_do_not_notice(tmp_path: Path) -> None:
     own, passed, folder = tmp_path / "own.mcap", tmp_path / "passed.mcap", tmp_path / "data" / "cyberdog"
     proof, certificates, called = ensure_certificates(folder), tmp_path / "certificates", free_port()

@@ -45,7 +45,7 @@ async def drive(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
     return path, x
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_our_own_reader_of_bags_finds_the_drive
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 async def test_a_bag_has_what_was_recorded(drive: tuple[Path, float], tmp_path: Path, storage: str) -> None:
     path, x = drive

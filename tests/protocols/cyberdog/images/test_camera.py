@@ -66,7 +66,7 @@ async def test_large_files_come_in_chunks(client, robot, folder, monkeypatch) ->
     assert Image.open(io.BytesIO(whole)).format == "JPEG"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_photo_comes_whole_and_is_gone_from_robot
 async def test_a_recording_is_an_mp4_of_its_length(client, robot, forward, folder, passing) -> None:
     assert await client.ask(4002, {"command": 2}) == {"result": 0}
     assert await client.ask(4002, {"command": 2}) == {"result": 4}

@@ -12,7 +12,7 @@ from tests.protocols.cyberdog.phone import App, Client, Stream, state, until
 pytestmark = pytest.mark.world("playground", body="cyberdog2")
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_it_keeps_near_who_walks
 async def test_the_person_chosen_is_followed(client: Client, app: App, robot, world, anna, passing, forward) -> None:
     nowhere = {"x_offset": 0, "y_offset": 0, "height": 10, "width": 10}
     assert await client.ask(6008, {"roi": nowhere}) == {"success": False}  # no task

@@ -86,7 +86,7 @@ async def test_the_end_frame_stops_at_once(client, robot, world, forward) -> Non
     assert robot.actions.running(BASE) == [] or robot.actions.running(BASE)[0].status.name == "CANCELING"
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_a_lying_dog_gets_up_for_a_figure
 async def test_a_lying_robot_gets_up_before_it_walks(client, robot, world, forward) -> None:
     robot[Legs].lie_down()
     await forward(seconds=5)
@@ -252,7 +252,7 @@ async def test_emergency_stop_ends_a_motion_that_waits(client, robot, world, for
     assert robot[Legs].posture is Posture.LIMP
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_dance_reports_timeout_and_lying_down_interrupts_it
 async def test_motion_longer_than_20_s_is_a_timeout(client, robot, world, forward) -> None:
     long = asyncio.ensure_future(client.ask(1004, {"motion_id": 303, "vel_des": [0, 0, 0.5], "duration": 30_000}))
     await until(lambda: robot.actions.running())

@@ -125,7 +125,7 @@ async def test_an_empty_battery_refuses_it(stands, client, robot, forward) -> No
     assert await client.ask(1100, {"data": True}) == {"success": False}
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_it_is_stopped_midway
 async def test_it_stops_when_the_app_is_lost(
     stands, client, app, door, robot, world, passing, forward, monkeypatch
 ) -> None:

@@ -174,7 +174,7 @@ async def test_unknown_place_fails_the_action(client: httpx.AsyncClient, forward
     assert (await client.post(ACTIONS, json=body)).status_code == 400
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_robot_rides_to_second_floor_and_drives_out
 async def test_into_car_that_others_command_and_out_again(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward, origin: Pose
 ) -> None:

@@ -101,7 +101,7 @@ async def test_docked_robot_stays_if_it_need_not_dock(
     assert robot[DockContact].docked
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_a_bound_dock_that_is_gone_is_reported
 async def test_back_to_landing_point_when_dock_is_gone(
     robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:

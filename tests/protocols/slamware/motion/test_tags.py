@@ -109,7 +109,7 @@ async def test_board_that_the_lidar_knows_by_its_shape(
     assert world.truth.pose_of("a").y == pytest.approx(1.42, abs=0.04)
 
 
-@pytest.mark.slow
+@pytest.mark.slow  # in short: test_up_to_it_and_away_again
 @pytest.mark.world(MARKS, body="hermes")
 async def test_from_a_place_by_its_name(client: httpx.AsyncClient, world: World, forward: Forward) -> None:
     seen_from = Pose(6.8, 2.0, -math.pi / 2).relative_to(world.truth.pose_of("a"))
