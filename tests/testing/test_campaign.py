@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from roboglot.cli import campaign
 from roboglot.testing.campaign.report import interval, report
-from roboglot.testing.campaign.table import OtherCampaign, Row, Table, write_parquet
+from roboglot.testing.campaign.table import OtherCampaign, Row, Table, replacing, write_parquet
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, named, trials_of
 from roboglot.testing.scenarios.files import find
 from tests.programs.playing import children_of
@@ -113,6 +113,21 @@ def test_trials_are_all_tabulated_and_never_played_twice(folder: Path) -> None:
     assert "2 of 2 trials passed" in said
     assert "2 of 2 were played" in (folder / "campaign/report.md").read_text()
     assert [row["seed"] for row in rows(folder) if row["scenario"] == "st\\xe9ys.yaml"] == ["1", "2"]
+
+
+def test_report_that_fills_the_disk_is_deleted(tmp_path: Path) -> None:
+    page = tmp_path / "report.md"
+    page.write_text("before")
+
+    def write() -> None:
+        with replacing(page) as fresh:
+            fresh.write_text("half")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(OSError, match="No space"):
+        write()
+    assert [file.name for file in tmp_path.iterdir()] == ["report.md"]
+    assert page.read_text() == "before"
 
 
 NAMES = (

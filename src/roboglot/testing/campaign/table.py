@@ -143,10 +143,14 @@ def _row(line: Sequence[str]) -> Row:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a place beside ``path`` for a file that replaces it once it is whole."""
+    """Yield a place beside ``path`` for a file that replaces it once it is whole; one that is not is deleted."""
     fresh = path.with_name(f"{path.name}.new")
-    yield fresh
-    fresh.replace(path)
+    try:
+        yield fresh
+        fresh.replace(path)
+    except BaseException:
+        fresh.unlink(missing_ok=True)
+        raise
 
 
 def write_parquet(rows: Sequence[Row], path: Path) -> bool:

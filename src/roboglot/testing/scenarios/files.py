@@ -236,8 +236,20 @@ def _check(scenario: Scenario) -> None:
             value = getattr(part, verb_of(part, verbs))
         except BadScenario as error:
             raise BadScenario(f"{where}: {error}") from None
+        if needed := _lacks(value):
+            raise BadScenario(f"{where}: {needed} is needed: without, nothing is checked")
         for robot in {getattr(part, "robot", ""), getattr(value, "robot", "")} - {"", *scenario.given.robots}:
             raise BadScenario(f"{where}: there is no robot {robot!r}{instead(robot, scenario.given.robots)}")
+
+
+def _lacks(value: object) -> str:
+    """Return what an expectation needs that would hold for any value; "" for others."""
+    match value:
+        case Range(at_least=None, at_most=None):
+            return "at_least or at_most"
+        case Place(x=None, y=None, degrees=None):
+            return "x, y or degrees"
+    return ""
 
 
 def shown_below(path: Path) -> Iterator[Path]:
