@@ -78,9 +78,9 @@ class Control:
             _, _, _, self.serial, name = topic.split("/")
             self.heard.setdefault(name, []).append(json.loads(payload))
 
-    def send(self, name: str, message: dict[str, Any] | bytes, *, wait: bool = True) -> None:
+    def send(self, name: str, message: dict[str, Any] | bytes, *, wait: bool = True, retain: bool = False) -> None:
         data = message if isinstance(message, bytes) else encoded(message)
-        sent = self._client.publish(f"uagv/{self.level}/roboglot/{self.serial}/{name}", data, qos=1)
+        sent = self._client.publish(f"uagv/{self.level}/roboglot/{self.serial}/{name}", data, qos=1, retain=retain)
         if wait:
             sent.wait_for_publish(PATIENCE)
 

@@ -58,6 +58,18 @@ async def test_an_order_of_most_nodes_is_driven(yard: Opened) -> None:
     assert one.control.errors == []
 
 
+async def test_a_retained_order_is_refused(yard: Opened) -> None:
+    """The broker sends it again at each connection, long after fleet control meant it."""
+    first = await yard()
+    await first.close()
+    first.control.send("order", order("kept", [(0, 0), (1, 0)]), retain=True)
+    one = await yard()
+    await one.until(lambda: "VALIDATION_FAILURE" in one.control.errors)
+    assert one.control.state["orderId"] == ""
+    one.control.send("order", order("new", [(0, 0)]))
+    await one.until(lambda: one.control.state["orderId"] == "new")
+
+
 async def test_robot_waits_at_the_decision_point_for_more(yard: Opened) -> None:
     one = await yard()
     one.control.send("order", order("one", [(0, 0), (0.6, 0), (1.2, 0)], released=2))

@@ -16,18 +16,23 @@ from roboglot.wire.vda5050.versions import ErrorKind
 log = logging.getLogger(__name__)
 
 
-async def answer(context: Context, name: str, payload: object) -> None:
-    """Process one message of the topic ``name``."""
+async def answer(context: Context, name: str, payload: object, *, retained: bool = False) -> None:
+    """Process one message of the topic ``name``. ``retained``: the broker kept it, so it may be of any time."""
     data = bytes(payload) if isinstance(payload, bytes | bytearray) else str(payload or "").encode()
     tap, began = context.robot.tap, None
     if tap.watched:
         began = tap.request(DOOR, name, data[:MESSAGE_MAX])
-    rejected = await _refusal(context, name, data)
+    rejected = _retained(name) if retained else await _refusal(context, name, data)
     if rejected is not None:
         context.errors.refuse(rejected)
     if tap.watched:
         status, why = (context.version.error(rejected.kind), str(rejected)) if rejected else ("accepted", "")
         tap.reply(DOOR, name, b"", status, why, began)
+
+
+def _retained(name: str) -> Rejected:
+    """Return the refusal of what the broker sends again at each connection: the robot would drive it each time."""
+    return Rejected(ErrorKind.MALFORMED, f"{name} is refused, as the broker retained it: send it without `retain`")
 
 
 async def _refusal(context: Context, name: str, data: bytes) -> Rejected | None:

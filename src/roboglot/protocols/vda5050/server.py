@@ -151,7 +151,7 @@ class Vda5050Door:
         async for message in self._client.messages:
             await self._turns.take(lambda: any(map(stops, (message, *intake.waiting))))  # noqa: B023 - used at once
             name = str(message.topic).rpartition("/")[2]
-            await self._turns.count(answer(self._context, name, message.payload))
+            await self._turns.count(answer(self._context, name, message.payload, retained=message.retain))
 
     async def _introduce(self, address: str) -> None:
         """Act for the fleet control behind this broker from here on."""
