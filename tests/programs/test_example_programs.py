@@ -197,9 +197,9 @@ CASES = {
 
 @pytest.mark.parametrize(
     "name",
-    [  # one example in five; the others are slow
+    [  # one example in ten; the others are slow
         pytest.param(
-            name, marks=[pytest.mark.world(case.world, body="cyberdog2"), *([pytest.mark.slow] if n % 5 else [])]
+            name, marks=[pytest.mark.world(case.world, body="cyberdog2"), *([pytest.mark.slow] if n % 10 else [])]
         )
         for n, (name, case) in enumerate(CASES.items())
     ],
