@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
+import sqlite3
 from contextlib import nullcontext
 from functools import cached_property
 from pathlib import Path
@@ -193,6 +195,21 @@ def test_looking_for_a_robot_makes_no_registry(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match=r"^roboglot fleet: there is no file .*typo.db$"):
         fleet.where("a", registry=str(tmp_path / "typo.db"))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", [b"", b"no database", "other"])
+def test_file_of_another_program_stays_as_it_is(content: bytes | str, tmp_path: Path) -> None:
+    file = tmp_path / "other.db"
+    if isinstance(content, bytes):
+        file.write_bytes(content)
+    else:
+        with contextlib.closing(sqlite3.connect(file)) as other:
+            other.execute("CREATE TABLE own (value)")
+    before = file.read_bytes()
+    with pytest.raises(SystemExit, match=r"^roboglot fleet: .*other.db is not a registry of robots$"):
+        fleet.where("a", registry=str(file))
+    assert file.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_a_missing_log_is_named(tmp_path: Path) -> None:

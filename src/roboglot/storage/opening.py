@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Collection
+from contextlib import closing
 from pathlib import Path
 
 from roboglot.extras import explained
@@ -18,13 +20,24 @@ def open_registry(where: str) -> Transactions:
 def read_registry(where: str) -> Transactions:
     """Open the registry read-only; on a server, a role that may read the table ``robot_home`` suffices.
 
-    Raises the errors of ``open_database``, and OSError for a missing file.
+    Raises the errors of ``open_database``, and OSError for a file that is missing or no registry.
     """
     if "://" in where:
         return open_database(Path(), where, only_read=True)
     if not Path(where).is_file():
         raise OSError(f"there is no file {where}")
+    if not _has_robots(Path(where)):
+        raise OSError(f"{where} is not a registry of robots")
     return open_database(Path(where))
+
+
+def _has_robots(file: Path) -> bool:
+    """Return whether a file is a registry; one that is not, perhaps another program's, is not changed."""
+    try:
+        with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as found:
+            return bool(found.execute("SELECT 1 FROM sqlite_master WHERE name='robot_home'").fetchall())
+    except sqlite3.Error:
+        return False
 
 
 def open_private(file: Path, schema: str, url: str = "") -> Transactions:
