@@ -47,11 +47,12 @@ async def lived(simulation: Simulation) -> tuple[list[object], int, int]:
 
 @pytest.mark.slow  # compares two worlds; in short: test_robot_at_rest_feels_obstacles
 async def test_skipped_contact_searches_miss_no_contact(simulate: Simulate, monkeypatch: pytest.MonkeyPatch) -> None:
-    simulation = simulate("office", robots=("a", "b"), seed=3)
+    simulation = simulate("office", robots=("a", "b"), seed=3, compiled=False)
+    simulation.world._physics.load_kernels()
     monkeypatch.setattr(FreeMotion, "step", lambda *_: False)  # equals MuJoCo's steps up to rounding only
     sparing, calm, touched = await lived(simulation)
     monkeypatch.setattr(ContactSwitch, "look", lambda *_, **__: None)
-    thorough, always, _ = await lived(simulate("office", robots=("a", "b"), seed=3))
+    thorough, always, _ = await lived(simulate("office", robots=("a", "b"), seed=3, compiled=False))
     assert sparing == thorough
     assert calm > 50
     assert touched > 20
