@@ -106,7 +106,7 @@ async def test_they_refuse_what_no_file_could_say():
 @pytest.mark.parametrize(
     ("people", "message"),
     [
-        ([ANNA, ANNA], "two people have the same name"),
+        ([ANNA, ANNA], "two people have the name anna"),
         ([ANNA | {"script": [{"do": "walk", "to": [40, 5]}]}], "lies outside the floor"),
     ],
 )

@@ -147,7 +147,7 @@ def test_unknown_robots_are_refused(simulate):
     world = simulate().world
     with pytest.raises(NotFound, match="'z'"):
         world.truth.pose_of("z")
-    with pytest.raises(ValueError, match="same name"):
+    with pytest.raises(ValueError, match="two robots have the name a"):
         World(load_world("empty"), [RobotPlacement("a"), RobotPlacement("a")], clock=LockstepClock())
 
 

@@ -84,7 +84,7 @@ async def test_lidar_sees_only_what_rises_above_its_plane(simulate):
         ("terrain = [{ at = [1, 1], profile = [[0, 0]] }]", "must have at least 2 entries"),
         ("terrain = [{ at = [1, 1], profile = [[0, 0], [0, 0.1]] }]", r"terrain\[0\].profile must go on"),
         ("terrain = [{ at = [19, 1], profile = [[0, 0], [1, 1]] }]", r"terrain\[0\].at = .* outside the floor"),
-        ('things = [{ name = "a", at = [1, 1] }, { name = "a", at = [2, 1] }]', "two things have the same name"),
+        ('things = [{ name = "a", at = [1, 1] }, { name = "a", at = [2, 1] }]', "two things have the name a"),
         ('things = [{ name = "a", at = [1, 1], mass = 900 }]', "mass"),
     ],
 )

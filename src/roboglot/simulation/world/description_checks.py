@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import msgspec
@@ -83,16 +84,17 @@ def _count_problems(world: WorldDescription) -> Iterator[str]:
 
 
 def _name_problems(world: WorldDescription) -> Iterator[str]:
-    if _repeats(_things(world)):
-        yield "two things have the same name"
-    if _repeats(_addresses(world)):
-        yield "two gadgets have the same address"
-    if _repeats([person.name for floor in world.floors for person in floor.people if person.name]):
-        yield "two people have the same name"
+    if name := repeated(_things(world)):
+        yield f"two things have the name {name}"
+    if address := repeated(_addresses(world)):
+        yield f"two gadgets have the address {address}"
+    if name := repeated([person.name for floor in world.floors for person in floor.people if person.name]):
+        yield f"two people have the name {name}"
 
 
-def _repeats(names: Sequence[str]) -> bool:
-    return len(set(names)) < len(names)
+def repeated(names: Sequence[str]) -> str:
+    """Return the first name that occurs twice; empty if there is none."""
+    return next((name for name, count in Counter(names).items() if count > 1), "")
 
 
 def _lift_problems(world: WorldDescription) -> Iterator[str]:

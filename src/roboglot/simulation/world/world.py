@@ -45,6 +45,7 @@ from roboglot.simulation.sound.sound import SoundField, Source, Speech
 from roboglot.simulation.sound.voice import hummed
 from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
+from roboglot.simulation.world.description_checks import repeated
 from roboglot.simulation.world.environment import Environment
 from roboglot.simulation.world.lag_monitor import Pace
 from roboglot.simulation.world.placing import Places
@@ -111,8 +112,8 @@ class World:
         self._clock = clock
         self._serials = {robot.name: robot.serial or serial_of(seed, robot.name) for robot in robots}
         bodies = {placement.name: load_body(placement.body) for placement in robots}
-        if len(bodies) < len(robots):
-            raise ValueError("two robots have the same name")
+        if name := repeated([placement.name for placement in robots]):
+            raise ValueError(f"two robots have the name {name}")
         self._physics = Physics(description, bodies)
         self._walkers = keyed([floor.people for floor in description.floors])
         self._crowd = Crowd(self._walkers, self._physics)
