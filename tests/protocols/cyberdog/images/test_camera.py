@@ -248,12 +248,12 @@ async def read_to_end(call: grpc.aio.UnaryStreamCall) -> None:
 async def test_files_nobody_reads_leave_room_for_others(
     client, robot, folder, pems, messages, door, monkeypatch, caplog, leaves
 ) -> None:
-    """gRPC takes some chunks for a client that reads nothing, and then no more."""
+    """gRPC takes up to some 16 MB for a client that reads nothing, and then no more."""
     monkeypatch.setattr(transfers, "HOST_TRANSFERS_MAX", 1)
     monkeypatch.setattr(service, "CHUNK_SECONDS_MAX", 0.05)
     monkeypatch.setattr(service, "WRITE_MAX", 0.05)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "large.jpg").write_bytes(bytes(16_000_000))
+    (folder / "large.jpg").write_bytes(bytes(48_000_000))
     hung = client.fetch(4004, {"file_name": "large.jpg"})
     assert (await hung.read()).error_code == 0
     async with pems.channel(door.port) as channel:
