@@ -91,7 +91,7 @@ async def _take_control(doors: Doors) -> bool:
 @pytest.mark.slow  # in short: test_all_doors_tell_the_same
 @pytest.mark.timeout(600)
 async def test_no_command_succeeds_falsely_beside_another(doors: Doors) -> None:
-    ended = list[ActionChanged]()
+    ended, start = list[ActionChanged](), doors.world.truth.pose_of("a")
     doors.robot.events.listen(ActionChanged, ended.append)
     await doors.say("robot battery ?")
     for pair in itertools.permutations((*COMMANDS, _take_control), 2):
@@ -102,6 +102,7 @@ async def test_no_command_succeeds_falsely_beside_another(doors: Doors) -> None:
                 await asyncio.sleep(0.01)
                 await doors.life.forward(0.1)
         await doors.robot[Lease].release()
+        doors.world.stage.place("a", start)  # it would reach a wall some time
         await doors.forward(2)
         succeeded = {event.action.id for event in ended if event.action.status.name == "SUCCEEDED"}
         assert sum(both.result()) <= len(succeeded), pair

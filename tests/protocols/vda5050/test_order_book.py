@@ -174,6 +174,7 @@ def test_any_valid_order_is_read(made: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow  # ten thousand orders; the test above reads fewer
+@pytest.mark.timeout(900)  # minutes on a slow machine
 @settings(max_examples=10_000)
 @given(valid_orders())
 def test_ten_thousand_valid_orders_are_read(made: dict[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from roboglot.clients.errors import RefusedByRobot
 from roboglot.clients.robomaster.client import RoboMasterClient
 from roboglot.drivers.capabilities import add_if_present
 from roboglot.drivers.robomaster.chapters.ai.ai import RoboMasterVision
@@ -49,6 +50,8 @@ from roboglot.model.components.sensing.vision import Vision
 from roboglot.model.components.system.pwm import PwmPorts
 from roboglot.model.robot import Robot
 
+REFUSED = (RefusedByRobot,)
+
 
 class OptionalComponents:
     """Holds every optional component. ``refreshed`` lists the polls of present components without pushes."""
@@ -84,8 +87,9 @@ class OptionalComponents:
         """Probe every component; return those that are pushed. Raises ClientError if the robot is gone."""
         robot = self._robot
         self.refreshed.clear()
-        attitude = await add_if_present(robot, Imu, self._imu, self._imu.probe())
-        status = await add_if_present(robot, MotionStatus, self._status, self._status.probe())
+        # An EP has both, so an answer that does not come is the link's fault.
+        attitude = await add_if_present(robot, Imu, self._imu, self._imu.probe(), absent=REFUSED)
+        status = await add_if_present(robot, MotionStatus, self._status, self._status.probe(), absent=REFUSED)
         gimbal = await add_if_present(robot, Gimbal, self._gimbal, self._gimbal.probe())
         if await add_if_present(robot, Arm, self._arm, self._arm.refresh()):
             self.refreshed.append(self._arm.refresh)
