@@ -144,6 +144,21 @@ def test_allowed_words_are_named(sent: object, words: str) -> None:
     assert why_invalid(raised.value, wanted=Plan) == words
 
 
+class Inner(msgspec.Struct, forbid_unknown_fields=True):
+    robot: str = ""
+
+
+class Outer(msgspec.Struct, forbid_unknown_fields=True):
+    robots: list[str] = []
+    inner: Inner | None = None
+
+
+def test_near_fields_come_before_distant_homes() -> None:
+    with pytest.raises(msgspec.ValidationError) as raised:
+        msgspec.convert({"inner": {"robots": "a"}}, Outer)
+    assert why_invalid(raised.value, wanted=Outer) == "inner.robots is unknown; did you mean 'robot'?"
+
+
 def test_long_lists_of_words_are_left_out() -> None:
     number = StrEnum("number", [f"n{i}" for i in range(CHOICES_MAX + 1)])  # type: ignore[misc]
     with pytest.raises(msgspec.ValidationError) as raised:

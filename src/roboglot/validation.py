@@ -79,6 +79,8 @@ def _remedy(error: str, wanted: object) -> str:
     if unknown := re.search(r"unknown field `([^`]+)`", error):
         kinds = [kind for kind in _at(wanted, path) if isinstance(kind, inspect.StructType)]
         fields = list(dict.fromkeys(field.encode_name for kind in kinds for field in kind.fields))
+        if near := meant(unknown[1], fields):
+            return near
         if home := _home_of(unknown[1], wanted):
             return f"; it belongs in {home}"
         near = meant(unknown[1], _fields_of(wanted))

@@ -102,7 +102,7 @@ async def test_no_command_succeeds_falsely_beside_another(doors: Doors) -> None:
                 await asyncio.sleep(0.01)
                 await doors.life.forward(0.1)
         await doors.robot[Lease].release()
-        doors.world.stage.place("a", start)  # it would reach a wall some time
+        doors.world.stage.place("a", start)  # else it reaches a wall in the end
         await doors.forward(2)
         succeeded = {event.action.id for event in ended if event.action.status.name == "SUCCEEDED"}
         assert sum(both.result()) <= len(succeeded), pair

@@ -28,6 +28,8 @@ WRONG = {
     "name: x\nwhen: []\nthen: [{travelled: {at_most: .nan}}]\n": ".nan is not a finite number in .* line 3",
     "name: x\nwhen: []\nthen: [{pose: {x: 0, within: .inf}}]\n": ".inf is not a finite number",
     "name: x\nwhen: []\nthen: [{travelled: {}}]\n": "then 1: at_least or at_most is needed",
+    "name: x\nwhen: []\nthen: [{exchanged: {at_least: 0}}]\n": "then 1: at_most, or at_least above 0, is needed",
+    "name: x\nwhen: []\nthen: [{printed: ''}]\n": "then 1: a text is needed",
     "name: x\nwhen: [{until: {pose: {robot: a}}}]\nthen: [{refused: 0}]\n": "until: x, y or degrees is needed",
     "name: x\nwhen: !!int ''\n": "a value does not fit its tag",
     "name: x\nwhen: !!bool maybe\n": "a value does not fit its tag",

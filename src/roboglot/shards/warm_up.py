@@ -73,7 +73,7 @@ def warm() -> None:
             importlib.import_module(f"roboglot.kernels.{name}")
     _rehearse()
     make_initialisers()
-    gc.freeze()  # garbage too: some thousand objects, which a collection would take a tenth of the time to find
+    gc.freeze()  # with the garbage: finding its few thousand objects would take a tenth of the time
     gc.enable()
     refuse_threads()
 

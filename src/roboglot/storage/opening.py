@@ -32,11 +32,13 @@ def read_registry(where: str) -> Transactions:
 
 
 def _has_robots(file: Path) -> bool:
-    """Return whether a file is a registry; one that is not, perhaps another program's, is not changed."""
+    """Return whether a file is a registry; another program's is not changed. Raises OSError if it cannot be read."""
     try:
         with closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as found:
             return bool(found.execute("SELECT 1 FROM sqlite_master WHERE name='robot_home'").fetchall())
-    except sqlite3.Error:
+    except sqlite3.OperationalError as error:
+        raise OSError(f"{file} cannot be read: {error}") from None
+    except sqlite3.DatabaseError:  # it is no database
         return False
 
 

@@ -34,29 +34,6 @@ AT_NODES = frozenset(
         "deleteMap",
     }
 )
-INSTANT = frozenset(
-    {
-        "startPause",
-        "stopPause",
-        "cancelOrder",
-        "stateRequest",
-        "factsheetRequest",
-        "clearInstantActions",
-        "trigger",
-        "retry",
-        "skipRetry",
-        "startHibernation",
-        "stopHibernation",
-        "shutdown",
-        "logReport",
-        "enableMap",
-        "deleteMap",
-        "initPosition",
-        "initializePosition",
-        "startCharging",
-        "stopCharging",
-    }
-)
 # Instant actions that are done at once; at the limit of those under way they help, so they are taken.
 PROMPT = frozenset(
     {
@@ -72,6 +49,17 @@ PROMPT = frozenset(
         "stopHibernation",
     }
 )
+INSTANT = PROMPT | {
+    "startHibernation",
+    "shutdown",
+    "logReport",
+    "enableMap",
+    "deleteMap",
+    "initPosition",
+    "initializePosition",
+    "startCharging",
+    "stopCharging",
+}
 MESSAGES = ("state", "visualization", "connection", "factsheet")
 FIELDS = (
     "order.nodes.nodePosition",

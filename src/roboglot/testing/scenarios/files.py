@@ -249,6 +249,10 @@ def _lacks(value: object) -> str:
             return "at_least or at_most"
         case Place(x=None, y=None, degrees=None):
             return "x, y or degrees"
+        case Exchanged(at_least=0, at_most=None):
+            return "at_most, or at_least above 0,"
+        case "":
+            return "a text"
     return ""
 
 
