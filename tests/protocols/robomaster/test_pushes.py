@@ -6,6 +6,8 @@ from collections.abc import AsyncIterator
 import pytest
 
 from roboglot.model.clock import LockstepClock
+from roboglot.model.components.system.health import Health
+from roboglot.model.components.system.link import Link, LinkState
 from roboglot.protocols.robomaster.pushes import Pushes
 from roboglot.wire.robomaster.replies import FW70
 from tests.protocols.robomaster.text_client import ADDRESS
@@ -91,6 +93,18 @@ async def test_quit_and_disconnect_end_them(client, connect, pushes, forward) ->
     await again.ask("command;")
     await forward(seconds=1)
     assert pushes.texts() == [], "a new session begins without them"
+
+
+async def test_pushes_go_on_after_a_lost_link(client, robot, pushes, forward) -> None:
+    """The first unreadable value ended them for good."""
+    await client.ask("chassis push status on sfreq 10;")
+    link = robot.add(Link, Link("robomaster://ep", robot.clock, robot.events, robot[Health]))
+    link.move_to(LinkState.LOST, "no answer")
+    await forward(seconds=1.001)
+    assert pushes.texts() == [], "the motion of a lost robot is unknown"
+    link.move_to(LinkState.UP)
+    await forward(seconds=1)
+    assert len(pushes.texts()) == 10
 
 
 async def test_two_clients_on_one_host_get_one_datagram(client, connect, pushes, forward) -> None:

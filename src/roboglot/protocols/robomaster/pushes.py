@@ -8,6 +8,7 @@ from dataclasses import field
 from itertools import groupby
 
 from roboglot.model.clock import Clock
+from roboglot.model.errors import RobotError
 from roboglot.values import dataclass
 from roboglot.wire.robomaster.replies import Number, Profile
 
@@ -90,4 +91,13 @@ class Pushes:
             due = [each for each in attributes if each.on and beat // (step := tick // each.rate) > last // step]
             last = beat
             for module, together in groupby(due, key=lambda each: each.module):
-                self.send(self.profile.push(module, *((each.name, each.read()) for each in together)))
+                if values := [(each.name, read) for each in together if (read := _reading(each)) is not None]:
+                    self.send(self.profile.push(module, *values))
+
+
+def _reading(attribute: _Attribute) -> tuple[Number, ...] | None:
+    """Return the attribute's value; None while it is unknown, as when the link to a real robot is lost."""
+    try:
+        return attribute.read()
+    except RobotError:
+        return None
