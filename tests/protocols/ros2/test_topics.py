@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.sensing.camera import Camera
+from roboglot.model.components.sensing.camera import Camera, Frame
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
+from roboglot.model.errors import Unconnected
 from roboglot.protocols.ros2.dispatch import MESSAGE_MAX
 from roboglot.protocols.ros2.server import PASSED_MAX, PENDING_MAX
 from tests.protocols.held_fairness import held
@@ -109,6 +110,24 @@ async def test_topics_come_with_the_robots_values(opened: Opened) -> None:
     picture = peer.heard["/a/image/compressed"][-1]
     assert (picture.format, bytes(picture.data[:2])) == ("jpeg", b"\xff\xd8")
     assert peer.heard["/a/joint_states"][-1].name == ["gimbal_pitch", "gimbal_yaw"]
+
+
+async def test_pictures_go_on_after_a_lost_one(opened: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first picture that a real robot did not send ended the topic for good."""
+    scene = await opened()
+    camera, topic, captures = scene.robot[Camera], "/a/image/compressed", list[float]()
+    capture = camera.capture
+
+    async def silent_once() -> Frame:
+        captures.append(scene.robot.clock.time())
+        if len(captures) == 1:
+            raise Unconnected("the robot sends no pictures")
+        return await capture()
+
+    monkeypatch.setattr(camera, "capture", silent_once)
+    scene.peer.listen(topic, "sensor_msgs/msg/CompressedImage")
+    await scene.peer.until(lambda: scene.peer.heard[topic], 5)
+    assert len(captures) > 1
 
 
 async def test_pictures_come_once_there_is_a_camera(opened: Opened) -> None:

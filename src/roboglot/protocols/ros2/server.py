@@ -18,6 +18,7 @@ from roboglot.model.client_context import set_client
 from roboglot.model.components.motion.gimbal import Gimbal
 from roboglot.model.components.sensing.camera import Camera
 from roboglot.model.components.system.link import is_current
+from roboglot.model.errors import RobotError
 from roboglot.model.robot import Robot
 from roboglot.protocols.door import Endpoint
 from roboglot.protocols.ros2.config import Ros2Config
@@ -245,7 +246,11 @@ class Ros2Door:
             if publisher is None:
                 self._declare(topic, "sensor_msgs/msg/CompressedImage", kept=False)
                 continue
-            frame = await self._robot[Camera].capture()
+            try:
+                frame = await self._robot[Camera].capture()
+            except RobotError as error:  # a real robot's camera is silent while its link is lost
+                self._log_limiter.info("camera", "robot %s: no picture for ROS: %s", self._robot.id, error)
+                continue
             picture = await beside(partial(jpeg, frame, JPEG_QUALITY))
             self._publish(self._words.picture(self._now(), f"{self._robot.id}/camera", picture), "image/compressed")
 
