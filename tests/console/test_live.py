@@ -7,6 +7,7 @@ import json
 from types import SimpleNamespace
 from typing import cast
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from websockets.asyncio.client import ClientConnection, connect
@@ -14,6 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from roboglot.console.live import Page
 from roboglot.console.server import those_due
 from roboglot.console.settings import BEAT_PAGES, OTHERS_BEATS, REQUESTS_MAX
+from roboglot.model.components.mapping.mapping import Mapping
 from roboglot.model.components.system.lease import Lease
 from tests.console.conftest import ServedConsole
 
@@ -69,6 +71,23 @@ async def test_two_pages_contend_for_control(served: ServedConsole) -> None:
         assert await done(ben, "release_control") == ""
         assert await done(anna, "go_to", points=[[1, 0]]) == ""
         assert len(served.robot.actions.running()) == 1
+
+
+async def test_crashed_commands_are_answered(
+    served: ServedConsole, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A page waited for the answer for ever, and no log line named the command."""
+
+    def crash(_: object) -> None:
+        raise RuntimeError("no such bytes")
+
+    monkeypatch.setattr(type(served.robot[Mapping]), "clear", crash)
+    async with connect(served.url.replace("http", "ws") + "/live") as page, asyncio.timeout(60):
+        await page.send(json.dumps({"type": "do", "id": 7, "robot": "a", "verb": "clear_map"}))
+        while isinstance(text := await page.recv(), bytes) or (answer := json.loads(text))["type"] != "done":
+            pass
+    assert answer == {"type": "done", "id": 7, "error": "internal error: no such bytes"}
+    assert "clear_map crashed" in caplog.text
 
 
 async def test_waiting_stops_leave_room_for_the_clock(served: ServedConsole) -> None:

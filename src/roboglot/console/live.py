@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import logging
 import time
 from collections.abc import Awaitable, Callable, Mapping
 
@@ -31,6 +32,7 @@ from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Right
 from roboglot.transport.limiter import Limiter
 
+log = logging.getLogger(__name__)
 Send = Callable[[str | bytes], Awaitable[None]]
 _numbers = itertools.count(1)
 
@@ -277,6 +279,9 @@ class Page:
                 answer["result"] = await self._desk.change_world(request.verb, request.values)
         except (RobotError, BadParameters, ValueError) as error:
             answer["error"] = str(error) or type(error).__name__
+        except Exception as error:  # the page waits for its answer
+            log.exception("console: %s crashed", request.verb)
+            answer["error"] = f"internal error: {error}"
         self._reply(answer)
 
     def _reply(self, message: dict[str, object]) -> None:

@@ -253,6 +253,9 @@ class Session:
             await self._do(message)
         except (RobotError, ProgramError, ValueError) as error:
             self.post({"type": "refused", "id": _named(message), "why": str(error)})
+        except Exception as error:  # the page waits for its answer
+            log.exception("studio: %s crashed", type(message).__name__)
+            self.post({"type": "refused", "id": _named(message), "why": f"internal error: {error}"})
 
     async def _do(self, message: Message) -> None:
         if isinstance(message, Member):
