@@ -89,6 +89,7 @@ async def test_one_robot_is_driven_mapped_and_refused(served: ServedConsole) -> 
         ("/api/robots/a/go_to", [1], 400, "not a JSON object"),
         ("/api/robots/a/go_to", {"points": [[9000, 9000]]}, 400, "not a place on this map: (9000, 9000)"),
         ("/api/robots/a/cancel", {"action": 999}, 404, "no action 999"),
+        ("/api/robots/a/pause", {"action": accepted["result"]["action"]}, 409, "navigate to has ended"),
         ("/api/world/inject_fault", {"kind": "low_batery"}, 400, "low_battery"),
         ("/api/world/inject_fault", {"kind": "low_battery", "options": {"charge": "much"}}, 400, "low_battery"),
         ("/api/world/move_thing", {"thing": "x", "x": 0, "y": 0}, 400, "no thing"),

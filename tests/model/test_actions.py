@@ -9,7 +9,7 @@ import pytest
 
 from roboglot.model.actions import HISTORY_MAX, Action, Actions, ActionStatus
 from roboglot.model.clock import LockstepClock
-from roboglot.model.errors import NotFound, Unreachable
+from roboglot.model.errors import NotFound, Refused, Unreachable
 from roboglot.model.events import ActionChanged, EventStream
 
 
@@ -118,7 +118,7 @@ async def test_paused_it_brakes_and_waits(actions: Actions, clock: LockstepClock
             steps.append((step, clock.time()))
             await clock.sleep(1)
 
-    action = actions.start("walk", run, resources=["base"])
+    action = actions.start("walk", run, resources=["base"], pausable=True)
     await clock.advance(0.5)
     action.pause()
     await clock.advance(9.5)
@@ -133,12 +133,22 @@ async def test_paused_it_can_be_cancelled(actions: Actions, clock: LockstepClock
     async def run(action: Action) -> None:
         await action.hold(lambda: None)
 
-    action = actions.start("walk", run, resources=["base"])
+    action = actions.start("walk", run, resources=["base"], pausable=True)
     action.pause()
     await clock.advance(1)
     action.cancel()
     assert await action.done() is ActionStatus.CANCELED
     assert not action.paused
+
+
+async def test_unpausable_action_refuses_a_pause(actions: Actions, clock: LockstepClock) -> None:
+    """It was shown as paused while it went on."""
+    action = actions.start("say", lambda _: clock.sleep(2), resources=["speaker"])
+    with pytest.raises(Refused, match="say cannot be paused"):
+        action.pause()
+    assert not action.paused
+    await clock.advance(3)
+    assert action.status is ActionStatus.SUCCEEDED
 
 
 async def test_only_a_clients_own_actions_end_with_it(actions: Actions) -> None:

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from roboglot.model.client_context import client, connection, identity
 from roboglot.model.clock import Clock
-from roboglot.model.errors import Busy, RobotError
+from roboglot.model.errors import Busy, Refused, RobotError
 
 
 class ActionStatus(IntEnum):
@@ -44,7 +44,15 @@ class Action:
     """One goal in progress or ended. Created by ``Actions.start``."""
 
     def __init__(
-        self, owner: Announcer, id: int, name: str, goal: object, resources: frozenset[str], source: str
+        self,
+        owner: Announcer,
+        id: int,
+        name: str,
+        goal: object,
+        resources: frozenset[str],
+        source: str,
+        *,
+        pausable: bool = False,
     ) -> None:
         self.id = id
         self.name = name
@@ -57,6 +65,7 @@ class Action:
         self.status = ActionStatus.ACCEPTED
         self.feedback: object = None
         self.error: RobotError | None = None
+        self.pausable = pausable  # its code stands still in ``hold`` while it is paused
         self.paused = False
         self.hands_over = False  # the next action continues this motion: no stop in between
         self.brakes_hard = False  # cancelled because its client is gone: brake as fast as possible
@@ -110,7 +119,9 @@ class Action:
             self._task.cancel()
 
     def pause(self) -> None:
-        """Hold where it is until ``resume``."""
+        """Hold where it is until ``resume``; no effect if it has ended. Raises Refused if it cannot stand still."""
+        if not self.pausable:
+            raise Refused(f"{self.name} cannot be paused, only cancelled")
         if not self.status.ended and not self.paused:
             self.paused = True
             self._going_on.clear()

@@ -46,14 +46,16 @@ class Actions:
         goal: object = None,
         source: str = "",
         after: Action | None = None,
+        pausable: bool = False,
     ) -> Action:
         """Accept a goal and execute ``run(action)`` once its resources are free.
 
         ``run`` ends by returning (SUCCEEDED), raising RobotError (ABORTED) or being cancelled (CANCELED); it must leave
         the hardware at rest in every case. Holders of the resources are cancelled first, except ``after``, which may
-        finish before this action begins (standing up, then driving).
+        finish before this action begins (standing up, then driving). ``pausable``: ``run`` looks at ``action.hold``, so
+        that a pause stops the robot; all other actions refuse one.
         """
-        action = Action(self, next(self._ids), name, goal, frozenset(resources), source)
+        action = Action(self, next(self._ids), name, goal, frozenset(resources), source, pausable=pausable)
         for admit in self._guards:
             admit(action)
         rivals = [o for o in self._running.values() if o.resources & action.resources and o is not after]

@@ -180,6 +180,21 @@ async def test_it_navigates_and_reports_map_and_pose(driven: Robot, robot: Robot
         driven[Localization].relocalize(may_move=True)
 
 
+async def test_a_paused_dog_stands_until_resumed(driven: Robot, robot: Robot, until: Until) -> None:
+    """It walked on, reported as paused: its own tasks know no pause."""
+    action = driven[Navigation].navigate_to([Point(1.5, 0.0)], NavigationOptions(), source="test")
+    await until(lambda: robot[Base].velocity.x > 0.1)
+    action.pause()
+    await until(lambda: not robot.actions.running(BASE))
+    held = robot[Localization].pose
+    await until(lambda: driven[Link].age("pose") < 0.1)
+    assert (action.status, action.paused) == (ActionStatus.EXECUTING, True)
+    assert robot[Localization].pose.distance_to(held) < 0.05
+    action.resume()
+    await done(action, until)
+    assert robot[Localization].pose.x == pytest.approx(1.5, abs=0.15)
+
+
 async def test_own_skills_keep_no_lower_limit(driven: Robot, robot: Robot, until: Until) -> None:
     """The dog's requests have no field for a speed."""
     limits = SpeedLimits(driven)

@@ -222,6 +222,22 @@ async def test_navigation_fails_in_model_words_stops_when_cancelled(
     assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
+async def test_a_paused_joystick_stands(driven: Robot, world: World, forward: Forward) -> None:
+    """It drove on, reported as paused, and its next frame was obeyed, too."""
+    driving = driven[Driving]
+    action = driving.drive(Twist(0.3), lifetime=60.0, source="test")
+    await forward(seconds=2)
+    action.pause()
+    await forward(seconds=2)
+    before = world.truth.pose_of("a")
+    assert driving.drive(Twist(0.2), lifetime=60.0, source="test") is action
+    await forward(seconds=2)
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
+    action.resume()
+    await forward(seconds=2)
+    assert world.truth.pose_of("a").distance_to(before) > 0.1
+
+
 @pytest.mark.slow  # in short: test_it_navigates_by_the_robots_own_skill
 async def test_a_paused_way_goes_on(driven: Robot, world: World, forward: Forward) -> None:
     action = driven[Navigation].navigate_to([Point(1.5, 0.0)], NavigationOptions(), source="test")

@@ -9,7 +9,7 @@ import pytest
 
 from roboglot.autonomy.slam.localization import LidarLocalization
 from roboglot.model.components.mapping.localization import Localization
-from roboglot.model.components.motion.driving import Driving
+from roboglot.model.components.motion.driving import BASE, Driving
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import PERSON, Lease
@@ -251,6 +251,20 @@ async def test_an_order_whose_driving_breaks_is_reported(yard: Opened, monkeypat
     one.control.send("order", order("one", [(0, 0), (0.5, 0)]))
     await one.until(lambda: one.control.errors == ["NODE_UNREACHABLE"])
     assert one.control.state["errors"][0]["errorLevel"] == "CRITICAL"
+
+
+async def test_unpausable_motion_fails_the_pause(yard: Opened) -> None:
+    """A robot whose skill cannot be paused drove on, reported as paused."""
+    one = await yard()
+    one.control.send("order", order("one", [(0, 0), (3, 0)]))
+    await one.until(lambda: one.control.state["driving"])
+    (driving,) = one.robot.actions.running(BASE)
+    driving.pausable = False
+    one.control.send("instantActions", instant(action("startPause", "p", "NONE")))
+    await one.until(lambda: status(one, "p") == "FAILED")
+    assert one.control.state["paused"] is False
+    driving.cancel()
+    await one.until(lambda: not one.control.state["driving"])
 
 
 @pytest.mark.slow  # in short: test_pause_holds_and_cancel_ends

@@ -26,7 +26,7 @@ STANDSTILL_YAW_RATE = 0.03  # rad/s
 def start_on_base(
     robot: Robot, name: str, run: Callable[[Action], Awaitable[None]], *, goal: object, source: str
 ) -> Action:
-    """Start ``run(action)`` holding the base; a lying robot stands up first.
+    """Start ``run(action)``, which can be paused, holding the base; a lying robot stands up first.
 
     Raises EmergencyStopped while the legs are limp.
     """
@@ -42,7 +42,9 @@ def start_on_base(
         async with braking_at_the_end(robot, action):
             await run(action)
 
-    return robot.actions.start(name, stand_then_run, resources={BASE}, goal=goal, source=source, after=rising)
+    return robot.actions.start(
+        name, stand_then_run, resources={BASE}, goal=goal, source=source, after=rising, pausable=True
+    )
 
 
 @asynccontextmanager

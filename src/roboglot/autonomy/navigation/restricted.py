@@ -80,7 +80,7 @@ class RestrictedAreas:
     def _hold(self, name: str) -> None:
         """Pause the driving action, unless it is manual or paused already."""
         for action in self._robot.actions.running(BASE):
-            if action.name not in MANUAL and not action.paused:
+            if action.name not in MANUAL and action.pausable and not action.paused:
                 action.pause()
                 self._held = action, name
 

@@ -24,7 +24,7 @@ from roboglot.model.components.motion.legs import Legs
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
 from roboglot.model.components.system.health import Health
 from roboglot.model.components.system.lease import Lease, moves
-from roboglot.model.errors import InvalidGoal
+from roboglot.model.errors import InvalidGoal, Refused
 from roboglot.model.geometry import Point, Twist
 from roboglot.model.robot import Robot
 from roboglot.operations import OperationTable, Right
@@ -106,14 +106,22 @@ async def cancel(robot: Robot, *, action: int) -> None:
 
 @VERBS.on("pause")
 async def pause(robot: Robot, *, action: int) -> None:
-    """Hold an action where it is."""
-    robot.actions.get(action).pause()
+    """Hold an action where it is, if it is under way and can stand still."""
+    _under_way(robot, action).pause()
 
 
 @VERBS.on("resume")
 async def resume(robot: Robot, *, action: int) -> None:
     """Go on with a paused action."""
-    robot.actions.get(action).resume()
+    _under_way(robot, action).resume()
+
+
+def _under_way(robot: Robot, id: int) -> Action:
+    """Return a running action. Raises NotFound, Refused if it has ended."""
+    action = robot.actions.get(id)
+    if action.status.ended:
+        raise Refused(f"{action.name} has ended")
+    return action
 
 
 @VERBS.on("emergency_stop", needs=(EmergencyStop,))

@@ -66,11 +66,15 @@ class Session:
         self._end_watch: Callable[[], None] = _nothing  # of actions that begin during a pause
 
     def pause(self) -> None:
-        """Pause the program's actions and waits, and actions that a call with several begins during the pause."""
+        """Pause the program's actions and waits, and actions that a call with several begins during the pause.
+
+        An action that cannot be paused, such as an announcement, goes on to its end.
+        """
         self._going_on.clear()
         self._paused.set()
         for action in self._actions():
-            action.pause()
+            if action.pausable:
+                action.pause()
         self._end_watch()
         self._end_watch = self.robot.events.listen(ActionChanged, self._pause_new)
 
@@ -131,8 +135,9 @@ class Session:
         await action.done()
 
     def _pause_new(self, event: ActionChanged) -> None:
-        if event.action.source == self.source and event.action.status is ActionStatus.ACCEPTED:
-            event.action.pause()
+        action = event.action
+        if action.source == self.source and action.status is ActionStatus.ACCEPTED and action.pausable:
+            action.pause()
 
     def _actions(self) -> list[Action]:
         return [action for action in self.robot.actions.running() if action.source == self.source]

@@ -182,10 +182,10 @@ class Context:
         return bool(nodes) and sum(node.released for node in nodes) <= 1 and not nodes[-1].released
 
     def pause(self, on: bool) -> None:
-        """Pause or continue all motion."""
-        self.paused = on
+        """Pause or continue all motion. Raises Refused if the robot moves in a way that cannot be paused."""
         self._route.pause(on)
         self.performer.pause(on)
+        self.paused = on
         self.touch()
 
     async def cancel_order(self, order_id: str) -> None:

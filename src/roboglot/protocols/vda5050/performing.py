@@ -7,6 +7,7 @@ import logging
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Protocol
 
+from roboglot.model.components.motion.driving import BASE
 from roboglot.model.errors import RobotError
 from roboglot.operations import BadParameters, Operation
 from roboglot.protocols.vda5050.error_book import ErrorBook
@@ -48,23 +49,16 @@ class Performer:
         self._paused = False
 
     def pause(self, on: bool) -> None:
-        """Pause or continue what the robot does."""
-        self._paused = on
+        """Pause or continue what the robot does. Raises Refused if it moves and cannot stand still."""
         for part, state in self._parts.items():
-            self._hold(part, state)
-
-    def _hold(self, part: RobotAction, state: ActionState) -> None:
-        state.status = ActionStatus.PAUSED if self._paused else ActionStatus.RUNNING
-        if self._paused:
-            part.pause()
-        else:
-            part.resume()
+            _hold(part, state, on)
+        self._paused = on
 
     async def carry_out(self, part: RobotAction) -> None:
         """Wait until the robot's part of an action has succeeded, paused with the order; cancelled if the wait is."""
         state = self._parts[part] = _DOING.get()
-        self._hold(part, state)
         try:
+            _hold(part, state, self._paused)
             await part.succeeded()
         finally:
             del self._parts[part]
@@ -131,3 +125,13 @@ class Performer:
             context.errors.report(ErrorKind.ACTION_FAILED, Level.WARNING, why, {"actionId": action.action_id})
         finally:
             context.touch()
+
+
+def _hold(part: RobotAction, state: ActionState, on: bool) -> None:
+    """Pause or continue a part; one that cannot be paused goes on, as long as it does not drive. Raises Refused."""
+    if on and (part.pausable or BASE in part.resources):
+        part.pause()
+        state.status = ActionStatus.PAUSED
+    else:
+        part.resume()
+        state.status = ActionStatus.RUNNING

@@ -84,7 +84,7 @@ class Route:
             self._task = asyncio.get_running_loop().create_task(self._guarded(None))
 
     def pause(self, on: bool) -> None:
-        """Pause in place, or continue."""
+        """Pause in place, or continue. Raises Refused."""
         if not on:
             self._more.set()
         if self._driving is not None:

@@ -22,7 +22,7 @@ async def at_once(_: Action) -> None:
 
 
 async def test_a_life(bare: Robot, bare_client: httpx.AsyncClient, forward: Forward) -> None:
-    action = bare.actions.start("navigate", for_ever, resources={BASE})
+    action = bare.actions.start("navigate", for_ever, resources={BASE}, pausable=True)
     await forward(seconds=1)
     current = (await bare_client.get(f"{ACTIONS}/:current")).json()
     assert current == {

@@ -9,6 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
+from roboglot.model.actions import ActionStatus
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.jack import Jack, JackStage
 from roboglot.model.components.mapping.localization import Localization
@@ -18,6 +19,7 @@ from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
+from roboglot.protocols.slamware.chapters.motion.errands import PART, Errand, run_errand
 from roboglot.simulation.world.world import World
 from roboglot.testing import Forward, assert_pose
 
@@ -55,6 +57,24 @@ async def test_errand_that_waits_ends_with_its_map(client: httpx.AsyncClient, fo
     assert (await client.delete("/api/core/slam/v1/maps")).status_code == 200
     ended = await finish(client, forward, id, within=30.0)
     assert (ended["result"], ended["reason"]) == (-1, "CANNOT_REACH_TARGET")
+
+
+async def test_errand_paused_between_parts_stays_paused(robot: Robot, forward: Forward) -> None:
+    """The next part drove off."""
+
+    async def work(errand: Errand) -> None:
+        await robot.clock.sleep(2.0)
+        await errand.do(robot[Driving].move_by(Pose(0.5), source=PART))
+
+    action = run_errand(robot, "wait, then drive", work)
+    await forward(seconds=1)
+    action.pause()
+    await forward(seconds=4)
+    assert action.paused
+    assert robot[Localization].pose.distance_to(Pose()) < 0.02
+    action.resume()
+    await forward(seconds=5)
+    assert action.status is ActionStatus.SUCCEEDED
 
 
 async def test_going_home_without_docking_ends_at_landing_point(

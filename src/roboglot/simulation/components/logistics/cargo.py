@@ -112,7 +112,9 @@ class SimulatedCargo(Cargo):
             await self._move(box, direction, action)
 
         name = "open box" if direction > 0 else "close box"
-        return self._robot.actions.start(name, run, resources={f"{BOX}{box.id}"}, goal=box.id, source=source)
+        return self._robot.actions.start(
+            name, run, resources={f"{BOX}{box.id}"}, goal=box.id, source=source, pausable=True
+        )
 
     async def _move(self, box: _Box, direction: int, action: Action) -> None:
         """Move the door to its end; at any end of the action, stop the door. Raises Blocked."""

@@ -101,7 +101,7 @@ class SimulatedJack(Jack):
         async def run(action: Action) -> None:
             await self._move(action, direction)
 
-        return self._robot.actions.start(name, run, resources={JACK}, source=source)
+        return self._robot.actions.start(name, run, resources={JACK}, source=source, pausable=True)
 
     async def _move(self, action: Action, direction: int) -> None:
         end = self.stroke if direction > 0 else 0.0

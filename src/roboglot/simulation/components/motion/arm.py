@@ -89,7 +89,7 @@ class SimulatedArm(Arm):
 
             await move(action, self._robot.clock, begin, lambda: self._way.position == self._length, self._halt)
 
-        return self._robot.actions.start(name, run, resources={ARM}, goal=goal, source=source)
+        return self._robot.actions.start(name, run, resources={ARM}, goal=goal, source=source, pausable=True)
 
     def _halt(self) -> None:
         self.moving.end()

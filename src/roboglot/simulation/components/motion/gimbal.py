@@ -173,7 +173,7 @@ class SimulatedGimbal(Gimbal):
     def _start(self, name: str, run: Callable[[Action], Awaitable[None]], goal: GimbalAngles, source: str) -> Action:
         if self.axes.suspended:
             raise Refused("the gimbal is suspended")
-        return self._robot.actions.start(name, run, resources={GIMBAL}, goal=goal, source=source)
+        return self._robot.actions.start(name, run, resources={GIMBAL}, goal=goal, source=source, pausable=True)
 
     def _top(self, speed: float | None) -> float:
         if speed is None:

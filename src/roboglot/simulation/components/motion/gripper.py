@@ -85,7 +85,7 @@ class SimulatedGripper(Gripper):
 
             await move(action, self._robot.clock, begin, lambda: self._goal is None, self._halt)
 
-        return self._robot.actions.start(name, run, resources={GRIPPER}, goal=goal, source=source)
+        return self._robot.actions.start(name, run, resources={GRIPPER}, goal=goal, source=source, pausable=True)
 
     def _halt(self) -> None:
         self._goal = None

@@ -146,7 +146,9 @@ class SimulatedLegs(Legs):
 
     def _start(self, name: str, run: Callable[[Action], Awaitable[None]], there: bool, goal: object, by: str) -> Action:
         # A body already in that posture does not interrupt a drive.
-        return self._robot.actions.start(name, run, resources=[LEGS] if there else [LEGS, BASE], goal=goal, source=by)
+        return self._robot.actions.start(
+            name, run, resources=[LEGS] if there else [LEGS, BASE], goal=goal, source=by, pausable=True
+        )
 
     async def _move(self, action: Action, wanted: Posture, height: float, duration: float) -> None:
         """Brake, then move the torso to ``height`` (m) in ``duration`` (s); if cancelled, it stays between postures."""
@@ -204,7 +206,9 @@ class SimulatedLegs(Legs):
             goal = Body(held.height if body.height is None else body.height, body.attitude, body.shift)
             await self._follow(action, Track(held, goal, max(duration, held.turn_to(goal) / 4.0)))
 
-        return self._robot.actions.start("hold the body", run, resources=[LEGS], goal=body, source=source)
+        return self._robot.actions.start(
+            "hold the body", run, resources=[LEGS], goal=body, source=source, pausable=True
+        )
 
     def walk(self, gait: Gait | None, lift: FootLift | None = None) -> None:
         lift = lift or FootLift()
@@ -225,7 +229,7 @@ class SimulatedLegs(Legs):
             self._check_ready(spec.before)
             await self._play(action, motion, lambda: motion_frames(spec, self._torso.body, self._stance), spec)
 
-        return self._robot.actions.start(motion, run, resources=[LEGS, BASE], goal=motion, source=source)
+        return self._robot.actions.start(motion, run, resources=[LEGS, BASE], goal=motion, source=source, pausable=True)
 
     def dance(self, steps: Sequence[Step], footfalls: Sequence[Footfall] = (), *, source: str = "") -> Action:
         check_steps(steps, footfalls, self.limits, self._base.limits.twist)
@@ -236,7 +240,9 @@ class SimulatedLegs(Legs):
             self._check_ready(frozenset({Posture.STANDING}))
             await self._play(action, None, lambda: dance_frames(steps, self._torso.body, self._stance, falls), None)
 
-        return self._robot.actions.start("dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source)
+        return self._robot.actions.start(
+            "dance", run, resources=[LEGS, BASE], goal=tuple(steps), source=source, pausable=True
+        )
 
     def _check_ready(self, before: frozenset[Posture]) -> None:
         check_posture(self._posture, before, self.off)

@@ -61,7 +61,9 @@ class SimulatedServos(Servos):
             await move(action, self._robot.clock, begin, lambda: axis.position == goal, lambda: self._halt(index))
 
         resources = {servo_resource(number)}
-        return self._robot.actions.start("move servo", run, resources=resources, goal=angle, source=source)
+        return self._robot.actions.start(
+            "move servo", run, resources=resources, goal=angle, source=source, pausable=True
+        )
 
     def set_speed(self, number: int, speed: float, *, source: str = "") -> Action:
         index = self._index(number)
@@ -83,7 +85,9 @@ class SimulatedServos(Servos):
             await move(action, self._robot.clock, lambda: None, turn, lambda: self._halt(index))
 
         resources = {servo_resource(number)}
-        started = self._robot.actions.start("turn servo", run, resources=resources, goal=cut, source=source)
+        started = self._robot.actions.start(
+            "turn servo", run, resources=resources, goal=cut, source=source, pausable=True
+        )
         self._turning[index] = started
         return started
 

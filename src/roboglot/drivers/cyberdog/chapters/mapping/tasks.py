@@ -37,15 +37,16 @@ class Skills:
         self._orphan: TaskType | None = None  # still running since the link was lost
 
     def start(self, name: str, begins: Sequence[Begin], *, goal: object, source: str, resource: str = BASE) -> Action:
-        """Start an action that runs one task after the other."""
+        """Start an action that runs one task after the other; the dog knows no pause, so a paused task begins again."""
 
         async def run(action: Action) -> None:
             for begin in begins:
                 with robot_errors():
-                    await self._follow(action, await begin())
+                    while not await self._follow(action, await begin()):
+                        await action.hold(_stand)
 
         if resource == BASE:
-            return self.start_moving(name, run, goal, source)
+            return self.start_moving(name, run, goal, source, pausable=True)
         self.link.require_free()
         return self.robot.actions.start(name, run, resources={resource}, goal=goal, source=source)
 
@@ -65,7 +66,7 @@ class Skills:
 
         return self.start_moving(name, run, goal, source)
 
-    def start_moving(self, name: str, run: Run, goal: object, source: str) -> Action:
+    def start_moving(self, name: str, run: Run, goal: object, source: str, *, pausable: bool = False) -> Action:
         """Start an action by which the dog moves itself. Raises Refused if it is to be slower than it then is."""
         self.link.require_free()
         base = self.robot[Base]
@@ -80,7 +81,7 @@ class Skills:
             finally:
                 self.moving -= 1
 
-        return self.robot.actions.start(name, counted, resources={BASE}, goal=goal, source=source)
+        return self.robot.actions.start(name, counted, resources={BASE}, goal=goal, source=source, pausable=pausable)
 
     @property
     def localized(self) -> bool:
@@ -121,11 +122,15 @@ class Skills:
         except ClientError as error:
             log.info("%s is not localized: %s", self.link.address, error)
 
-    async def _follow(self, action: Action, task: RunningTask, then: Afterwards | None = None) -> None:
+    async def _follow(self, action: Action, task: RunningTask, then: Afterwards | None = None) -> bool:
+        """Follow the task; return True when it has succeeded, False when it was stopped for a pause."""
         try:
             if then:
                 await then(task)
             while not task.ended:
+                if action.paused:
+                    await self._stop(task)
+                    return False
                 self.link.require()
                 remaining = self.reported.path
                 action.report(
@@ -138,6 +143,7 @@ class Skills:
                 )
                 await self.robot.clock.sleep(PERIOD)
             await task.succeeded()
+            return True
         except BaseException:
             if task.result is None:
                 await self._stop(task)
@@ -150,3 +156,7 @@ class Skills:
         except (ClientError, Unconnected):  # without a link the task continues until the link is back
             task.leave()
             self._orphan = task.kind
+
+
+def _stand() -> None:
+    """Do nothing: the dog stands once its task has been stopped."""

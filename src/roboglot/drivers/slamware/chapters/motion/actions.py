@@ -102,7 +102,7 @@ class ActionRunner:
             finally:
                 self.moving -= BASE in held
 
-        return self._robot.actions.start(name, run, resources=held, goal=goal, source=source)
+        return self._robot.actions.start(name, run, resources=held, goal=goal, source=source, pausable=True)
 
     async def _follow(self, action: Action, running: RunningAction, feedback: Feedback) -> bool:
         """Follow the action; return True when it has ended, False when it is paused."""

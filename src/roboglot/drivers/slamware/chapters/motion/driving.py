@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 
 from roboglot.drivers.slamware.chapters.motion.base import SlamwareBase
 from roboglot.drivers.slamware.state import ReportedState
@@ -58,13 +58,17 @@ class SlamwareDriving(Driving):
         if action and action.may_go_on(source):
             self._command.velocity, self._command.until = command, until
             action.goal = command
-            self._base.set_velocity(command)
+            if not action.paused:
+                self._base.set_velocity(command)
             return action
         wanted = self._command = _Command(command, until)
 
-        async def keep(_: Action) -> None:
+        async def keep(action: Action) -> None:
             try:
                 while (left := wanted.until - self._robot.clock.time()) > 1e-9:
+                    if action.paused:
+                        await self._hold_at_most(action, left)
+                        continue
                     self._base.set_velocity(wanted.velocity)
                     await self._robot.clock.sleep(min(PERIOD, left))
                     self._check()
@@ -103,7 +107,7 @@ class SlamwareDriving(Driving):
                 with robot_errors():
                     await run(action)
 
-        return self._robot.actions.start(name, braked, resources={BASE}, goal=goal, source=source)
+        return self._robot.actions.start(name, braked, resources={BASE}, goal=goal, source=source, pausable=True)
 
     @asynccontextmanager
     async def _braking(self) -> AsyncIterator[None]:
@@ -186,6 +190,11 @@ class SlamwareDriving(Driving):
             if abs(angle - turned) <= GOOD_YAW + SLOW_YAW * self._reported.latency:
                 return
         raise Blocked(f"cannot settle: {math.degrees(angle - turned):.1f} degrees off")
+
+    async def _hold_at_most(self, action: Action, seconds: float) -> None:
+        """Pause for at most ``seconds``, the rest of the command's lifetime."""
+        with suppress(TimeoutError):
+            await self._robot.clock.wait_for(action.hold(lambda: self._base.set_velocity(STILL)), seconds)
 
     async def _hold(self, action: Action, twist: Twist) -> None:
         if not await action.hold(lambda: self._base.set_velocity(STILL)):

@@ -29,9 +29,15 @@ class Errand:
     async def do(self, part: Action, *, within: float | None = None) -> None:
         """Wait for ``part``, report it as the errand's progress, and raise its error.
 
-        After ``within`` s it is cancelled, with Expired. If another client cancels it, so is the errand.
+        The errand can be paused as long as its part can, and a part that begins during a pause is paused, too. After
+        ``within`` s the part is cancelled, with Expired. If another client cancels it, so is the errand.
         """
         self._action.report(part)
+        self._action.pausable = part.pausable
+        if not part.pausable:
+            self._action.resume()  # the pause of an earlier part cannot last
+        elif self._action.paused:
+            part.pause()
         stop = self.robot.events.listen(ActionChanged, lambda event: self._pass_on(event, part))
         try:
             if within is None:
@@ -49,6 +55,7 @@ class Errand:
             raise
         finally:
             stop()
+            self._action.pausable = True  # what comes between two parts stands still
         if part.status is ActionStatus.CANCELED:
             self._action.cancel(part.reason)
             raise asyncio.CancelledError
@@ -69,7 +76,7 @@ def run_errand(
     async def run(action: Action) -> None:
         await work(Errand(robot, action))
 
-    return robot.actions.start(name, run, resources={ERRAND}, goal=goal, source=source)
+    return robot.actions.start(name, run, resources={ERRAND}, goal=goal, source=source, pausable=True)
 
 
 def part_of(action: Action) -> Action:
