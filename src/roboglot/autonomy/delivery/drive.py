@@ -10,15 +10,19 @@ from roboglot.autonomy.navigation.context import SPEED_MAX
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.delivery import Failure, Policy
+from roboglot.model.components.mapping.annotations import LineKind, MapAnnotations
+from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.map_memory import settle
 from roboglot.model.components.mapping.storeys import StoreyPlace, Storeys
+from roboglot.model.components.mapping.track_graph import through_tracks
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import BASE
 from roboglot.model.components.motion.emergency_stop import EmergencyStop
-from roboglot.model.components.motion.navigation import Navigation, NavigationOptions
+from roboglot.model.components.motion.navigation import Navigation, NavigationOptions, Tracks
 from roboglot.model.errors import Blocked, EmergencyStopped, Expired, NotFound, NotLocalized, RobotError, Unreachable
 from roboglot.model.events import DeliveryNews, DeliveryReported
+from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 
 SOURCE = "delivery"
@@ -91,11 +95,25 @@ class DeliveryDrive:
         options = NavigationOptions(
             yaw=place.pose.yaw if policy.yaw is None else policy.yaw,
             speed_ratio=min(1.0, max(RATIO_MIN, ratio)),
+            tolerance=policy.tolerance,
             retries=policy.retries,
             tracks=policy.tracks,
+            waits=policy.waits,
         )
         navigation = self._robot[Navigation]
-        await self._drive(lambda: navigation.navigate_to([place.pose.point], options, source=SOURCE), policy)
+
+        def start() -> Action:
+            return navigation.navigate_to(self._way(place.pose.point, policy), options, source=SOURCE)
+
+        await self._drive(start, policy)
+
+    def _way(self, goal: Point, policy: Policy) -> list[Point]:
+        """Return the goals of a drive, along the tracks' direction where that counts. Raises InvalidGoal."""
+        if policy.tracks is Tracks.FREE or not policy.directed:
+            return [goal]
+        tracks = self._robot[MapAnnotations].current.lines_of(LineKind.TRACK)
+        here = self._robot[Localization].pose.point
+        return through_tracks(tracks, here, [goal], strictly=policy.tracks is Tracks.STRICT)
 
     async def go_home(self, policy: Policy) -> None:
         """Drive onto the dock, by lift if needed. Raises Failed."""

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Any
 
 import httpx
 import pytest
 
+from roboglot.autonomy.navigation.context import Goal
 from roboglot.model.components.energy.battery import Battery, DockContact
 from roboglot.model.components.logistics.delivery import Delivery
 from roboglot.model.components.logistics.industry import CallKind, Industry
+from roboglot.model.components.mapping.annotations import Line, LineKind, MapAnnotations
 from roboglot.model.components.motion.base import Base
+from roboglot.model.components.motion.driving import BASE
+from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
 from tests.protocols.slamware.screen import API, TASKS, Screen
 
@@ -102,6 +107,34 @@ async def test_move_options_are_merged_and_act(screen: Screen, robot: Robot) -> 
     assert (await put(screen, "admin/move_options", {"mode": 7})).status_code == 400
     assert (await screen.client.put(f"{API}/admin/move_options")).status_code == 200
     assert await get(screen, "admin/move_options") == default
+
+
+async def _goal_of_delivery(screen: Screen, robot: Robot) -> Goal:
+    """Order food, and return the goal that the robot then drives to."""
+    await screen.create("R101", "FOOD_DELIVERY")
+    for _ in range(40):
+        await screen.forward(seconds=0.5)
+        for action in robot.actions.running(BASE):
+            if isinstance(action.goal, Goal):
+                return action.goal
+    raise AssertionError("it does not drive")
+
+
+async def test_all_move_options_reach_the_drive(screen: Screen, robot: Robot) -> None:
+    """Precision and two of the flags were stored and shown, and nothing else."""
+    await screen.prepare(R101=(2.0, 1.0, "ROOM"))
+    await put(screen, "admin/move_options", {"acceptable_precision": 0.4})
+    await put(screen, "admin/move_options", {"flags": ["find_path_ignoring_dynamic_obstacles"]})
+    options = (await _goal_of_delivery(screen, robot)).options
+    assert (options.tolerance, options.waits) == (0.4, True)
+    await screen.client.delete(TASKS)
+    corners = Point(0, 0), Point(2, 0), Point(2, 2)
+    lines = [Line(0, LineKind.TRACK, start, end) for start, end in itertools.pairwise(corners)]
+    await robot[MapAnnotations].change(lambda now: now.with_new(*lines))
+    await put(screen, "admin/move_options", {"mode": 1, "flags": ["precise", "with_directed_virtual_track"]})
+    goal = await _goal_of_delivery(screen, robot)
+    assert goal.options.tolerance == 0.05
+    assert goal.points[-2:] == (Point(2, 0), Point(2, 1))
 
 
 async def test_stored_flags_act_as_they_are_shown(screen: Screen, robot: Robot) -> None:

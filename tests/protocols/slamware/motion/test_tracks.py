@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from roboglot.model.components.interaction.light import Colour, Light
 from roboglot.model.components.mapping.annotations import Line, LineKind
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.track_graph import way_along
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
 from roboglot.model.robot import Robot
-from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
 from roboglot.testing import Forward
 
 SEARCH = "/api/multi-floor/map/v1/search_path_points"

@@ -170,6 +170,9 @@ class Policy:
     return_speed: float | None = None
     speed_ratio: float = 1.0
     tracks: Tracks = Tracks.FREE
+    directed: bool = False  # tracks, where they count, from their start to their end only
+    tolerance: float = 0.05  # m from the target that count as arrived
+    waits: bool = False  # for obstacles that are not on the map, instead of driving around them
     retries: int = 0
     yaw: float | None = None  # rad in map, at every target; None: the heading of the place
     pickup_seconds: float = 300.0

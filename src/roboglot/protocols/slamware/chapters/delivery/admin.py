@@ -18,6 +18,7 @@ from roboglot.model.geometry import wrap_angle
 from roboglot.operations import Right
 from roboglot.protocols.slamware.chapters.delivery.cargo import all_cargos
 from roboglot.protocols.slamware.chapters.delivery.voice import LANGUAGE, language_of
+from roboglot.protocols.slamware.chapters.motion.moves import PRECISE, tolerance_of
 from roboglot.protocols.slamware.chapters.system.system import device_id, software_version
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
@@ -147,6 +148,9 @@ def _with_move_options(policy: Policy, body: dict[str, object] | None) -> Policy
         yaw=wrap_angle(how.yaw) if how.has("with_yaw") and how.yaw is not None else None,
         retries=how.fail_retry_count or 0 if how.has("fail_retry_count") else 0,
         speed_ratio=min(max(how.speed_ratio, RATIO_MIN), 1.0) if how.speed_ratio else 1.0,
+        tolerance=tolerance_of(how) or PRECISE,
+        waits=how.has("find_path_ignoring_dynamic_obstacles"),
+        directed=how.has("with_directed_virtual_track"),
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.annotations import AreaKind, LineKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.track_graph import through_tracks
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.motion.navigation import Navigation, NavigationOptions, Tracks
@@ -16,7 +17,6 @@ from roboglot.model.geometry import Point, Pose, Twist, wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.motion.errands import SOURCE
 from roboglot.protocols.slamware.chapters.motion.strategies import speed_share
-from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.vocabulary import TRACKS
 from roboglot.wire.slamware import geometry
@@ -45,21 +45,9 @@ def navigate(
     if yaw is None and how.has("with_yaw") and how.yaw is not None:
         yaw = wrap_angle(how.yaw)
     if how.mode and how.has("with_directed_virtual_track"):
-        goals = _directed(robot, goals, strictly=how.mode == 1)
+        tracks = robot[MapAnnotations].current.lines_of(LineKind.TRACK)
+        goals = through_tracks(tracks, robot[Localization].pose.point, goals, strictly=how.mode == 1)
     return robot[Navigation].navigate_to(goals, navigation_options(robot, how, yaw), source=source)
-
-
-def _directed(robot: Robot, goals: Sequence[Point], *, strictly: bool) -> list[Point]:
-    """Return ``goals`` with ways along the tracks' direction. Raises InvalidGoal if ``strictly`` and there is none."""
-    tracks = robot[MapAnnotations].current.lines_of(LineKind.TRACK)
-    here, through = robot[Localization].pose.point, list[Point]()
-    for goal in goals:
-        way = way_along(tracks, here, goal, directed=True)
-        if not way and strictly:
-            raise InvalidGoal("no tracks lead there in the allowed direction")
-        through += way[1:] or [goal]
-        here = goal
-    return through
 
 
 def navigation_options(robot: Robot, how: MoveOptions, yaw: float | None) -> NavigationOptions:
@@ -72,14 +60,17 @@ def navigation_options(robot: Robot, how: MoveOptions, yaw: float | None) -> Nav
         yaw=yaw,
         tracks=tracks,
         speed_ratio=max(share * speed_share(robot), SPEED_RATIO_MIN),
-        tolerance=PRECISE if how.has("precise") else _near_enough(how.acceptable_precision),
+        tolerance=tolerance_of(how) or OCCUPIED,
         retries=how.fail_retry_count or 0 if how.has("fail_retry_count") else 0,
         waits=how.has("find_path_ignoring_dynamic_obstacles"),
     )
 
 
-def _near_enough(precision: float | None) -> float:
-    return min(max(precision, PRECISE), OCCUPIED_MAX) if precision else OCCUPIED
+def tolerance_of(how: MoveOptions) -> float | None:
+    """Return the distance (m) from the target that counts as arrived; None if the client leaves it open."""
+    if how.has("precise"):
+        return PRECISE
+    return min(max(how.acceptable_precision, PRECISE), OCCUPIED_MAX) if how.acceptable_precision else None
 
 
 def has_tracks(robot: Robot) -> bool:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from roboglot.model.components.mapping.annotations import LineKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
+from roboglot.model.components.mapping.track_graph import way_along
 from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import Point
 from roboglot.operations import Right
-from roboglot.protocols.slamware.chapters.multi_floor.track_graph import way_along
 from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.table import TABLE
 from roboglot.wire.slamware.chapters.motion import PathPoints

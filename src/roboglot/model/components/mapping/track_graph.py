@@ -41,6 +41,21 @@ def way_along(tracks: Sequence[Line], start: Point, end: Point, *, directed: boo
     return [way[0], *(b for a, b in pairwise(way) if a.distance_to(b) > SAME)]
 
 
+def through_tracks(tracks: Sequence[Line], start: Point, goals: Sequence[Point], *, strictly: bool) -> list[Point]:
+    """Return ``goals``, each with a way there along the tracks' direction before it, if there is one.
+
+    Raises InvalidGoal for too many tracks, and if ``strictly`` and there is no such way.
+    """
+    through = list[Point]()
+    for goal in goals:
+        way = way_along(tracks, start, goal, directed=True)
+        if not way and strictly:
+            raise InvalidGoal("no tracks lead there in the allowed direction")
+        through += way[1:] or [goal]
+        start = goal
+    return through
+
+
 def _shares(begins: _Points, spans: _Points, point: _Points) -> NDArray[np.float64]:
     """Return the share (0..1) along each piece that is nearest to ``point``."""
     shares: NDArray[np.float64] = ((point - begins) * spans).sum(axis=1) / (spans**2).sum(axis=1)
