@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roboglot.model.actions import Action
+from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
 from roboglot.model.components.mapping.map_library import Label, MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
@@ -109,6 +109,20 @@ async def test_drive_can_be_cancelled(home: Caller, world: World) -> None:
     assert result_of(await home("cyberdog.navigation.cancel_navigation")) == (0, 0)
     assert not home.robot.actions.running()
     await home.clock.advance(0.2)
+    assert result_of(going.result()) == (1, 5)
+
+
+async def test_drive_that_waits_can_be_cancelled(home: Caller) -> None:
+    """It went uncancelled while the robot still braked, or got up, for it."""
+    await home("cyberdog.navigation.turn_on_navigation")
+    home.robot[Driving].drive(Twist(0.5), lifetime=5.0, source="someone")
+    await home.clock.advance(1.0)
+    going = home.start("cyberdog.navigation.navigation_to_preset", "kitchen")
+    await home.clock.advance(0.0)
+    assert home.robot.actions.running()[-1].status is ActionStatus.ACCEPTED
+    assert result_of(await home("cyberdog.navigation.cancel_navigation")) == (0, 0)
+    await home.clock.advance(2.0)
+    assert not home.robot.actions.running()
     assert result_of(going.result()) == (1, 5)
 
 

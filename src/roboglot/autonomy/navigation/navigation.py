@@ -18,7 +18,13 @@ from roboglot.autonomy.navigation.pilot import Pilot
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import abort_with_map
-from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions, check_goals
+from roboglot.model.components.motion.navigation import (
+    NAVIGATE,
+    Navigation,
+    NavigationFeedback,
+    NavigationOptions,
+    check_goals,
+)
 from roboglot.model.errors import Blocked, Unreachable
 from roboglot.model.events import MapReplaced
 from roboglot.model.geometry import ORIGIN, Path, Point
@@ -45,7 +51,7 @@ class GridNavigation(Navigation):
         async def run(action: Action) -> None:
             await self._drive(action, goal, action.report, DriveProgress())
 
-        return abort_with_map(self._robot, start_on_base(self._robot, "navigate to", run, goal=goal, source=source))
+        return abort_with_map(self._robot, start_on_base(self._robot, NAVIGATE, run, goal=goal, source=source))
 
     async def drive(
         self,

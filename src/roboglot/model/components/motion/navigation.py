@@ -13,6 +13,7 @@ from roboglot.model.errors import InvalidGoal
 from roboglot.model.geometry import POSITION_MAX, Path, Point
 from roboglot.values import dataclass
 
+NAVIGATE = "navigate to"  # the name of its actions
 RETRIES_MAX = 1000
 
 
@@ -67,7 +68,7 @@ def check_goals(goals: Sequence[Point], options: NavigationOptions, *, most: int
 
 
 class Navigation(Component):
-    """Plans on the map and current scans; its actions' feedback is ``NavigationFeedback``."""
+    """Plans on the map and current scans; its actions, named NAVIGATE, report ``NavigationFeedback``."""
 
     @abstractmethod
     def navigate_to(self, goals: Sequence[Point], options: NavigationOptions, *, source: str = "") -> Action:

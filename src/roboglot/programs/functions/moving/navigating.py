@@ -11,7 +11,7 @@ from roboglot.model.components.interaction.speaker import Speaker
 from roboglot.model.components.mapping.localization import GOOD_FIT, Localization
 from roboglot.model.components.mapping.map_library import MapLibrary, StoredMap
 from roboglot.model.components.mapping.mapping import Mapping
-from roboglot.model.components.motion.navigation import Navigation, NavigationFeedback, NavigationOptions
+from roboglot.model.components.motion.navigation import NAVIGATE, Navigation, NavigationOptions
 from roboglot.model.errors import Busy, InvalidGoal, NotFound, NotLocalized, Refused, RobotError
 from roboglot.model.events import MapReplaced
 from roboglot.model.geodesy import sky_over
@@ -211,7 +211,7 @@ async def _go(session: Session, point: Point, yaw: float | None) -> None:
 
 async def _cancel(robot: Robot) -> None:
     for action in robot.actions.running():
-        if isinstance(action.feedback, NavigationFeedback):
+        if action.name == NAVIGATE:
             action.cancel("a program cancelled it")
             await action.done()
 

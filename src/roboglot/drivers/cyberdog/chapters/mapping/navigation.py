@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from roboglot.drivers.cyberdog.chapters.mapping.tasks import Begin, Skills
 from roboglot.model.actions import Action
 from roboglot.model.components.mapping.localization import LOCALIZATION, Localization, Region
-from roboglot.model.components.motion.navigation import Navigation, NavigationOptions, check_goals
+from roboglot.model.components.motion.navigation import NAVIGATE, Navigation, NavigationOptions, check_goals
 from roboglot.model.errors import Refused
 from roboglot.model.geometry import Path, Point, Pose
 
@@ -31,7 +31,7 @@ class CyberDogNavigation(Navigation):
             return lambda: self._skills.client.navigate(goal.x, goal.y, yaw)
 
         begins = [begin(goal, yaw) for goal, yaw in zip(goals, yaws, strict=True)]
-        return self._skills.start("navigate", begins, goal=tuple(goals), source=source)
+        return self._skills.start(NAVIGATE, begins, goal=tuple(goals), source=source)
 
     async def plan(self, start: Point, goal: Point) -> Path:
         raise Refused("this robot does not report plans")

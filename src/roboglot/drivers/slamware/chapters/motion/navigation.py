@@ -14,6 +14,7 @@ from roboglot.drivers.slamware.vocabulary import location, robot_errors
 from roboglot.extras import lazy
 from roboglot.model.actions import Action
 from roboglot.model.components.motion.navigation import (
+    NAVIGATE,
     Navigation,
     NavigationFeedback,
     NavigationOptions,
@@ -61,7 +62,7 @@ class SlamwareNavigation(Navigation):
         else:
             name, wanted = "SeriesMoveToAction", SeriesMoveToOptions([location(goal) for goal in goals], how)
         action = VendorAction(name, wanted, self._feedback)
-        return self._runner.start("navigate", action, goal=tuple(goals), source=source)
+        return self._runner.start(NAVIGATE, action, goal=tuple(goals), source=source)
 
     async def plan(self, start: Point, goal: Point) -> Path:
         if start.distance_to(self._reported.pose) > HERE:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from roboglot.model.actions import Action, ActionStatus
 from roboglot.model.clock import Timer
 from roboglot.model.components.energy.battery import Battery
-from roboglot.model.components.motion.navigation import NavigationFeedback
+from roboglot.model.components.motion.navigation import NAVIGATE, NavigationFeedback
 from roboglot.model.components.system.firmware import FirmwareState
 from roboglot.model.components.system.health import FaultLevel
 from roboglot.model.errors import Blocked, DockNotFound, Unreachable
@@ -42,7 +42,7 @@ from roboglot.wire.slamware.chapters.platform import ElevatorEvent, GeneralEvent
 
 EVENTS_MAX = 256  # unread events, beyond which the oldest is dropped
 HOMING = ("GoHomeAction", "MultiFloorBackHomeAction")
-DRIVES = ("navigate to", "dock", "sweep")  # actions that plan routes
+DRIVES = (NAVIGATE, "dock", "sweep")  # actions that plan routes
 KEPT_AT_RESTARTS = (DeliveryEvent.ROBOT_REBOOT, GeneralEvent.POWER_OFF)  # clients read them after the restart
 BLOCKED_AFTER = 180.0  # s in one place before ROBOT_BLOCKED
 OCCUPIED_AGAIN = 5.0  # s until the same obstacle is reported again
