@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from roboglot.model.components.energy.battery import Battery
+from roboglot.model.components.interaction.light import Light, LightEffect
+from roboglot.model.errors import Unconnected
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import BatteryState
 from roboglot.programs.engine.events import ExitReason
@@ -137,6 +139,25 @@ async def test_suspend_recover_and_shutdown_of_a_busy_loop(app: FrontEnd) -> Non
     assert app.news("t", "shutdown")[0]["feedback"]["describe"] == "Task loop feedback, now state is shutdown"
     assert await app.state("t") == "shutdown"
     assert app.news("t", "stop") == []
+
+
+@pytest.mark.world("empty")
+async def test_shutdown_of_a_robot_out_of_reach(
+    connect: Connect, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lost robot's lights could not be restored, and so the program that had taken them went on."""
+
+    def lost(*_: object, **__: object) -> None:
+        raise Unconnected("the robot is not connected")
+
+    app = await connect(robot)
+    await app.start("t", "cyberdog.led.play(2, 161)\nwhile True:\n    n = 1\n")
+    await app.until(lambda: robot[Light].state("tail").effect is not LightEffect.OFF)
+    run = app.service._runs["t"]._run
+    monkeypatch.setattr(type(robot[Light]), "shine", lost)
+    await app.ask("shutdown", "t")
+    assert not alive(run.pid)
+    assert await app.state("t") == "shutdown"
 
 
 async def test_the_first_feedback_comes_before_the_second(app: FrontEnd) -> None:

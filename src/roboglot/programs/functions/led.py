@@ -73,10 +73,10 @@ class HeldLights:
         self._before.setdefault(zone, before)
 
     def free(self, zone: str) -> None:
-        """Restore a zone's earlier state; do nothing if it is not held."""
-        before = self._before.pop(zone, None)
-        if before:
+        """Restore a zone's earlier state; do nothing if it is not held. Raises like ``Light.shine``."""
+        if before := self._before.get(zone):
             self._light.shine(zone, before.colour, before.effect, frequency=before.frequency)
+            del self._before[zone]
 
     def close(self) -> None:
         """Restore all zones."""

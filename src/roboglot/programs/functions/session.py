@@ -6,16 +6,18 @@ Knows no process and no store; its ``host`` does.
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 from typing import Protocol, TypeVar, cast
 
 from roboglot.model.actions import Action, ActionStatus
-from roboglot.model.errors import Busy
+from roboglot.model.errors import Busy, RobotError
 from roboglot.model.events import ActionChanged
 from roboglot.model.robot import Robot
 from roboglot.programs.functions.results import state
 from roboglot.programs.worker.values import Record
 
+log = logging.getLogger(__name__)
 SLEEP_MAX = 9.2e9  # s, as in CPython
 
 
@@ -87,12 +89,16 @@ class Session:
             action.resume()
 
     def cancel(self, reason: str) -> None:
-        """Cancel all actions of the program and release its holds; the robot brakes by itself."""
+        """Cancel all actions of the program and release its holds; the robot brakes by itself. Raises nothing."""
         self._end_watch()
         for action in self._actions():
             action.cancel(reason)
         while self._parts:
-            self._parts.popitem()[1].close()
+            kind, part = self._parts.popitem()
+            try:
+                part.close()
+            except RobotError as error:  # a real robot that is out of reach: the other parts are closed all the same
+                log.info("%s: cannot close %s: %s", self.source, kind.__name__, error)
 
     def part(self, kind: type[P]) -> P:
         """Return the program's state of this kind, made on first use and closed with the program."""
