@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from roboglot.model.components.motion.base import Base
 from roboglot.model.robot import Robot
 from roboglot.operations import BadParameters
 from roboglot.protocols.vda5050.errors import Rejected
@@ -63,6 +64,12 @@ def _check_edge(edge: Edge, robot: Robot) -> None:
     if edge.height is not None and edge.height < robot.description.height:
         high = robot.description.height
         raise _unsupported(f"the robot is {high} m high, the edge allows {edge.height}", {"edgeId": edge.edge_id})
+    if edge.device_height > 0:
+        raise _unsupported("this robot's load handling device has no height", {"edgeId": edge.edge_id})
+    turning = robot[Base].limits.twist.yaw if Base in robot else 0.0
+    if edge.rotation_speed is not None and edge.rotation_speed < turning:
+        why = f"the robot turns at up to {turning:g} rad/s, the edge allows {edge.rotation_speed:g}"
+        raise _unsupported(why, {"edgeId": edge.edge_id})
     if edge.speed is not None and edge.speed <= 0:
         raise _unsupported("the speed must be above 0", {"edgeId": edge.edge_id})
 

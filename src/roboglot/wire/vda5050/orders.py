@@ -99,7 +99,10 @@ class Node(OrderPart, frozen=True, rename="camel", kw_only=True):
 
 
 class Edge(OrderPart, frozen=True, rename="camel", kw_only=True):
-    """The way between two nodes; unsupported fields are parsed so that they can be refused."""
+    """The way between two nodes; unsupported fields are parsed so that they can be refused.
+
+    Limits have several names: those of 2.1, of drafts of 3.0, and of 3.0.
+    """
 
     edge_id: Id
     start_node_id: Text | None = None
@@ -108,6 +111,12 @@ class Edge(OrderPart, frozen=True, rename="camel", kw_only=True):
     maximum_speed: NotNegative | None = None
     max_height: NotNegative | None = None
     maximum_height: NotNegative | None = None
+    maximum_mobile_robot_height: NotNegative | None = None
+    min_height: NotNegative | None = None
+    minimum_height: NotNegative | None = None
+    minimum_load_handling_device_height: NotNegative | None = None
+    max_rotation_speed: NotNegative | None = None
+    maximum_rotation_speed: NotNegative | None = None
     orientation: object = None
     direction: object = None
     rotation_allowed: bool | None = None
@@ -117,12 +126,28 @@ class Edge(OrderPart, frozen=True, rename="camel", kw_only=True):
     @property
     def speed(self) -> float | None:
         """Speed limit, m/s; None: no limit."""
-        return self.maximum_speed if self.max_speed is None else self.max_speed
+        return _least(self.max_speed, self.maximum_speed)
+
+    @property
+    def rotation_speed(self) -> float | None:
+        """Limit of the turning rate, rad/s; None: no limit."""
+        return _least(self.max_rotation_speed, self.maximum_rotation_speed)
 
     @property
     def height(self) -> float | None:
         """Limit of the robot's height, m; None: no limit."""
-        return self.maximum_height if self.max_height is None else self.max_height
+        return _least(self.max_height, self.maximum_height, self.maximum_mobile_robot_height)
+
+    @property
+    def device_height(self) -> float:
+        """Height above which the load handling device has to be, m."""
+        given = self.min_height, self.minimum_height, self.minimum_load_handling_device_height
+        return max((height for height in given if height is not None), default=0.0)
+
+
+def _least(*limits: float | None) -> float | None:
+    """Return the lowest limit; None without one."""
+    return min((limit for limit in limits if limit is not None), default=None)
 
 
 class OrderMessage(msgspec.Struct, frozen=True, rename="camel"):
