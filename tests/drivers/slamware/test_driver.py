@@ -222,6 +222,23 @@ async def test_navigation_fails_in_model_words_stops_when_cancelled(
     assert world.truth.pose_of("a").distance_to(before) < 0.01
 
 
+async def test_a_refused_limit_ends_the_drive(
+    driven: Robot, world: World, forward: Forward, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The robot drove at its own speed instead, several times as fast."""
+
+    async def refuse(*_: object) -> None:
+        raise SlamwareRefused("PUT parameter", 400, "Invalid parameter")
+
+    monkeypatch.setattr(SlamwareClient, "set_system_parameter", refuse)
+    before = world.truth.pose_of("a")
+    action = driven[Driving].drive(Twist(0.1), lifetime=60.0, source="test")
+    await forward(seconds=2)
+    assert action.status is ActionStatus.ABORTED
+    assert "Invalid parameter" in action.reason
+    assert world.truth.pose_of("a").distance_to(before) < 0.01
+
+
 async def test_a_paused_joystick_stands(driven: Robot, world: World, forward: Forward) -> None:
     """It drove on, reported as paused, and its next frame was obeyed, too."""
     driving = driven[Driving]

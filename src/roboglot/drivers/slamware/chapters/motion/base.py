@@ -130,14 +130,20 @@ class SlamwareBase(LinkedBase):
         self._last = await self._runner.begin("MoveByAction", options)
 
     async def _limit_speed(self, speed: float) -> None:
-        """Send the limit if it differs enough; the robot's own limit is restored exactly."""
+        """Send the limit if it differs enough; the robot's own limit is restored exactly.
+
+        Raises SlamwareRefused for a refused one: without it the robot would drive faster than it should.
+        """
         speed, own = max(speed, SPEED_MIN), self.built.twist.x
         limit = own if self._limit is None else self._limit
         if abs(speed - limit) < SPEED_STEP and (speed == own) == (limit == own):
             return
         await self._limit_restore.remember(own)
-        with contextlib.suppress(SlamwareRefused):  # otherwise the robot uses its own speed
+        try:
             await self._client.set_system_parameter(Parameter(PARAMETER, f"{speed:.3f}"))
+        except SlamwareRefused:
+            if speed < own:
+                raise
         self._limit = speed
 
     async def _halt(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import logging
 from typing import Final
 
 from roboglot.clients.slamware import SlamwareClient, SlamwareRefused
@@ -11,6 +11,7 @@ from roboglot.model.components.system.settings import Settings
 from roboglot.model.robot import Robot
 from roboglot.wire.slamware.chapters.system.devices import Parameter
 
+log = logging.getLogger(__name__)
 PARAMETER: Final = "base.max_moving_speed"
 SETTING = "slamware_driver.owed_speed"  # the setting: the robot's URL and its limit, m/s
 
@@ -39,8 +40,10 @@ class SpeedLimitRestore:
         """Restore the limit. Raises ClientError without a link; the limit then stays stored."""
         if self.speed is None:
             return
-        with contextlib.suppress(SlamwareRefused):
+        try:
             await self._client.set_system_parameter(Parameter(PARAMETER, f"{self.speed:.6f}"))
+        except SlamwareRefused as refused:
+            log.warning("%s does not take its own speed limit back: %s", self._link.name, refused)
         self.speed = None
         await self._store(None)
 
