@@ -304,6 +304,7 @@ INVALID = [
     ("MoveByAction", {"direction": 4}),
     ("MoveByAction", {"direction": 0, "duration": 10**9}),
     ("MoveByAction", {"theta": "nan"}),
+    ("MoveByAction", {"direction": 0, "theta": 0.5}),
     ("RotateToAction", {"orientation": {"yaw": 1}}),
     ("RotateAction", {"angle": 1e9}),
     ("GoHomeAction", {"gohome_options": {"flags": "dock", "move_options": {"mode": 1}}}),

@@ -114,6 +114,8 @@ def move_by(context: Context, options: MoveByOptions) -> Action:
     match options:
         case MoveByOptions(direction=None, theta=None):
             raise InvalidGoal("give either direction or theta")
+        case MoveByOptions(direction=Direction(), theta=float(theta)) if theta:  # clients send 0 for "unset"
+            raise InvalidGoal("give either direction or theta, not both")
         case MoveByOptions(direction=None, theta=float(theta)):
             twist = Twist(yaw=theta)
         case MoveByOptions(direction=Direction.FORWARD):
