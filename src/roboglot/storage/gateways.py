@@ -7,6 +7,7 @@ import logging
 
 from roboglot.storage.robot_registry import Claim, RobotRegistry
 from roboglot.storage.transactions import FAILURES
+from roboglot.transport.log_limiter import LogLimiter
 from roboglot.values import dataclass
 
 log = logging.getLogger(__name__)
@@ -40,12 +41,13 @@ class GatewayLookup:
 
     async def moved(self, robot: str, epoch: int) -> None:
         """Return when the robot has a gateway under another epoch; wait on while the registry is unreachable."""
+        seldom = LogLimiter(log)
         while True:
             await asyncio.sleep(PERIOD)
             try:
                 now = await self.of(robot)
             except OSError as error:
-                log.info("cannot look up robot %s, it counts as unmoved: %s", robot, error)
+                seldom.info(robot, "cannot look up robot %s, it counts as unmoved: %s", robot, error)
                 continue
             if now is not None and now.epoch != epoch:
                 return

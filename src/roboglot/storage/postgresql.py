@@ -1,13 +1,12 @@
 """A PostgreSQL database by URL, shared by many robots. Needs the extra ``roboglot[postgresql]`` (psycopg 3).
 
 Every piece of work is a transaction in one of a few threads, each with its own connection, which is renewed if it was
-lost while idle. Knows no robot.
+lost while idle. Work that waited while a connection could not be renewed fails with it. Knows no robot.
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import copy
 import functools
 import logging
@@ -21,7 +20,9 @@ from typing import Any, TypeVar
 
 import psycopg
 
+from roboglot.hosting.steady_time import uptime
 from roboglot.model.components.system.disk import Disk
+from roboglot.storage.postgresql_connection import CLOSE_MAX, LimitedConnection, NoAnswer, close, connect
 from roboglot.storage.transactions import AlreadyThere, Connection, DatabaseError, DiskFull, Rows
 from roboglot.transport.log_limiter import LogLimiter
 
@@ -30,7 +31,6 @@ log = logging.getLogger(__name__)
 limited_log = LogLimiter(log)
 
 CONNECTIONS_MAX = 4
-CONNECT_MAX, STATEMENT_MAX, IDLE_MAX = 5, 10, 10  # s for connecting, for a statement, for an idle transaction
 CLAIM_MAX = 6000  # ms; the server notices within five seconds that a machine is gone
 CLAIM_LOCKS = 0x626F74  # the class of the locks by which a program claims its robots
 PIECE_MIN = 3  # characters of a password that an error may not show
@@ -59,8 +59,9 @@ class PostgreSQL:
         connections = 1 if robots else CONNECTIONS_MAX
         self._disk: Disk | None = None
         self._own = threading.local()
-        self._opened: list[psycopg.Connection[object]] = []
+        self._opened: list[LimitedConnection] = []
         self._opening = threading.Lock()
+        self._ends = threading.Event()
         self._lock_timeout = CLAIM_MAX
         self._threads = ThreadPoolExecutor(
             max_workers=connections,
@@ -69,7 +70,8 @@ class PostgreSQL:
         )
         self._readers = ThreadPoolExecutor(max_workers=1, thread_name_prefix="database reader")
         try:
-            self._threads.submit(self._committed, _is_there if only_read else _migrate, read_only=only_read).result()
+            prepare = _is_there if only_read else _migrate
+            self._threads.submit(self._committed, prepare, read_only=only_read, asked=uptime()).result()
         except BaseException as error:
             self.close()
             if isinstance(error, psycopg.Error | DatabaseError):
@@ -92,7 +94,8 @@ class PostgreSQL:
         """
         if self._in_place:
             return self.run_now(work)
-        return await asyncio.get_running_loop().run_in_executor(self._threads, self._transact, work)
+        writing = functools.partial(self._transact, work, asked=uptime())
+        return await asyncio.get_running_loop().run_in_executor(self._threads, writing)
 
     run_together = run  # the server itself combines disk flushes of transactions that end together
 
@@ -100,17 +103,18 @@ class PostgreSQL:
         """Run read-only ``work`` beside writing transactions."""
         if self._in_place:
             return self.run_now(work)
-        reading = functools.partial(self._transact, work, read_only=True)
+        reading = functools.partial(self._transact, work, read_only=True, asked=uptime())
         return await asyncio.get_running_loop().run_in_executor(self._readers, reading)
 
     def run_now(self, work: Callable[[Connection], T]) -> T:
         """Run ``work`` and block: for start-up, and where nothing else may run meanwhile."""
-        return self._threads.submit(self._transact, work).result()
+        return self._threads.submit(self._transact, work, asked=uptime()).result()
 
-    def _transact(self, work: Callable[[Connection], T], *, read_only: bool = False) -> T:
+    def _transact(self, work: Callable[[Connection], T], *, read_only: bool = False, asked: float) -> T:
+        """Run ``work``; ``asked``: uptime at which a client did."""
         full = self._disk is not None and self._disk.free <= 0
         try:
-            return self._committed(work, read_only=read_only or full)
+            return self._committed(work, read_only=read_only or full, asked=asked)
         except psycopg.errors.ReadOnlySqlTransaction as error:
             if full:
                 raise DiskFull("the disk is full") from None
@@ -122,8 +126,8 @@ class PostgreSQL:
         except psycopg.Error as error:
             raise _failed(error) from error
 
-    def _committed(self, work: Callable[[Connection], T], *, read_only: bool) -> T:
-        connection = self._begin(b"BEGIN READ ONLY" if read_only or self._only_read else b"BEGIN")
+    def _committed(self, work: Callable[[Connection], T], *, read_only: bool, asked: float) -> T:
+        connection = self._begin(b"BEGIN READ ONLY" if read_only or self._only_read else b"BEGIN", asked)
         try:
             result = work(_Statements(connection))
             connection.execute("COMMIT")
@@ -133,23 +137,26 @@ class PostgreSQL:
             raise
         return result
 
-    def _begin(self, begin: bytes) -> psycopg.Connection[object]:
+    def _begin(self, begin: bytes, asked: float) -> LimitedConnection:
         """Return this thread's connection with a transaction begun; reconnects if it died while idle."""
-        connection: psycopg.Connection[object] | None = getattr(self._own, "connection", None)
+        connection: LimitedConnection | None = getattr(self._own, "connection", None)
         if connection is not None and not connection.closed:
             try:
                 connection.execute(begin)
-            except psycopg.OperationalError:
+            except psycopg.OperationalError as error:
                 connection.close()
+                if self._ends.is_set() and isinstance(error, NoAnswer):  # who ends does not try a silent server again
+                    self._own.failed = uptime(), str(error)
+                    raise
             else:
                 return connection
-        connection = self._own.connection = self._connect()
+        connection = self._own.connection = self._connect(asked)
         if getattr(self._own, "writes", False):
             self._claim(connection)
         connection.execute(begin)
         return connection
 
-    def _claim(self, connection: psycopg.Connection[Any]) -> None:
+    def _claim(self, connection: LimitedConnection) -> None:
         """Take the robots' locks, which end with the connection. Raises DatabaseError if another program has one.
 
         The first connection waits for those of a program whose machine is gone: a cluster would start the shard again,
@@ -164,7 +171,7 @@ class PostgreSQL:
                 connection.close()
                 raise DatabaseError(f"robot {robot} is served by another program from the same database")
 
-    def _waited(self, connection: psycopg.Connection[object], lock: tuple[int, str]) -> bool:
+    def _waited(self, connection: LimitedConnection, lock: tuple[int, str]) -> bool:
         """Wait for a robot's lock; return whether it was released in time."""
         log.info("another program serves robot %s: waiting %d ms for its end", lock[1], self._lock_timeout)
         connection.execute(f"SET lock_timeout = {self._lock_timeout}".encode())
@@ -175,19 +182,16 @@ class PostgreSQL:
         connection.execute("SET lock_timeout = 0")
         return True
 
-    def _connect(self) -> psycopg.Connection[object]:
-        limits = (
-            f"-c statement_timeout={STATEMENT_MAX}s -c idle_in_transaction_session_timeout={IDLE_MAX}s"
-            # The server notices within five seconds that a machine is gone, even one to which it was sending, and
-            # frees its robots: by then another node may have started their shard.
-            " -c tcp_keepalives_idle=2 -c tcp_keepalives_interval=1 -c tcp_keepalives_count=3 -c tcp_user_timeout=5s"
-        )
+    def _connect(self, asked: float) -> LimitedConnection:
+        """Return a new connection. Raises psycopg.Error, at once if a try failed since the work was ``asked`` for."""
+        failed_at, why = getattr(self._own, "failed", (asked, ""))
+        if failed_at > asked:
+            raise psycopg.OperationalError(why)
         try:
-            connection = psycopg.connect(
-                self._url, autocommit=True, connect_timeout=CONNECT_MAX, options=limits, application_name="roboglot"
-            )
+            connection = connect(self._url)
         except psycopg.Error as error:
             error.args = (without_password(str(error), self._url),)
+            self._own.failed = uptime(), str(error)
             raise
         with self._opening:
             self._opened[:] = [*(opened for opened in self._opened if not opened.closed), connection]
@@ -195,12 +199,13 @@ class PostgreSQL:
 
     def close(self) -> None:
         """Finish queued work, then close the connections."""
+        self._ends.set()
+        for connection in self._opened:
+            connection.answer_max = CLOSE_MAX
         self._threads.shutdown()
         self._readers.shutdown()
         for connection in self._opened:
-            with contextlib.suppress(psycopg.Error):  # the server would free the robots only on noticing the end
-                connection.execute("SELECT pg_advisory_unlock_all()")
-            connection.close()
+            close(connection)
 
 
 class _Rows:
@@ -227,7 +232,7 @@ class _Rows:
 class _Statements:
     """A connection that, like SQLite, takes ``?`` for parameters and every character in a text."""
 
-    def __init__(self, connection: psycopg.Connection[object]) -> None:
+    def __init__(self, connection: LimitedConnection) -> None:
         self._connection = connection
 
     def execute(self, query: str, parameters: Sequence[object] = (), /) -> Rows:
@@ -282,7 +287,7 @@ def is_exposed(address: str, ssl_mode: str) -> bool:
     return bool(address) and not ip_address(address).is_loopback and ssl_mode not in CHECKING
 
 
-def _option(connection: psycopg.Connection[object], name: bytes) -> str:
+def _option(connection: LimitedConnection, name: bytes) -> str:
     """Return an option of an open connection, from its URL, a service file or the environment."""
     return next((o.val or b"" for o in connection.pgconn.info if o.keyword == name), b"").decode()
 

@@ -1,0 +1,77 @@
+"""A PostgreSQL server that hangs, or that nobody reaches, keeps no work waiting."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import threading
+from pathlib import Path
+from typing import NoReturn
+
+import psycopg
+import pytest
+
+from roboglot.storage import postgresql
+from roboglot.storage.opening import open_database
+from roboglot.storage.postgresql_connection import LimitedConnection
+from roboglot.storage.settings import StoredSettings
+from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
+
+
+@needs_postgresql
+async def test_silent_server_fails_what_waits_for_it(
+    db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A server that hangs keeps its connections, and takes new ones: only the time tells."""
+    database = open_database(tmp_path / "unused", db_server.url)
+    settings = StoredSettings(database, "a")
+    await settings.put("x", 1)
+    with psycopg.connect(db_server.url, autocommit=True) as connection:
+        ours = connection.execute("SELECT pid FROM pg_stat_activity WHERE application_name='roboglot'").fetchall()
+    for (process,) in ours:
+        os.kill(process, signal.SIGSTOP)
+    monkeypatch.setattr(LimitedConnection, "answer_max", 0.2)
+    monkeypatch.setattr(postgresql, "connect", lambda _url: (_ for _ in ()).throw(psycopg.OperationalError("silence")))
+    try:
+        saving = asyncio.ensure_future(asyncio.gather(settings.put("x", 2), return_exceptions=True))
+        await asyncio.wait([saving], timeout=30.0)
+        assert saving.done()
+        assert str(saving.result()[0]) == "the database cannot be reached"
+    finally:
+        monkeypatch.undo()
+        for (process,) in ours:
+            os.kill(process, signal.SIGCONT)
+    await settings.put("x", 3)
+    assert StoredSettings(database, "a").get("x") == 3
+    database.close()
+
+
+@needs_postgresql
+async def test_work_that_waits_shares_a_failed_connection(
+    db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the tenth of ten would wait ten times as long as it takes to see that a server gives no answer."""
+    database = open_database(tmp_path / "unused", db_server.url, ["a"])
+    settings = StoredSettings(database, "a")
+    await settings.put("x", 1)
+    tries, all_wait = list[str](), threading.Event()
+
+    def fail(url: str) -> NoReturn:
+        tries.append(url)
+        all_wait.wait(30.0)
+        raise psycopg.OperationalError("no answer")
+
+    db_server.stop()
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(postgresql, "connect", fail)
+            saving = asyncio.gather(*(settings.put("x", number) for number in range(10)), return_exceptions=True)
+            await asyncio.sleep(0)  # all are asked for
+            all_wait.set()
+            assert {str(failed) for failed in await saving} == {"the database cannot be reached"}
+    finally:
+        db_server.start()
+    assert len(tries) == 1
+    await settings.put("x", 3)
+    database.close()
