@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from roboglot.hosting.process import has_ended
 from roboglot.testing.scenarios.files import BadScenario, find, read, schema
 
 SAMPLE = Path(__file__).parents[2] / "examples/ci"
@@ -124,3 +125,17 @@ def test_scenarios_are_played_and_reported(tmp_path: Path) -> None:
     assert (tmp_path / "roboglot-failures/b/recording.mcap").stat().st_size > 1000
     assert (tmp_path / "roboglot-failures/b/exchanges.html").exists()
     assert "[[ATTACHMENT|" in (suite[1].findtext("system-out") or "")
+
+
+def test_leftovers_of_a_command_end_with_its_scenario(tmp_path: Path) -> None:
+    """It would disturb the next one, and outlive all of them."""
+    (tmp_path / "leaves.yaml").write_text(
+        "name: it leaves one\ngiven: {world: empty, lockstep: true}\n"
+        "when:\n  - run: setsid sh -c 'echo $$ >left; exec sleep 3600' >/dev/null 2>&1 &\n"
+        "  - run: until test -s left; do sleep 0.01; done; kill -0 $(cat left)\n"
+        "then: [{travelled: {at_most: 1}}]\n"
+    )
+    command = [sys.executable, "-m", "roboglot", "test", str(tmp_path)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert has_ended(int((tmp_path / "left").read_text()))

@@ -7,7 +7,9 @@ import ctypes
 import os
 import sys
 import threading
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # from malloc.h
 SWITCH_SECONDS = 0.001  # s for which other threads (database, pictures) may block the main thread
@@ -37,6 +39,24 @@ def has_ended(pid: int) -> bool:
         return not pid or Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
     except (FileNotFoundError, ProcessLookupError):
         return True
+
+
+class Running(NamedTuple):
+    """A process; ``has_ended``: its parent does not know yet."""
+
+    pid: int
+    parent: int
+    name: str
+    has_ended: bool
+
+
+def running() -> Iterator[Running]:
+    """Yield every process of this machine; none where the system has no ``/proc``."""
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it has just ended
+            name, _, rest = stat.read_text("utf-8", "replace").partition("(")[2].rpartition(")")
+            state, parent, *_ = rest.split()
+            yield Running(int(stat.parent.name), int(parent), name, state in "ZX")
 
 
 def _cut_short() -> None:

@@ -5,12 +5,9 @@ Ray's own health checks would take a minute to report that. This module does not
 
 from __future__ import annotations
 
-import contextlib
 import os
-from collections.abc import Iterator
-from pathlib import Path
 
-from roboglot.hosting.process import has_ended
+from roboglot.hosting.process import has_ended, running
 
 NAMES = "raylet", "gcs_server"
 
@@ -19,7 +16,11 @@ class RayProcesses:
     """Those that run when it is made, not those of an earlier Ray; none where Ray was started elsewhere."""
 
     def __init__(self) -> None:
-        self._pids = {pid: name for pid, name in _children() if name in NAMES and not has_ended(pid)}
+        self._pids = {
+            one.pid: one.name
+            for one in running()
+            if one.parent == os.getpid() and one.name in NAMES and not one.has_ended
+        }
 
     def why_lost(self) -> str:
         """Return why Ray no longer works; "" if it works."""
@@ -27,13 +28,3 @@ class RayProcesses:
             if has_ended(pid):
                 return f"{name}, a process of Ray, has ended, and Ray with it; start again"
         return ""
-
-
-def _children() -> Iterator[tuple[int, str]]:
-    """Yield process id and name of each child of this process."""
-    own = str(os.getpid())
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):  # it has just ended
-            name, _, rest = stat.read_text("utf-8", "replace").partition("(")[2].rpartition(")")
-            if rest.split()[1] == own:
-                yield int(stat.parent.name), name

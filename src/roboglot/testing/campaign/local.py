@@ -12,7 +12,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from multiprocessing import forkserver, resource_tracker
+from multiprocessing import forkserver, resource_tracker, util
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
@@ -20,6 +20,7 @@ from pathlib import Path
 
 import msgspec
 
+from roboglot.hosting.leftovers import MARK, adopt_orphans, end_descendants, end_marked
 from roboglot.shards.warm_up import ENVIRONMENT
 from roboglot.testing.campaign.trials import Outcome, Result, Trial, play_trial
 from roboglot.values import dataclass
@@ -27,6 +28,8 @@ from roboglot.values import dataclass
 END_SECONDS_MAX = 10.0
 ATTEMPTS_MAX = 3  # for a trial whose process dies
 PRELOADED = ["roboglot.testing.campaign.warmed"]
+FOLDER = "ROBOGLOT_CAMPAIGN_FOLDER"  # environment variable with multiprocessing's own temporary folder
+_OUTER = os.environ.get(MARK, "")  # of a scenario that runs this campaign
 Leave = Callable[[Trial], Path | None]
 Ended = Callable[[Trial, Result], None]
 
@@ -49,6 +52,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
     os.environ.update(ENVIRONMENT)
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(PRELOADED)
+    os.environ[FOLDER] = util.get_temp_dir()
     _start_fork_server()
     running: list[_Running] = []
 
@@ -56,6 +60,7 @@ def play_here(trials: Iterator[Trial], workers: int, seconds_max: float, leave: 
         running.append(_start(context, trial, attempt, leave(trial), seconds_max))
 
     with interruptions() as interrupted:
+        _wait_for_fork_server(context, interrupted)
         try:
             while not interrupted.poll():
                 while len(running) < workers and (trial := next(trials, None)) is not None:
@@ -104,6 +109,21 @@ def _start_fork_server() -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+def _wait_for_fork_server(context: ForkServerContext, interrupted: Connection) -> None:
+    """Wait until that process has loaded everything; end it when interrupted: starting a trial would wait for it."""
+    receiver, sender = context.Pipe(duplex=False)
+
+    def fork() -> None:
+        with contextlib.suppress(EOFError, OSError):  # it was ended
+            context.Process(target=_now).start()
+        sender.close()
+
+    threading.Thread(target=fork, daemon=True).start()
+    wait([interrupted, receiver])
+    if not receiver.poll():
+        os.kill(vars(forkserver._forkserver)["_forkserver_pid"], signal.SIGKILL)
+
+
 @contextlib.contextmanager
 def interruptions() -> Iterator[Connection]:
     """Deliver SIGINT and SIGTERM through a pipe: raised anywhere, they could lose a process that was just started."""
@@ -148,22 +168,33 @@ def _end(one: _Running) -> None:
             os.killpg(process.pid, signal.SIGKILL)
     process.kill()
     process.join()
+    end_marked(_mark(one.scratch))  # what a trial that was killed has left
     shutil.rmtree(one.scratch, ignore_errors=True)
 
 
 def _play(trial: Trial, leave: Path | None, scratch: str, sender: Connection) -> None:
     """Play in the forked process, in its own group, so that Ctrl-C reaches the campaign alone; it ends with that."""
     os.setpgid(0, 0)
+    adopt_orphans()
     tempfile.tempdir = os.environ["TMPDIR"] = scratch
+    os.environ[MARK] = _mark(scratch)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # for the commands of its scenario
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_campaign, daemon=True).start()
     try:
-        sender.send_bytes(msgspec.json.encode(play_trial(trial, leave)))
-        sender.close()
+        result = play_trial(trial, leave)
     finally:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it has been obeyed
+        end_descendants()
         shutil.rmtree(scratch, ignore_errors=True)  # the campaign may have been killed
+    sender.send_bytes(msgspec.json.encode(result))
+    sender.close()
+
+
+def _mark(scratch: str) -> str:
+    """Return the mark of a trial's processes."""
+    return ":".join(filter(None, (_OUTER, Path(scratch).name)))
 
 
 def _end_with_campaign() -> None:
@@ -171,4 +202,5 @@ def _end_with_campaign() -> None:
     campaign = multiprocessing.parent_process()
     assert campaign is not None
     campaign.join()
+    shutil.rmtree(os.environ[FOLDER], ignore_errors=True)  # if the fork server was killed, too
     os.kill(os.getpid(), signal.SIGTERM)

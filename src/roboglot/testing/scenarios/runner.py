@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -43,7 +44,11 @@ def play(found: Found, leave: Path) -> Outcome:
 
 def _play_on(server: RobotServer, found: Found) -> Sequence[str]:
     checker = Checker(server)
-    steps = Steps(server, checker, found.path.parent)
+    with contextlib.closing(Steps(server, checker, found.path.parent)) as steps:
+        return _failures(steps, checker, found)
+
+
+def _failures(steps: Steps, checker: Checker, found: Found) -> Sequence[str]:
     for number, step in enumerate(found.scenario.when, 1):
         try:
             steps.play(step)

@@ -9,10 +9,12 @@ import math
 import os
 import signal
 import subprocess
+import uuid
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from roboglot.clients.errors import ClientError
+from roboglot.hosting.leftovers import MARK, end_marked
 from roboglot.model.errors import RobotError
 from roboglot.model.geometry import Pose
 from roboglot.testing.blocking import Blocking
@@ -37,6 +39,7 @@ class Steps:
     def __init__(self, server: RobotServer, checker: Checker, folder: Path) -> None:
         self._server, self._checker, self._folder = server, checker, folder
         self._clients: dict[str, Blocking] = {}
+        self._mark = ":".join(filter(None, (os.environ.get(MARK), uuid.uuid4().hex)))
         self._verbs: Mapping[str, Callable[[Step], None]] = {name: getattr(self, f"_{name}") for name in STEPS}
 
     def play(self, step: Step) -> None:
@@ -46,6 +49,10 @@ class Steps:
             self._verbs[verb](step)
         except (ClientError, RobotError, ProgramFailed, NotInTime, TimeoutError, ValueError, OSError) as error:
             raise StepFailed(f"{verb}: {error or type(error).__name__}") from None
+
+    def close(self) -> None:
+        """End what commands have left running, in whichever session."""
+        end_marked(self._mark)
 
     def environment(self) -> dict[str, str]:
         """Return a command's environment, with variables that point to the robots."""
@@ -57,6 +64,7 @@ class Steps:
             "ROBOGLOT_URL": server.url,
             "ROBOGLOT_PROGRAMS": server.programs_url.removesuffix("/programs"),
             "ROBOGLOT_APP_PORT": str(server.app_port),
+            MARK: self._mark,
         }
         with contextlib.suppress(ImportError, OSError):
             server.clients.certificates()
