@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
+import os
+import stat
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BufferedReader
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 import msgspec
 
@@ -15,6 +19,7 @@ if TYPE_CHECKING:
     from yaml import SafeLoader
 
 TEXT_MAX = 16 << 20  # characters of a file
+OF_THE_SHELL = "/dev/fd/", "/dev/stdin", "/proc/self/fd/"
 T = TypeVar("T")
 
 
@@ -33,12 +38,34 @@ def in_bounds() -> Iterator[None]:
         raise
 
 
+def open_bytes(path: Path) -> BufferedReader:
+    """Open a user's file. Raises OSError, for a named pipe, too: opening that would wait for a program to write."""
+    return open(path, "rb", opener=_opened)
+
+
+def open_text(path: Path, encoding: str = "utf-8", errors: str = "strict") -> TextIO:
+    """Open a user's file as ``open_bytes`` does, for its text."""
+    return open(path, encoding=encoding, errors=errors, opener=_opened)
+
+
+def _opened(path: str, flags: int) -> int:
+    """Return a descriptor of a regular file, of a folder (which Python refuses), or of what the shell has opened."""
+    descriptor = os.open(path, flags | os.O_NONBLOCK)
+    mode = os.fstat(descriptor).st_mode
+    if os.fspath(path).startswith(OF_THE_SHELL):  # <(command)
+        os.set_blocking(descriptor, True)
+    elif not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "not a regular file", path)
+    return descriptor
+
+
 def text_of(path: Path, most: int = TEXT_MAX, encoding: str = "utf-8") -> str:
     """Return the text of a file.
 
     Raises OSError, and ValueError without the file's name if it is not UTF-8 or has more than ``most`` characters.
     """
-    with in_bounds(), path.open(encoding=encoding) as file:
+    with in_bounds(), open_text(path, encoding) as file:
         text = file.read(most + 1)
     if len(text) > most:
         raise ValueError(f"longer than {most} characters")
@@ -53,7 +80,7 @@ def content_of(path: Path) -> bytes:
 
 def bytes_of(path: Path, most: int) -> bytes:
     """Return the bytes of a file. Raises OSError, and ValueError with the file's name beyond ``most`` of them."""
-    with path.open("rb") as file:
+    with open_bytes(path) as file:
         data = file.read(most + 1)
     if len(data) > most:
         raise ValueError(f"{path}: longer than {most} bytes")

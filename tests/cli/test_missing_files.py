@@ -15,14 +15,19 @@ import typer
 from roboglot.cli import connect, mcp
 from roboglot.cli.fleet import _plan, _PlanOptions
 from roboglot.cli.programs import lesson
+from roboglot.clients.cyberdog.link import Certificates
 from roboglot.config import load_config
+from roboglot.datasets.formats import read_drive_log
+from roboglot.datasets.measures import read_relations
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.folder_lock import lock_folder
 from roboglot.recording.comparing.masks import read_mask
+from roboglot.recording.reader import records
 from roboglot.simulation.world.declarations import read_toml
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.world_files import import_ros_map
 from roboglot.testing.scenarios import files
+from roboglot.transport.tls import server_context
 
 
 @pytest.mark.parametrize(
@@ -97,6 +102,41 @@ def test_token_file_that_is_no_text_is_named(tmp_path: Path) -> None:
         connect.command("127.0.0.1", token_file=path)
     with pytest.raises(typer.BadParameter, match=rf"^{re.escape(str(path))}: not UTF-8 text"):
         mcp.command(token_file=path)
+
+
+def recording(path: Path) -> object:
+    return list(records(path))
+
+
+def tls(path: Path) -> object:
+    return server_context(path, path)
+
+
+def phone(path: Path) -> object:
+    for name in ("ca-cert", "client-cert", "client-key"):
+        path.with_name(f"{name}.pem").symlink_to(path)
+    return Certificates.load(path.parent)
+
+
+READERS = [*TOML, files.read, lesson._text, import_ros_map, read_drive_log, read_relations, recording, tls, phone]
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_named_pipe_is_refused(read: Callable[[Path], object], tmp_path: Path) -> None:
+    """Opening it would wait for a program that writes, for ever."""
+    os.mkfifo(path := tmp_path / "pipe.yaml")
+    with pytest.raises((ValueError, OSError)) as refused:
+        read(path)
+    assert re.search(r"/(pipe.yaml|ca-cert.pem): not a regular file$", in_words(refused.value))
+
+
+def test_pipe_of_the_shell_is_read(tmp_path: Path) -> None:
+    """As in ``--config <(command)``."""
+    reading, writing = os.pipe()
+    os.write(writing, b"seed = 7\n")
+    os.close(writing)
+    assert load_config(Path(f"/dev/fd/{reading}"), {}).seed == 7
+    os.close(reading)
 
 
 @pytest.mark.parametrize("name", ["file", "file/folder"])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan, echoes, no_echo
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
+from roboglot.text_files import open_text
 from roboglot.values import dataclass
 
 RANGE_MIN, LEAST_NO_ECHO = 0.03, 5.0  # m
@@ -44,7 +45,7 @@ class _Log:
 def read_carmen(path: Path) -> DriveLog:
     """Read the log at ``path``. Raises BadDriveLog if it has no scan of the front laser."""
     log = _Log()
-    with path.open(encoding="ascii", errors="replace") as lines:
+    with open_text(path, "ascii", "replace") as lines:
         for line in _bounded(lines):
             words = line.split()
             reader = _READERS.get(words[0]) if words else None

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roboglot.datasets.drive_log import RAYS_MAX, SCANS_MAX, BadDriveLog, DriveLog, RecordedScan, echoes, no_echo
 from roboglot.model.geometry import Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
+from roboglot.text_files import open_text
 
 HALF_CIRCLES = {180: math.pi / 180, 181: math.pi / 180, 360: math.pi / 360, 361: math.pi / 360}
 RANGE_MIN, LEAST_NO_ECHO = 0.05, 3.0  # m
@@ -44,7 +45,7 @@ def read_columns(path: Path) -> DriveLog:
 def table(path: Path) -> NDArray[np.float64]:
     """Return the numbers of a text file with lines of equal length; lines that begin with # are comments."""
     rows: list[NDArray[np.float64]] = []
-    with path.open(encoding="ascii", errors="replace") as lines:
+    with open_text(path, "ascii", "replace") as lines:
         for number, line in enumerate(lines, 1):
             if line.startswith("#") or not line.strip():
                 continue

@@ -14,6 +14,7 @@ from roboglot.datasets.own_recording import MAGIC, read_own_recording
 from roboglot.datasets.rawlog import read_rawlog
 from roboglot.datasets.rosbag import is_bag, read_bag
 from roboglot.model.geometry import POSITION_MAX, Pose
+from roboglot.text_files import open_bytes
 
 HEAD_BYTES = 65_536
 STAMP_MAX = 1e11  # s since 1970, some 3,000 years: a log with later scans is damaged
@@ -48,7 +49,7 @@ def _read(path: Path) -> DriveLog:
         raise BadDriveLog(f"{path.name}: a folder without metadata.yaml is not a ROS bag")
     if path.stat().st_size > FILE_BYTES_MAX:
         raise BadDriveLog(f"{path.name}: larger than {FILE_BYTES_MAX} bytes")
-    with path.open("rb") as file:
+    with open_bytes(path) as file:
         head = file.read(HEAD_BYTES)
     if is_bag(path, head):
         return read_bag(path)

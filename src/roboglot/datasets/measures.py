@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from roboglot.datasets.drive_log import BadDriveLog
 from roboglot.model.geometry import Pose, wrap_angle
+from roboglot.text_files import open_text
 from roboglot.values import dataclass
 
 RELATIONS_MAX = 1_000_000
@@ -73,7 +74,7 @@ def neighbour_relations(reference: Stamped) -> list[Relation]:
 def read_relations(path: Path) -> list[Relation]:
     """Read a file of relations: two stamps, then x y z roll pitch yaw of the second pose in the first's frame."""
     relations = []
-    with path.open(encoding="ascii", errors="replace") as lines:
+    with open_text(path, "ascii", "replace") as lines:
         for number, line in enumerate(lines, 1):
             words = line.split()
             if not words or words[0].startswith("#"):

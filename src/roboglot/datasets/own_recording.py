@@ -21,6 +21,7 @@ from roboglot.datasets.track import Track, with_odometry
 from roboglot.extras import explaining
 from roboglot.model.geometry import ORIGIN, Pose
 from roboglot.model.sensing import LaserScan
+from roboglot.text_files import open_bytes
 
 if TYPE_CHECKING:
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
@@ -88,7 +89,7 @@ def _messages(path: Path) -> Iterator[tuple[str, str, bytes]]:
         from roboglot.wire.mcap_damage import DAMAGE
     schemas: dict[int, str] = {}
     channels: dict[int, tuple[str, str]] = {}  # topic and schema
-    with path.open("rb") as file:
+    with open_bytes(path) as file:
         try:
             for record in stream_of(file):
                 if isinstance(record, Schema):

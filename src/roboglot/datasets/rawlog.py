@@ -23,6 +23,7 @@ from roboglot.datasets.drive_log import FILE_BYTES_MAX, RAYS_MAX, SCANS_MAX, Bad
 from roboglot.datasets.mounts import level_mount, rotation
 from roboglot.model.geometry import ORIGIN, Pose, wrap_angle
 from roboglot.model.sensing import LaserScan
+from roboglot.text_files import open_bytes
 from roboglot.values import dataclass
 
 SCAN, ODOMETRY, MOVEMENT, POSE = "CObservation2DRangeScan", "CObservationOdometry", "CActionRobotMovement2D", "CPose2D"
@@ -152,9 +153,9 @@ def _headers_in(data: bytes, until: int) -> Generator[tuple[bytes, re.Match[byte
 
 
 def _opened(path: Path) -> BufferedIOBase:
-    with path.open("rb") as file:
+    with open_bytes(path) as file:
         packed = file.read(2) == b"\x1f\x8b"
-    return gzip.open(path) if packed else path.open("rb")
+    return gzip.open(path) if packed else open_bytes(path)
 
 
 def _joined(scans: Sequence[_Scan], stamped: Sequence[tuple[float, Pose]]) -> list[RecordedScan]:

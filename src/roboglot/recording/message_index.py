@@ -17,6 +17,7 @@ from mcap.records import Channel, Chunk, Message, Schema
 from mcap.summary import Summary
 
 from roboglot.recording.reader import BadRecording, parts, stream, summary_of, unpacked
+from roboglot.text_files import open_bytes
 from roboglot.values import dataclass
 from roboglot.wire.mcap_damage import DAMAGE
 
@@ -116,7 +117,7 @@ class MessageIndex:
     # -- files --
 
     def _part(self, path: Path) -> Iterator[_Chunk]:
-        with path.open("rb") as file:
+        with open_bytes(path) as file:
             summary = summary_of(file)
             if summary is not None:
                 yield from self._by_index(path, summary)
@@ -168,7 +169,7 @@ class MessageIndex:
     def _read(chunk: _Chunk) -> list[TimedMessage]:
         path, places = chunk.part.path, chunk.part.places
         try:
-            with path.open("rb") as file:
+            with open_bytes(path) as file:
                 file.seek(chunk.offset + RECORD_HEAD)
                 inside = unpacked(path, Chunk.read(ReadDataStream(file)))
         except DAMAGE as error:

@@ -22,6 +22,7 @@ from roboglot.model.inputs.external import Input
 from roboglot.model.tap import DRIVER, SILENT, Direction, Exchange
 from roboglot.recording.latched_values import REPEATED
 from roboglot.recording.messages import decode_exchange, decode_input
+from roboglot.text_files import open_bytes
 from roboglot.validation import decode_json
 from roboglot.values import dataclass
 from roboglot.wire.mcap_chunks import Allowance, Bomb, records_in
@@ -148,7 +149,7 @@ def records(path: Path) -> Iterator[tuple[object, Channel | None, Schema | None]
 
     Raises BadRecording, OSError.
     """
-    with path.open("rb") as file:
+    with open_bytes(path) as file:
         summary = summary_of(file)
         channels = {} if summary is None else summary.channels
         schemas = {} if summary is None else summary.schemas

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import cast
 
+from roboglot.text_files import open_bytes
 from roboglot.transport.log_limiter import LogLimiter
 from roboglot.values import dataclass
 
@@ -44,6 +45,8 @@ def server_context(certificate: Path, key: Path, oldest: ssl.TLSVersion = ssl.TL
     context.minimum_version = oldest
     context.options |= ssl.OP_NO_RENEGOTIATION | ssl.OP_NO_COMPRESSION | ssl.OP_NO_TICKET
     context.num_tickets = 0
+    for file in (certificate, key):
+        open_bytes(file).close()  # OpenSSL would wait for the writer of a named pipe
     context.load_cert_chain(certificate, key)
     return context
 

@@ -18,6 +18,7 @@ import grpc
 from roboglot.clients.errors import BadAnswer, LinkLost, TimedOut
 from roboglot.model.clock import Clock
 from roboglot.model.tap import LOST, Line
+from roboglot.text_files import open_bytes
 from roboglot.transport.grpc_wakeups import prompt_wakeups
 from roboglot.values import dataclass
 from roboglot.wire.cyberdog.channel import APP_PORT, LOST_AFTER, ROBOT_NAME, ROBOT_PORT, SERVICE, client_options
@@ -28,6 +29,7 @@ from roboglot.wire.cyberdog.proto import cyberdog_app_pb2 as pb
 REDIAL_MAX = 2000  # ms between two attempts to connect
 PUSH_MAX = 5_242_880  # bytes per message
 FOUND_PERIOD = 0.05  # s between two checks whether the robot has called
+PEM_MAX = 1 << 20  # bytes
 CALLERS_MAX = 64  # connections whose robot is remembered
 IN_BAND = re.compile(r'"error_code"\s*:\s*([1-9]\d*)')
 
@@ -52,7 +54,12 @@ class Certificates:
     @classmethod
     def load(cls, folder: Path) -> Certificates:
         """Load ca-cert.pem, client-cert.pem and client-key.pem, written by ``roboglot certs``. Raises OSError."""
-        return cls(*((folder / f"{name}.pem").read_bytes() for name in ("ca-cert", "client-cert", "client-key")))
+        return cls(*(_read_pem(folder / f"{name}.pem") for name in ("ca-cert", "client-cert", "client-key")))
+
+
+def _read_pem(path: Path) -> bytes:
+    with open_bytes(path) as file:
+        return file.read(PEM_MAX)
 
 
 @dataclass(frozen=True, slots=True)
