@@ -280,7 +280,7 @@ async def test_places(robot: Robot, client: httpx.AsyncClient, forward: Forward)
 
 
 async def test_places_are_adjusted_after_a_loop_was_closed(
-    robot: Robot, client: httpx.AsyncClient, forward: Forward
+    robot: Robot, client: httpx.AsyncClient, world: World, forward: Forward
 ) -> None:
     await forward(seconds=1)
     for id, x in (("near", 1.0), ("far", 9.0), ("moved", 1.0)):
@@ -290,6 +290,9 @@ async def test_places_are_adjusted_after_a_loop_was_closed(
         robot.events.publish(LoopClosed(stamp=1.0, shift=0.1, moved=moved[: 2 if y == 0.2 else 1]))
     await client.put(f"{POIS}/moved", json={"pose": {"x": 5.0, "y": 5.0, "yaw": 0.0}})
     await client.post(POIS, json={"id": "new", "pose": {"x": 1.0, "y": 0.5, "yaw": 0.0}})
+    (full,) = world.faults.inject("full_disk", "a")
+    assert (await client.post(f"{POIS}/:adjust")).status_code != 200
+    world.faults.clear(full.number)  # the shifts were lost with the failure
     reply = await client.post(f"{POIS}/:adjust")
     assert (reply.status_code, reply.content) == (200, b"")
     for _ in range(2):  # exactly once

@@ -9,6 +9,7 @@ import httpx
 import numpy as np
 import pytest
 
+from roboglot.model.actions import ActionStatus
 from roboglot.model.components.mapping.annotations import LineKind, MapAnnotations
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.mapping.mapping import Mapping
@@ -17,7 +18,7 @@ from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.system.firmware import Firmware
 from roboglot.model.events import LoopClosed
-from roboglot.model.geometry import Pose
+from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.protocols.slamware.chapters.slam.composite import (
     FloorMap,
@@ -78,6 +79,17 @@ async def test_invalid_map_is_refused_and_nothing_changes(robot: Robot, client: 
     assert (await client.post(f"{MULTI}/stcm", content=b"nonsense")).status_code == 400
     assert robot[Mapping].grid is grid
     assert robot[Places].all()
+
+
+async def test_refused_maps_stop_nothing(robot: Robot, client: httpx.AsyncClient, forward: Forward) -> None:
+    """The robot was stopped first, and then it turned out that there was no such map."""
+    drive = robot[Driving].drive(Twist(0.1), source="test")
+    await forward(seconds=1)
+    assert (await client.post(f"{MULTI}/stcm/:reload")).status_code == 404
+    floor = {"building": "", "floor": "9F"}
+    assert (await client.put(f"{MULTI}/floors/:current", json=floor)).status_code == 404
+    await forward(seconds=1)
+    assert drive.status is ActionStatus.EXECUTING
 
 
 async def test_memory_and_disk_are_two_things(robot: Robot, client: httpx.AsyncClient, drawn: None) -> None:

@@ -58,8 +58,8 @@ class PoiShifts:
             self._shifts = {id: Shift(Pose(*n[:3]), Pose(*n[3:])) for id, n in saved["shifts"].items()}
 
     async def adjust(self) -> None:
-        """Move places that were on the map at loop closures to their corrected poses."""
-        shifts, self._shifts = self._shifts, {}
+        """Move places that were on the map at loop closures to their corrected poses, which are kept if that fails."""
+        shifts = self._shifts
         if not shifts:
             return
 
@@ -68,6 +68,9 @@ class PoiShifts:
             return replace(place, pose=shift.should) if shift and place.pose == shift.has else place
 
         await self._robot[Places].change(lambda places: [moved(place) for place in places])
+        for id, shift in tuple(shifts.items()):
+            if self._shifts.get(id) is shift:  # else another closure came meanwhile
+                del self._shifts[id]
 
     def _closed(self, event: LoopClosed) -> None:
         if not event.moved or Places not in self._robot:

@@ -78,8 +78,8 @@ async def save_stcm(context: Context) -> None:
 )
 async def reload_stcm(context: Context, body: Reload | None = None) -> None:
     """Load the map from disk; without a pose the robot is on its dock, or in front of it. 404 if none is saved."""
-    context.actions.abort()
-    await context.maps.reload(pose_of(body.pose) if body and body.pose else None)
+    pose = pose_of(body.pose) if body and body.pose else None
+    await context.maps.reload(pose, stop=context.actions.abort)  # a refusal stops nothing
 
 
 @TABLE.on(
@@ -117,8 +117,8 @@ def get_current_floor(context: Context) -> CurrentFloorInfo:
 @TABLE.on(f"PUT {MAP}/floors/:current", right=Right.DRIVE)
 async def set_current_floor(context: Context, body: FloorChoice) -> None:
     """Switch to the map of the floor that the robot was carried to; 404 if it is not loaded."""
-    context.actions.abort()
-    await context.maps.enter(body.building, body.floor, pose_of(body.pose) if body.pose else None)
+    pose = pose_of(body.pose) if body.pose else None
+    await context.maps.enter(body.building, body.floor, pose, stop=context.actions.abort)
 
 
 def _selected(context: Context, floor: str, building: str) -> list[FloorMap]:
@@ -206,8 +206,7 @@ async def set_current_home_dock(context: Context, body: DockChoice) -> None:
     floor, dock = found
     await context.robot[Settings].put(BOUND, dock.id)
     if floor.name != context.maps.current:
-        context.actions.abort()
-        await context.maps.enter(floor.name.building, floor.name.floor, dock.pose)
+        await context.maps.enter(floor.name.building, floor.name.floor, dock.pose, stop=context.actions.abort)
     settle_home(context.robot)
 
 

@@ -60,6 +60,10 @@ FILE = "slamware/map.stcm"
 NO_GRID = "the map has no grid"
 
 
+def _go_on() -> None:
+    """Stop nothing."""
+
+
 class MapKeeper:
     """Map keeper of one robot; changes of its maps, in memory and on disk, are made one after the other."""
 
@@ -174,11 +178,14 @@ class MapKeeper:
         self._loaded.hold(await self._parse(data), _digest(data))
         self.status = MapLoadStatus.LOADED
 
-    async def reload(self, pose: Pose | None = None, *, restarting: bool = False) -> None:
+    async def reload(
+        self, pose: Pose | None = None, *, restarting: bool = False, stop: Callable[[], None] = _go_on
+    ) -> None:
         """Load the map from disk, after replacing it by the cloud's, if there is one. Raises NotFound without a map.
 
         Without ``pose`` the robot is taken to stand on its dock or in front of it. ``restarting``: keep drawings made
-        on that same map since it was saved, and continue at the last place on it.
+        on that same map since it was saved, and continue at the last place on it. ``stop`` is called before a map is
+        used, and not if there is none.
         """
         async with self._turn:
             before, self.status = self.status, MapLoadStatus.LOADING
@@ -192,7 +199,7 @@ class MapKeeper:
                     floor, pose = resumed(self._robot, floors, digest, last) or (floor, None)
                 keep = restarting and digest in bases(self._robot)
                 draw = self._turn_over(floor, digest) if keep else put_drawings(self._robot, floor, {digest: NOT_MOVED})
-                await self._use(floor, pose, draw)
+                await self._use(floor, pose, draw, stop)
             except NotFound:
                 self.status = before
                 raise
@@ -221,11 +228,11 @@ class MapKeeper:
         await files.write(FILE, data)
         self._synced()
 
-    async def enter(self, building: str, floor: str, pose: Pose | None) -> None:
-        """Use the map of another loaded floor, with its last drawings. Raises NotFound."""
+    async def enter(self, building: str, floor: str, pose: Pose | None, *, stop: Callable[[], None] = _go_on) -> None:
+        """Use the map of another loaded floor, with its last drawings, after calling ``stop``. Raises NotFound."""
         if (loaded := self._loaded.find(building, floor)) is not None:
             async with self._turn:
-                await self._use(loaded, pose, self._turn_over(loaded, self._loaded.digest))
+                await self._use(loaded, pose, self._turn_over(loaded, self._loaded.digest), stop)
             return
         raise NotFound(f"no floor {floor!r} of {building!r} is loaded")
 
@@ -250,12 +257,15 @@ class MapKeeper:
         async with self._parsing:
             return await asyncio.to_thread(_parsed, data)
 
-    async def _use(self, floor: FloorMap, pose: Pose | None, draw: Coroutine[object, None, None]) -> None:
+    async def _use(
+        self, floor: FloorMap, pose: Pose | None, draw: Coroutine[object, None, None], stop: Callable[[], None] = _go_on
+    ) -> None:
         """Load the grid into memory, call ``draw`` for its drawings, and set the robot's pose, else at its dock."""
         self._loading = True
         try:
             if floor.grid is None:
                 raise InvalidGoal(NO_GRID)
+            stop()
             with exchange(self._robot):
                 async with confirmed():
                     self._robot[Mapping].load(floor.grid, pose or ORIGIN)
