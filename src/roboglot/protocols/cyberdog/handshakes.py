@@ -10,12 +10,16 @@ import asyncio
 import ipaddress
 import logging
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from roboglot.protocols.cyberdog.app_link import host_of
 
 log = logging.getLogger(__name__)
-TABLES = (Path("/proc/self/net/tcp"), Path("/proc/self/net/tcp6"))
+TABLES = (  # gRPC listens for both families at once where it can; each table takes the kernel 5 ms on a slow machine
+    Path("/proc/self/net/tcp6"),
+    Path("/proc/self/net/tcp"),
+)
 FIELDS = 12  # per line, at least
 LISTENS, ESTABLISHED = "0A", "01"  # states of a connection
 IPAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
@@ -73,10 +77,11 @@ class Handshakes:
     def _look(self, look: asyncio.TimerHandle, peers: list[str]) -> None:
         self._looks.discard(look)
         self._watched.difference_update(peers)
-        there = {peer for peer, state in _peers(self._own, self.port).items() if state == ESTABLISHED}
-        for peer in peers:
-            if peer not in self._asked and peer not in there:
-                self._log_refusal(host_of(peer))
+        if silent := [peer for peer in peers if peer not in self._asked]:
+            there = {peer for peer, state in _peers(self._own, self.port).items() if state == ESTABLISHED}
+            for peer in silent:
+                if peer not in there:
+                    self._log_refusal(host_of(peer))
 
     def _log_refusal(self, host: str) -> None:
         now = self._loop.time()
@@ -106,23 +111,36 @@ def _peers(own: IPAddress | None, port: int) -> dict[str, str]:
     """Return the peers of open and recent connections, in gRPC's form, with their states."""
     peers: dict[str, str] = {}
     for table in TABLES:
-        try:
-            with table.open() as file:
-                lines = file.read(TABLE_MAX).splitlines()[1:]
-        except OSError:
-            continue
-        for line in lines:
-            if len(fields := line.split()) < FIELDS:  # the last line may be cut off
+        listens = False
+        for local, remote, state in _connections(table, port):
+            if own not in (None, _address(local)):
                 continue
-            _, local, remote, state, *_ = fields
-            here, _, at = local.partition(":")
-            if state == LISTENS or int(at, 16) != port or own not in (None, _address(here)):
+            if state == LISTENS:
+                listens = True
                 continue
             host, _, far = remote.partition(":")
             there = _address(host)
             written = f"ipv6:%5B{there}%5D" if there.version == 6 else f"ipv4:{there}"
             peers[f"{written}:{int(far, 16)}"] = state
+        if listens:
+            break
     return peers
+
+
+def _connections(table: Path, port: int) -> Iterator[tuple[str, str, str]]:
+    """Yield the local address, the remote address and port, and the state of a local port's connections."""
+    try:
+        with table.open() as file:
+            lines = file.read(TABLE_MAX).splitlines()[1:]
+    except OSError:
+        return
+    for line in lines:
+        if len(fields := line.split()) < FIELDS:  # the last line may be cut off
+            continue
+        _, local, remote, state, *_ = fields
+        here, _, at = local.partition(":")
+        if int(at, 16) == port:
+            yield here, remote, state
 
 
 def _address(text: str) -> IPAddress:
