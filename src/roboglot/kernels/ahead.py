@@ -44,7 +44,8 @@ def missing(modules: Sequence[str] = MODULES) -> list[str]:
 
 
 def _missing(folder: Path, modules: Sequence[str]) -> list[str]:
-    return [name for name in modules if not (folder / _mark(name)).exists()]
+    stat = cache(os.stat)  # most modules are built from the same few files
+    return [name for name in modules if not os.path.exists(f"{folder}/{_mark(name, stat)}")]
 
 
 def compile_ahead(modules: Sequence[str] = MODULES, report: Report = lambda _name, _done, _total: None) -> None:
@@ -127,8 +128,8 @@ def _forget(names: Sequence[str]) -> None:
             old.unlink(missing_ok=True)
 
 
-def _mark(name: str) -> str:
-    stats = [os.stat(f"{HERE}/{source}.py") for source in _sources(name)]  # every start asks for all of them
+def _mark(name: str, stat: Callable[[str], os.stat_result] = os.stat) -> str:
+    stats = [stat(f"{HERE}/{source}.py") for source in _sources(name)]  # every start asks for all of them
     text = f"{_machine()} {HERE} {[(stat.st_mtime_ns, stat.st_size) for stat in stats]}"
     return f"roboglot-{name}.{hashlib.sha256(text.encode()).hexdigest()[:16]}.compiled"
 

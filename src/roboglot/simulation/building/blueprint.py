@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from enum import StrEnum
-from functools import lru_cache
 
 from roboglot.model.geometry import Pose
+from roboglot.simulation.building.keeping import kept
 from roboglot.simulation.world.description import Box, Cylinder, Floor, Lift, Material, Person, Shelf, Spot, Wall
 from roboglot.values import dataclass
 
@@ -63,17 +63,9 @@ class Rectangle:
         return math.hypot(dx, dy)
 
 
+@kept(FLOORS_MAX)
 def solids_of(floor: Floor, lift: Lift | None, lift_here: bool) -> tuple[Solid, ...]:
     """Return all still solids of one floor. ``lift_here``: the car is parked here, so the landing door is open."""
-    try:
-        hash(floor)
-    except TypeError:  # created by hand, with lists
-        return tuple(_solids(floor, lift, lift_here))
-    return _kept_solids(floor, lift, lift_here)
-
-
-@lru_cache(FLOORS_MAX)
-def _kept_solids(floor: Floor, lift: Lift | None, lift_here: bool) -> tuple[Solid, ...]:
     return tuple(_solids(floor, lift, lift_here))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from roboglot.kernels import loading
 from roboglot.kernels.arrays import FloatArray
 from roboglot.simulation.building.blueprint import SolidKind, solids_of
+from roboglot.simulation.building.keeping import WORLDS_MAX, kept
 from roboglot.simulation.world.description import WorldDescription
 
 
@@ -17,15 +18,7 @@ class Walls:
     """Distances to walls and furniture, without movable things."""
 
     def __init__(self, world: WorldDescription) -> None:
-        self._floors = []
-        for floor in world.floors:
-            solids = [s for s in solids_of(floor, world.lift, lift_here=True) if s.kind is not SolidKind.DOCK]
-            rows = [(s.pose.x, s.pose.y, math.cos(s.pose.yaw), math.sin(s.pose.yaw), *s.size[:2]) for s in solids]
-            self._floors.append(np.array(rows).reshape(-1, 6).T.copy())
-
-        numbered = [np.vstack((those, np.full(those.shape[1], floor))) for floor, those in enumerate(self._floors)]
-        self._table = np.ascontiguousarray(np.hstack(numbered).T)
-        self._table[:, 4:6] /= 2.0
+        self._floors, self._table = _rows_of(world)
         self._room: Callable[[FloatArray, float, float, int], float] | None = None
 
     @property
@@ -49,3 +42,17 @@ class Walls:
         along = np.maximum(0.0, np.abs(c * dx + s * dy) - width / 2)
         aside = np.maximum(0.0, np.abs(c * dy - s * dx) - depth / 2)
         return float(np.sqrt(np.min(along * along + aside * aside, initial=np.inf)))
+
+
+@kept(WORLDS_MAX)
+def _rows_of(world: WorldDescription) -> tuple[list[FloatArray], FloatArray]:
+    """Return each floor's solids, in columns, and the table of all."""
+    floors = []
+    for floor in world.floors:
+        solids = [s for s in solids_of(floor, world.lift, lift_here=True) if s.kind is not SolidKind.DOCK]
+        rows = [(s.pose.x, s.pose.y, math.cos(s.pose.yaw), math.sin(s.pose.yaw), *s.size[:2]) for s in solids]
+        floors.append(np.array(rows).reshape(-1, 6).T.copy())
+    numbered = [np.vstack((those, np.full(those.shape[1], floor))) for floor, those in enumerate(floors)]
+    table = np.ascontiguousarray(np.hstack(numbered).T)
+    table[:, 4:6] /= 2.0
+    return floors, table

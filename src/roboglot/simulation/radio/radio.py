@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from roboglot.model.components.logistics.traffic_radio import Announcement
 from roboglot.model.geometry import Point, Pose
 from roboglot.simulation.building.blueprint import SolidKind, solids_of
+from roboglot.simulation.building.keeping import WORLDS_MAX, kept
 from roboglot.simulation.world.description import AccessPoint, Mobile, WorldDescription
 
 EXPONENT = 2.2  # indoors, with line of sight
@@ -92,6 +93,7 @@ class Radio:
         return power - loss - SLAB_LOSS * slabs - WALL_LOSS * walls
 
 
+@kept(WORLDS_MAX)
 def walls_of(world: WorldDescription) -> list[NDArray[np.float64]]:
     """Return the walls' middle lines by floor: rows x, y of both ends, then of their difference (6, n; m)."""
     floors = []

@@ -318,7 +318,7 @@ class PlannedFault(Struct, frozen=True, forbid_unknown_fields=True):
     options: dict[str, float | int | str] = {}
 
 
-class Floor(Struct, frozen=True, forbid_unknown_fields=True):
+class Floor(Struct, frozen=True, cache_hash=True, forbid_unknown_fields=True):
     """One storey; ``origin``: its lower left corner. ``like``: an earlier floor to copy walls and furniture from."""
 
     size: tuple[Positive, Positive]
@@ -350,7 +350,7 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
         return self.terrain + tuple(tread for flight in self.stairs for tread in flight.treads)
 
 
-class WorldDescription(Struct, frozen=True, forbid_unknown_fields=True):
+class WorldDescription(Struct, frozen=True, cache_hash=True, forbid_unknown_fields=True):
     """A whole world; floors from the ground up."""
 
     floors: tuple[Floor, ...]

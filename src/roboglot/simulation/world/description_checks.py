@@ -10,6 +10,7 @@ import msgspec
 
 from roboglot.model.components.system.network import PASSWORD_MIN
 from roboglot.model.perception import TagKind
+from roboglot.simulation.building.keeping import WORLDS_MAX, kept
 from roboglot.simulation.building.printed_codes import QR_BYTES_MAX
 from roboglot.simulation.faults.faults import problem_of
 from roboglot.simulation.people.routine import Walk
@@ -28,6 +29,7 @@ from roboglot.simulation.world.description import (
 EDGE = 0.5  # m by which objects may protrude from a floor
 
 
+@kept(WORLDS_MAX)
 def completed(world: WorldDescription, where: str) -> WorldDescription:
     """Return ``world`` with every ``like`` of its floors resolved. Raises BadFile, prefixed with ``where``."""
     floors: list[Floor] = []
