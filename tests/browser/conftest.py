@@ -20,7 +20,7 @@ from roboglot.model.clock import LockstepClock
 from roboglot.protocols.slamware.config import SlamwareConfig
 from roboglot.protocols.visual.config import VisualConfig
 from roboglot.runtime import Runtime
-from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, OpenConsole, Page, Served, Tabs
+from tests.browser.served import ADDRESS, FRIEND, REBOUND, STRANGER, OpenConsole, Page, Served, Tabs, keep_modules
 
 # The shell is the same engine without a browser's own windows, which take as much of the processor as the pages.
 KINDS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
@@ -117,6 +117,7 @@ async def all_tabs(browser: Any, opened: Served) -> Tabs:
     """Pages of this robot's console."""
     assert opened.runtime.console is not None
     await opened.runtime.console.ready()
+    keep_modules(opened.runtime.console)
     return Tabs(browser, opened.runtime.console.address)
 
 

@@ -7,8 +7,11 @@ import contextlib
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
+from roboglot.console.application import Application
+from roboglot.console.http import Message, Scope, Send
+from roboglot.console.server import Console
 from roboglot.console.teleop import PAD
 from roboglot.model.action import ActionStatus
 from roboglot.model.clock import LockstepClock
@@ -81,6 +84,26 @@ async def until(page: Page, expression: str) -> None:
             return
         await asyncio.sleep(0.05)
     raise AssertionError(expression)
+
+
+def keep_modules(console: Console) -> None:
+    """Let browsers keep scripts, styles and words for the whole run: else a page asks for some forty of them again.
+
+    That took a quarter of a page's work. A restarted server's new modules are in test_studio_restart.py.
+    """
+    application = cast(Application, console._application)
+    serve = application._serve_file
+
+    async def serve_for_long(scope: Scope, send: Send) -> None:
+        async def send_for_long(message: Message) -> None:
+            headers = dict(message.get("headers", ()))
+            if b"cache-control" in headers and b"html" not in headers[b"content-type"]:
+                message = {**message, "headers": [*(headers | {b"cache-control": b"max-age=3600"}).items()]}
+            await send(message)
+
+        await serve(scope, send_for_long)
+
+    application._serve_file = serve_for_long  # type: ignore[method-assign]
 
 
 class Tabs:
