@@ -16,7 +16,7 @@ from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.docking import Docking
 from roboglot.model.components.system.file_store import FileStore
 from roboglot.model.components.system.firmware import Firmware
-from roboglot.model.errors import NotFound
+from roboglot.model.errors import NotFound, Refused
 from roboglot.model.geometry import Twist
 from roboglot.model.tap import Direction
 from roboglot.protocols.vda5050.chapters.sensing import REPORTS, REPORTS_MAX
@@ -65,6 +65,20 @@ async def test_a_load_is_picked_reported_and_dropped(yard: Opened) -> None:
     assert states(one)["d"][0] == "FINISHED"
     assert one.control.state["loads"] == []
     assert one.control.errors.count("ACTION_FAILED") == 1
+
+
+async def test_unreported_load_is_left_out_of_states(yard: Opened, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a real robot's jack no state was sent at all."""
+
+    def unreported(_: object) -> bool:
+        raise Refused("this robot does not report whether its jack is loaded")
+
+    one = await yard(**robot_at(7.5, 6.0))
+    monkeypatch.setattr(type(one.robot[Jack]), "loaded", property(unreported))
+    one.control.send("order", here(action("pick", "p")))
+    await one.until(lambda: states(one).get("p", ("", ""))[0] == "FAILED")
+    assert states(one)["p"][1] == "this robot does not report whether its jack is loaded"
+    assert "loads" not in one.control.state
 
 
 @pytest.mark.slow  # in short: test_a_load_is_picked_reported_and_dropped

@@ -12,7 +12,6 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from roboglot.model.admission import Forbidden, Right
-from roboglot.model.components.logistics.jack import Jack
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.odometry import Odometry
@@ -29,7 +28,7 @@ from roboglot.protocols.vda5050.order_check import check_order
 from roboglot.protocols.vda5050.performing import Performer
 from roboglot.protocols.vda5050.route import Route
 from roboglot.protocols.vda5050.table import INSTANT, PROMPT, operation_of
-from roboglot.protocols.vda5050.vocabulary import DOOR
+from roboglot.protocols.vda5050.vocabulary import DOOR, is_loaded
 from roboglot.wire.vda5050.orders import Edge, InstantActions, Malformed, Node, OrderMessage, read
 from roboglot.wire.vda5050.versions import ErrorKind, Level, Version
 
@@ -71,7 +70,7 @@ class Context:
         return self.robot[Odometry].reading.distance if Odometry in self.robot else 0.0
 
     def _jack_changed(self, _: JackChanged) -> None:
-        if not self.robot[Jack].loaded:  # the next load is another, whichever door set this one down
+        if not is_loaded(self.robot):  # the next load is another, whichever door set this one down
             self.load = {}
 
     def touch(self) -> None:

@@ -16,6 +16,7 @@ from roboglot.model.components.sensing.bumper import Bumper
 from roboglot.model.components.sensing.odometry import Odometry
 from roboglot.model.components.system.lease import Lease
 from roboglot.model.components.system.link import is_current, was_heard
+from roboglot.model.errors import Refused
 from roboglot.model.geometry import wrap_angle
 from roboglot.model.robot import Robot
 from roboglot.protocols.vda5050.order_book import ActionState, OrderBook
@@ -103,10 +104,18 @@ def safety(robot: Robot, version: Version) -> dict[str, object]:
 
 
 def loads(robot: Robot, known: Mapping[str, str]) -> dict[str, object]:
-    """Return the jack's load, with fleet control's own data about it; nothing for a robot without a jack."""
-    if Jack not in robot:
+    """Return the jack's load, with fleet control's own data about it; nothing where that is unknown."""
+    if (loaded := is_loaded(robot)) is None:
         return {}
-    return {"loads": [{**known, "loadPosition": JACK_POSITION}] if robot[Jack].loaded else []}
+    return {"loads": [{**known, "loadPosition": JACK_POSITION}] if loaded else []}
+
+
+def is_loaded(robot: Robot) -> bool | None:
+    """Return whether the jack carries a load; None without a jack, and for a real one that does not report it."""
+    try:
+        return robot[Jack].loaded if Jack in robot else None
+    except Refused:
+        return None
 
 
 def progress(book: OrderBook) -> dict[str, object]:

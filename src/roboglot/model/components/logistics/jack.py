@@ -38,7 +38,7 @@ class Jack(Component):
     @property
     @abstractmethod
     def loaded(self) -> bool:
-        """True if something rests on the platform."""
+        """True if something rests on the platform. Raises Refused if the robot does not report it."""
 
     @property
     @abstractmethod
