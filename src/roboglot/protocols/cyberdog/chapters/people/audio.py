@@ -66,7 +66,7 @@ def activated(robot: Robot, uid: str | None = None) -> bool:
     return uid is None or account["uid"] == uid
 
 
-@TABLE.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Members,))
+@TABLE.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Hearing, Members))
 async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, object]:
     """Learn the next speaker's voice for a member; push 3013 reports the outcome within 30 s."""
     call.context.robot[Hearing]

@@ -61,7 +61,7 @@ async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
     return {"success": True}
 
 
-@TABLE.on(Code.SET_MICROPHONE, right=Right.EDIT)
+@TABLE.on(Code.SET_MICROPHONE, right=Right.EDIT, needs=(Hearing, Settings))
 async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
     """Switch the voice board's microphone; voice control and voiceprints need it."""
     call.context.robot[Hearing]
@@ -70,7 +70,7 @@ async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
     return {"success": True}
 
 
-@TABLE.on(Code.SET_VOICE_CONTROL, right=Right.EDIT)
+@TABLE.on(Code.SET_VOICE_CONTROL, right=Right.EDIT, needs=(Hearing, Settings))
 async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
     """Switch voice control: the wake word, and the commands after it."""
     call.context.robot[Hearing]

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import msgspec
 
+from roboglot.model.components.motion.base import Base
 from roboglot.model.components.sensing.sensor_masks import SensorMasks
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.errors import InvalidGoal, NotFound
@@ -39,6 +40,8 @@ class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
     "PUT /api/core/system/v1/cube/config",
     partial="the format that the vendor's tool exports is not public and refused; a JSON object of our own configures",
     right=Right.EDIT,
+    needs=(Base, Settings),
+    some=(SensorMasks,),
 )
 async def set_cube_config(context: Context, body: bytes) -> None:
     """Configure the machine; 400 for unknown settings or values beyond the robot's limits."""

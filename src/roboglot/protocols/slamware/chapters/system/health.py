@@ -84,7 +84,7 @@ def _has(robot: Robot, name: str) -> bool:
     return Health in robot and robot[Health].has(name)
 
 
-@TABLE.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE)
+@TABLE.on(f"DELETE {API}/{{error_code}}", right=Right.DRIVE, needs=(Health,))
 def clear_robot_health(context: Context, error_code: int) -> None:
     """Dismiss a fault, which returns while its cause persists; 400 for an unknown code.
 
