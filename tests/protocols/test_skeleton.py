@@ -50,7 +50,9 @@ def test_handlers_declare_components_that_they_take(door: DoorType) -> None:
     for operation in module(door, "table").TABLE:
         handler = inspect.unwrap(operation.handler)
         source = inspect.getsource(handler)
-        taken = {handler.__globals__.get(name) for name in re.findall(r"\brobot\[(\w+)\]", source)}
+        required = re.findall(r"robot\.require\(([\w, ]+)\)", source)
+        names = [*re.findall(r"\brobot\[(\w+)\]", source), *", ".join(required).split(", ")]
+        taken = {handler.__globals__.get(name) for name in names}
         if_there = {handler.__globals__.get(name) for name in re.findall(r"\b(\w+) (?:not )?in [\w.]*robot\b", source)}
         kinds = {kind for kind in taken - if_there if inspect.isclass(kind)}
         if missing := kinds - operation.needs - operation.some:

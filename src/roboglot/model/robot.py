@@ -78,6 +78,11 @@ class Robot:
         except KeyError:
             raise ComponentMissing(interface) from None
 
+    def require(self, *interfaces: type[Component]) -> None:
+        """Raise ComponentMissing for the first of these that the robot lacks."""
+        for interface in interfaces:
+            self[interface]
+
     def __contains__(self, interface: type[Component]) -> bool:
         return interface in self._components
 

@@ -24,17 +24,17 @@ class EventSwitches:
 
     def armor(self, on: bool) -> None:
         """Switch ``armor event hit``: plate and cause."""
-        _ = self._robot[Armor]
+        self._robot.require(Armor)
         self._switch("armor", on, lambda: self._robot.events.listen(ArmorHit, self._on_hit))
 
     def adapters(self, on: bool) -> None:
         """Switch ``sensor_adapter event io_level``: changed level of an input."""
-        _ = self._robot[SensorAdapters]
+        self._robot.require(SensorAdapters)
         self._switch("adapters", on, lambda: self._robot.events.listen(AdapterLevelChanged, self._on_level))
 
     def applause(self, on: bool) -> None:
         """Switch ``sound event applause``: number of claps in a row."""
-        _ = self._robot[Hearing]
+        self._robot.require(Hearing)
         self._switch("applause", on, self._listen)
 
     def reset(self) -> None:

@@ -148,7 +148,7 @@ def set_attribute(
     marker_dist: MarkerDistance | None = None,
 ) -> None:
     """Filter lines and markers by colour, and markers by distance, m (3.2.15.1)."""
-    _ = context.robot[Vision]
+    context.robot.require(Vision)
     ai = context.part(Ai)
     ai.line_colour = line_color or ai.line_colour
     ai.marker_colour = marker_color or ai.marker_colour
@@ -174,5 +174,5 @@ def push(
     words = {"person": person or people, "gesture": gesture or pose, "marker": marker, "robot": robot, "line": line}
     if {person, people} == {"on", "off"} or {gesture, pose} == {"on", "off"}:
         raise InvalidGoal("the same attribute is on and off")
-    _ = context.robot[Vision]
+    context.robot.require(Vision)
     context.part(Ai).switch({name: word == "on" for name, word in words.items() if word})

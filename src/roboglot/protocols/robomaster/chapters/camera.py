@@ -23,7 +23,7 @@ def expose(context: Context, ev_level: Exposure) -> None:
 @TABLE.on("stream on", right=Right.SEE, needs=(VideoStream,))
 def stream_on(context: Context) -> None:
     """Start H.264 to all clients of the video port (3.2.17.1); no effect if started."""
-    _ = context.robot[VideoStream]
+    context.robot.require(VideoStream)
     context.outlets.video.switch(True)
     context.at_end("stream", lambda: context.outlets.video.switch(False))
 
@@ -37,7 +37,7 @@ def stream_off(context: Context) -> None:
 @TABLE.on("audio on", right=Right.SEE, needs=(AudioStream,))
 def audio_on(context: Context) -> None:
     """Start Opus to all clients of the audio port (3.2.18.1); no effect if started."""
-    _ = context.robot[AudioStream]
+    context.robot.require(AudioStream)
     context.outlets.audio.switch(True)
     context.at_end("audio", lambda: context.outlets.audio.switch(False))
 

@@ -62,7 +62,7 @@ class GamePushes:
 @TABLE.on("game_msg on", right=Right.SEE, needs=(InputDevice,))
 def game_on(context: Context) -> None:
     """Push keys and mouse (3.2.20.1)."""
-    _ = context.robot[InputDevice]
+    context.robot.require(InputDevice)
     context.part(GamePushes).switch(True)
 
 

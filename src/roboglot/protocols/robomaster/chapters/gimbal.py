@@ -130,7 +130,7 @@ def push(
     context: Context, *, attitude: Switch | None = None, afreq: Rate | None = None, freq: Rate | None = None
 ) -> None:
     """Switch pushes of the attitude, at afreq Hz (3.2.4.8); rates without the attribute's switch are refused."""
-    _ = context.robot[Gimbal]
+    context.robot.require(Gimbal)
     if not attitude:
         raise InvalidGoal("say which attribute, and on or off: `gimbal push attitude on afreq 10`")
     context.pushes.switch("gimbal", "attitude", attitude == "on", afreq or freq)

@@ -36,7 +36,7 @@ class MediaPort:
     def switch(self, on: bool) -> None:
         """Start or stop the stream; idempotent. Raises ComponentMissing if the robot has no such stream."""
         if on:
-            _ = self._robot[self._stream]
+            self._robot.require(self._stream)
         if on != self.on:
             self.on = on
             for watcher in tuple(self._watchers):

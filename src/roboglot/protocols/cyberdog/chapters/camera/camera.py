@@ -88,7 +88,7 @@ async def _refused(error: FileError) -> AsyncGenerator[pb.FileChunk, None]:
 async def camera(call: Call, *, command: Int32) -> dict[str, int]:
     """Take a photo (1), begin (2) or end (3) a recording; files stay on the robot until they are fetched."""
     robot, kept = call.context.robot, call.context.files
-    robot[Camera], robot[Recorder]
+    robot.require(Camera, Recorder)
     try:
         match command:
             case 1:

@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 @TABLE.on(Code.VIDEO, right=Right.SEE, needs=(Camera, VideoStream))
 async def signal(call: Call) -> str:
     """Handle the app's offers, candidates and stops; the robot's own are pushes of the same code."""
-    call.context.robot[Camera], call.context.robot[VideoStream]
+    call.context.robot.require(Camera, VideoStream)
     try:
         call.context.video.take(read_signal(read_params(call.text)))
     except BadSignal as bad:

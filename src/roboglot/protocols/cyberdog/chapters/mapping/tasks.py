@@ -77,8 +77,7 @@ async def start_task(
         return call.refused({"accepted": int(Accepted.NO)}, f"there is no task of type {type}")
     kind = TaskType(type)
     order = TaskRequest(kind, outdoor and kind in IN_A_MAP, object_tracking and kind is TaskType.VISION_FOLLOWING)
-    for component in NEEDS_FOR_THINGS if order.thing else NEEDS[kind]:
-        context.robot[component]
+    context.robot.require(*NEEDS_FOR_THINGS if order.thing else NEEDS[kind])
     if kind is TaskType.NAVIGATION and (goalX is None or goalY is None):
         raise InvalidGoal("a goal needs goalX and goalY")
     manner = manner_of(relative_pos, keep_distance) if kind in FOLLOWS else manner_of(AUTOMATIC, 0.0)

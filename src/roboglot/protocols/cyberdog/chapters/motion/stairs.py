@@ -52,7 +52,7 @@ async def align_with_stairs(call: Call, *, data: bool) -> dict[str, object]:
 @TABLE.on(Code.END_STAIR_ALIGNMENT, right=Right.DRIVE, needs=(StairAlignment,))
 async def end_stair_alignment(call: Call) -> dict[str, bool]:
     """Stop the alignment of any client, if there is one. Answered once the robot stands."""
-    call.context.robot[StairAlignment]
+    call.context.robot.require(StairAlignment)
     for action in call_off(call.context.robot, "stopped by the app"):
         await action.done()
     return {"success": True}

@@ -30,7 +30,7 @@ LASTS_MAX = 10 * 365 * 86_400  # s
 @TABLE.on(Code.AUDIO_IDENTITY, right=Right.SEE, needs=(Hearing,))
 async def audio_identity(call: Call) -> dict[str, str]:
     """Return the device that asks for an account: its id (made from the serial number) and its serial number."""
-    call.context.robot[Hearing]
+    call.context.robot.require(Hearing)
     serial = call.context.robot.description.serial
     return {"did": str(uuid.uuid5(DEVICES, serial)), "sn": serial}
 
@@ -45,7 +45,7 @@ async def audio_token(
     token_expires_in: str | int = "",
 ) -> dict[str, bool]:
     """Activate the voice board for ``uid`` until the token expires (s from now); false for an expired token."""
-    call.context.robot[Hearing]
+    call.context.robot.require(Hearing)
     lasts = _seconds(token_expires_in)
     account = str(uid)
     if not (account.isascii() and account.isdecimal() and len(account) <= ID_MAX and int(account) <= UID_MAX):
@@ -69,7 +69,7 @@ def activated(robot: Robot, uid: str | None = None) -> bool:
 @TABLE.on(Code.TRAIN_VOICE, right=Right.EDIT, needs=(Hearing, Members))
 async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") -> dict[str, object]:
     """Learn the next speaker's voice for a member; push 3013 reports the outcome within 30 s."""
-    call.context.robot[Hearing]
+    call.context.robot.require(Hearing)
     call.context.voice.train(nick_name, voiceprint_id[:ID_MAX])
     return {}
 
@@ -77,7 +77,7 @@ async def train_voice(call: Call, *, nick_name: str, voiceprint_id: str = "") ->
 @TABLE.on(Code.CANCEL_VOICE, right=Right.EDIT, needs=(Hearing,))
 async def cancel_voice(call: Call) -> dict[str, object]:
     """Stop learning a voice."""
-    call.context.robot[Hearing]
+    call.context.robot.require(Hearing)
     call.context.voice.stop_training()
     return {}
 
@@ -85,7 +85,7 @@ async def cancel_voice(call: Call) -> dict[str, object]:
 @TABLE.on(Code.VOICEPRINTS, right=Right.EDIT, needs=(Hearing, Settings))
 async def voiceprints(call: Call, *, voiceprints_data: str = "") -> str:
     """Store the app's answer to push 3014. Robots recognise people by voices that they learned themselves."""
-    call.context.robot[Hearing]
+    call.context.robot.require(Hearing)
     if len(voiceprints_data) > VOICEPRINTS_MAX:
         raise BadParameters(f"voiceprints_data has up to {VOICEPRINTS_MAX} characters")
     await call.context.robot[Settings].put(VOICEPRINTS, voiceprints_data)

@@ -29,7 +29,7 @@ async def enter_face(
 ) -> dict[str, object]:
     """Enrol (0), cancel (1), confirm (2: no effect), rename (3) or delete (4) a face, or list members with one (5)."""
     robot = call.context.robot
-    robot[Vision], robot[Members]
+    robot.require(Vision, Members)
     try:
         match command:
             case 0 | 1 | 2:
@@ -84,7 +84,7 @@ async def recognise_faces(
 ) -> dict[str, object]:
     """Recognise all faces (0) or ``username`` (1) for ``timeout`` s (1 to 300), or stop (2). Reports: push 7004."""
     faces = call.context.faces
-    call.context.robot[Vision]
+    call.context.robot.require(Vision)
     if command == 2:
         if not faces.entering:
             faces.stop()

@@ -65,7 +65,7 @@ async def download_update(call: Call, *, modules: object) -> dict[str, object]:
 @TABLE.on(Code.INSTALL_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def install_update(call: Call, *, md5: str) -> dict[str, object]:
     """Install the download and restart; the manual spells the key "reponse", clients read either."""
-    call.context.robot[Firmware]
+    call.context.robot.require(Firmware)
     code = call.context.updates.obstacle(md5)
     if code == GOOD:
         call.context.updates.install()
@@ -77,7 +77,7 @@ async def install_update(call: Call, *, md5: str) -> dict[str, object]:
 @TABLE.on(Code.UPDATE_PROGRESS, right=Right.SEE, needs=(Firmware,))
 async def update_progress(call: Call) -> dict[str, int]:
     """Return the progress of download and installation, percent; -1 failed, -2 too little space."""
-    call.context.robot[Firmware]
+    call.context.robot.require(Firmware)
     return call.context.updates.progress()
 
 
@@ -91,7 +91,7 @@ async def update_time(call: Call) -> dict[str, int]:
 @TABLE.on(Code.START_UPDATE, right=Right.ADMIN, needs=(Firmware,))
 async def start_update(call: Call, *, operate: str = "", id: Id = "", data: object = None) -> object:
     """Answers ``accepted``, feedback, result; the work continues if the stream breaks."""
-    call.context.robot[Firmware]
+    call.context.robot.require(Firmware)
     if operate not in OPERATIONS:
         return call.refused({"accepted": int(Accepted.NO)}, f"operate is one of {', '.join(OPERATIONS)}")
     if call.context.jobs.stream is not None:
@@ -102,7 +102,7 @@ async def start_update(call: Call, *, operate: str = "", id: Id = "", data: obje
 @TABLE.on(Code.JOIN_UPDATE, right=Right.SEE, needs=(Firmware,))
 async def join_update(call: Call) -> object:
     """Take over the stream of the goal under way, from its latest feedback on."""
-    call.context.robot[Firmware]
+    call.context.robot.require(Firmware)
     stream = call.context.jobs.stream
     if stream is None:
         return call.refused({"accepted": int(Accepted.NOTHING_TO_JOIN)}, "no goal is under way")

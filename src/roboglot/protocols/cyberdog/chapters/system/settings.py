@@ -64,7 +64,7 @@ async def set_volume(call: Call, *, volume: Int32) -> dict[str, bool]:
 @TABLE.on(Code.SET_MICROPHONE, right=Right.EDIT, needs=(Hearing, Settings))
 async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
     """Switch the voice board's microphone; voice control and voiceprints need it."""
-    call.context.robot[Hearing]
+    call.context.robot.require(Hearing)
     await call.context.robot[Settings].put(MICROPHONE, enable)
     call.context.voice.adapt()
     return {"success": True}
@@ -73,7 +73,7 @@ async def set_microphone(call: Call, *, enable: bool) -> dict[str, bool]:
 @TABLE.on(Code.SET_VOICE_CONTROL, right=Right.EDIT, needs=(Hearing, Settings))
 async def set_voice_control(call: Call, *, enable: bool) -> dict[str, bool]:
     """Switch voice control: the wake word, and the commands after it."""
-    call.context.robot[Hearing]
+    call.context.robot.require(Hearing)
     await call.context.robot[Settings].put(VOICE_CONTROL, enable)
     call.context.voice.adapt()
     return {"success": True}
@@ -94,6 +94,6 @@ async def set_eye_light(call: Call, *, eyelight: Int32) -> dict[str, bool]:
 @TABLE.on(Code.STOP_SOUND, right=Right.DRIVE, needs=(Speaker,))
 async def stop_sound(call: Call) -> dict[str, bool]:
     """Stop the sound of any client."""
-    call.context.robot[Speaker]
+    call.context.robot.require(Speaker)
     await call.context.robot.actions.cancel(resource=SPEAKER, reason="silenced by the app")
     return {}

@@ -28,14 +28,14 @@ def _current(robot: Robot) -> str:
 @TABLE.on(f"GET {API}", right=Right.SEE, needs=(Navigation,))
 def get_motion_strategies(context: Context) -> list[str]:
     """Return all strategies."""
-    _ = context.robot[Navigation]
+    context.robot.require(Navigation)
     return list(SHARES)
 
 
 @TABLE.on(f"GET {API}/:current", right=Right.SEE, needs=(Navigation,))
 def get_current_strategy(context: Context) -> Text:
     """Return the current strategy."""
-    _ = context.robot[Navigation]
+    context.robot.require(Navigation)
     return Text(_current(context.robot))
 
 
@@ -44,6 +44,6 @@ async def set_current_strategy(context: Context, body: Strategy) -> bool:
     """Set the strategy of further actions, kept over restarts; 400 for an unknown name."""
     if body.strategy not in SHARES:
         raise InvalidGoal(f"there is no strategy {body.strategy}")
-    _ = context.robot[Navigation]
+    context.robot.require(Navigation)
     await context.robot[Settings].put(CURRENT, body.strategy)
     return True

@@ -25,7 +25,7 @@ def get_system_parameter(context: Context, param: Readable) -> Text:
         case "base.max_angular_speed":
             return Text(f"{context.robot[Base].limits.twist.yaw:.6f}")
         case "docking.docked_register_strategy":
-            _ = context.robot[Docking]
+            context.robot.require(Docking)
             return Text("when_not_exists")  # the actual behaviour: only a robot without a dock learns one by touch
 
 

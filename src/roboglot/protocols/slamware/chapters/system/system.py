@@ -118,5 +118,5 @@ def device_id(robot: Robot) -> str:
 @TABLE.on(f"GET {API}/laserscan", right=Right.SEE, needs=(Lidar, Localization, Odometry))
 def get_laser_scan(context: Context) -> LaserScan:
     """Return the lidar's last turn (rad from straight ahead, m) and the robot's pose at its time."""
-    _ = context.robot[Lidar]
+    context.robot.require(Lidar)
     return LaserScan(pose3d(context.laser.pose), context.laser.points)
