@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 
 import pytest
 
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.geometry import Pose
 from tests.protocols.cyberdog.phone import App, Client, Stream, state, until
 
@@ -110,5 +112,20 @@ async def test_a_wall_is_no_thing_to_follow(client: Client, robot, world, passin
     assert await client.ask(6008, {"roi": middle}) == {"success": True}
     await passing(lambda: stream.ended)
     assert stream.codes[-1] == 507
+    assert stream.answers[-2]["feedback_msg"]
     assert stream.answers[-1] == {"result": 3}
     assert await state(client) == 101
+
+
+async def test_reason_against_following_is_logged(
+    client: Client, app: App, robot, anna, passing, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It was swallowed, as if another client could only be driving."""
+    caplog.set_level(logging.INFO)
+    stream = Stream(client, 6004, {"type": 13})
+    await passing(lambda: any(push["body_info_roi"] for push in app.of(6007)))
+    await robot[Lease].take("someone else")
+    await client.ask(6008, {"roi": app.of(6007)[-1]["body_info_roi"][0]["roi"]})
+    await passing(lambda: stream.ended)
+    assert stream.answers[-1] == {"result": 3}
+    assert any("VISION_FOLLOWING failed" in line and "someone else" in line for line in caplog.messages)

@@ -80,14 +80,13 @@ async def _pursue(
         task.feedback(Feedback.FOLLOW_CHOSEN)
         action = task.action = follow(chosen)
         await _report(context, task, action, Feedback.FOLLOWING, Feedback.TARGET_SEARCHED)
-    except NotFound:
-        task.feedback(Feedback.TARGET_LOST if task.last is not Feedback.FOLLOW_CHOSEN else Feedback.TARGET_NOT_LOCKED)
-    except RobotError:
-        pass  # another client is driving
+        return TaskResult.FAILED  # it ends by itself only if the target is gone
+    except NotFound as error:
+        locked = task.last is not Feedback.FOLLOW_CHOSEN
+        return task.fail(Feedback.TARGET_LOST if locked else Feedback.TARGET_NOT_LOCKED, error)
     finally:
         context.pursuit = None
         watching.cancel()
-    return TaskResult.FAILED
 
 
 async def follow_tag(context: Context, task: Task, manner: Manner) -> TaskResult:
@@ -97,17 +96,16 @@ async def follow_tag(context: Context, task: Task, manner: Manner) -> TaskResult
         action = task.action = context.robot[Following].follow_tag(
             side=manner.side, distance=manner.distance, source=SOURCE
         )
-    except RobotError:
-        task.feedback(Feedback.ACTIVATION_FAILED)
-        return TaskResult.FAILED
+    except RobotError as error:
+        return task.fail(Feedback.ACTIVATION_FAILED, error)
     task.feedback(Feedback.ACTIVATED)
     try:
         await _report(context, task, action, Feedback.TAG_FOLLOWED, None)
-    except NotFound:
-        task.feedback(Feedback.TAG_LOST if task.last is Feedback.TAG_FOLLOWED else Feedback.TAG_NOT_THERE)
-    except RobotError:
-        task.feedback(Feedback.TAG_CONTROL_FAILED)
-    return TaskResult.FAILED
+        return TaskResult.FAILED
+    except NotFound as error:
+        return task.fail(Feedback.TAG_LOST if task.last is Feedback.TAG_FOLLOWED else Feedback.TAG_NOT_THERE, error)
+    except RobotError as error:
+        return task.fail(Feedback.TAG_CONTROL_FAILED, error)
 
 
 async def _report(context: Context, task: Task, action: Action, followed: Feedback, searched: Feedback | None) -> None:
