@@ -289,4 +289,7 @@ async def test_reset_puts_one_back_as_it_was(desk: Path, world: World, forward: 
     assert not world.stage.faults
     world.stage.place("a", start.compose(Pose(3.0, 0.0)))
     world.stage.place("b", start)
+    driving = world.robot("a")[Driving].drive(Twist(0.1, 0.0, 0.0), source="test")
+    await forward(seconds=0.1)
     assert "b is in the way" in (await say(desk, b'{"do": "reset", "robot": "a"}\n'))["error"]
+    assert driving in world.robot("a").actions.running()  # a refusal stops nothing

@@ -109,6 +109,7 @@ class LeaseServer(LocalServer):
             case "reset":
                 if self._stage is None or robot.id not in {placed.name for placed in self._stage.robots}:
                     raise LookupError(f"robot {robot.id} is in no simulated world")
+                self._stage.refuse_reset(robot.id)
                 await robot.actions.cancel(reason="reset by the owner of this machine")
                 self._stage.reset(robot.id)
             case _:

@@ -203,6 +203,10 @@ class Stage(ABC):
         """
 
     @abstractmethod
+    def refuse_reset(self, name: str) -> None:
+        """Raise Refused if something is in the way of ``reset``, for a caller that would first stop the robot."""
+
+    @abstractmethod
     def lift(self, name: str, height: float = 0.3) -> None:
         """Lift a robot by ``height`` m, and hold it there until ``let_go``. Raises ValueError beyond 10 m."""
 

@@ -255,11 +255,13 @@ class Classes:
         elif do in ("unlock", "close") and name in locked:
             locked.discard(name)
             await _release(robot)
-        if do in ("reset", "give_back", "close"):
-            await self._stop(name)
         if do == "reset":
             if name not in {placed.name for placed in self._desk.stage.robots}:
                 raise Refused(f"robot {name} is a real one: carry it back by hand")
+            self._desk.stage.refuse_reset(name)
+        if do in ("reset", "give_back", "close"):
+            await self._stop(name)
+        if do == "reset":
             self._desk.stage.reset(name)
 
     async def _give_back(self, class_: OpenClass, seat: Seat) -> None:

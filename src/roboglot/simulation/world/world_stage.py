@@ -112,9 +112,8 @@ class WorldStage(Stage):
             self._population.simulated[name].displaced()
 
     def reset(self, name: str) -> None:
+        self.refuse_reset(name)
         hull, (pose, floor) = self._population.hull(name), self._population.starts[name]
-        if obstacle := Truth(self._population, self._environment).in_the_way(name, pose, floor):
-            raise Refused(f"{name} cannot go back to its start: {obstacle} is in the way")
         for fault in self._faults().active:
             if fault.robot == name:
                 self._faults().clear(fault.number)
@@ -123,6 +122,11 @@ class WorldStage(Stage):
         self.place(name, pose, floor)
         if (battery := self._population.find(name, SimulatedBattery)) is not None:
             battery.reset()
+
+    def refuse_reset(self, name: str) -> None:
+        pose, floor = self._population.starts[name]
+        if obstacle := Truth(self._population, self._environment).in_the_way(name, pose, floor):
+            raise Refused(f"{name} cannot go back to its start: {obstacle} is in the way")
 
     def lift(self, name: str, height: float = 0.3) -> None:
         self._population.hull(name).lift(_bounded("height", "m", LIFTED_MAX, height)[0])
