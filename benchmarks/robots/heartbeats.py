@@ -133,7 +133,8 @@ def look_by_ray(claims: Claims, plan: FleetPlan, seconds: float) -> None:
     import ray
 
     from roboglot.shards.actor import Condition
-    from roboglot.shards.cluster import Actor, ClusterFleet, joined
+    from roboglot.shards.cluster import Actor, ClusterFleet
+    from roboglot.shards.joining import joined
 
     said = [ready_of(plan, number) for number in range(len(plan.shards))]
 

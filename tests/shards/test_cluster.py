@@ -8,6 +8,8 @@ import importlib
 import inspect
 import os
 import signal
+import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -29,7 +31,8 @@ from ray.cluster_utils import Cluster
 
 from roboglot.shards import cluster as cluster_module
 from roboglot.shards.actor import Condition
-from roboglot.shards.cluster import ClusterFleet, _answer, join, joined, own_token, refuse_unfenced
+from roboglot.shards.cluster import ClusterFleet, _answer, refuse_unfenced
+from roboglot.shards.joining import join, joined, own_token
 from roboglot.shards.messages import Beat, Ready, Refusal
 from roboglot.shards.plan import plan_fleet
 from roboglot.shards.ray_processes import RayProcesses
@@ -148,6 +151,25 @@ def test_failed_client_server_is_named_by_its_reason(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(ray, "init", refuse)
     with pytest.raises(OSError, match=f"^--on ray://head: Initialization failure from server: {reason}$"):
         join("ray://head")
+
+
+@pytest.mark.parametrize("failures", [1, 3])
+def test_ray_that_gave_itself_up_is_started_again(failures: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine its agents take more than the 15 s that it allows; the third time, the reason is named."""
+    left: list[subprocess.Popen[bytes]] = []
+
+    def init(**_: object) -> None:
+        if len(left) < failures:
+            left.append(subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE))
+            raise Exception("The current node timed out during startup. This could happen because some")
+
+    monkeypatch.setattr(ray, "init", init)
+    if failures == 1:
+        join("local")
+    else:
+        with pytest.raises(OSError, match=r"^--on local: this machine is too busy: Ray gave itself up 3 times because"):
+            join("local")
+    assert [process.wait(60) for process in left] == [-signal.SIGKILL] * failures
 
 
 def test_silent_head_is_named_with_both_reasons(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -219,7 +219,8 @@ def test_kubernetes_own_schema_takes_a_manifests_pods(name: str) -> None:
 
 def test_without_ray_extra_is_named_in_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
-    monkeypatch.delitem(sys.modules, "roboglot.shards.cluster", raising=False)
+    for module in ("cluster", "joining"):
+        monkeypatch.delitem(sys.modules, f"roboglot.shards.{module}", raising=False)
     done = CliRunner().invoke(app, ["up", "--worlds", "1", "--on", "local", "--data", str(tmp_path)])
     assert str(done.exception) == (
         "roboglot fleet: --on needs ray, which is not installed: pip install 'roboglot[fleet]'"

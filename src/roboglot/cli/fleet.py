@@ -287,7 +287,8 @@ def _joined(plan: FleetPlan, on: str) -> AbstractContextManager[None]:
     """Return a context in the cluster ``on``, if given. Raises MissingExtra, OSError; ValueError for such a plan."""
     if not on:
         return nullcontext()
-    from roboglot.shards.cluster import joined, refuse_unfenced
+    from roboglot.shards.cluster import refuse_unfenced
+    from roboglot.shards.joining import joined
 
     refuse_unfenced(plan, on)
     return joined(on)

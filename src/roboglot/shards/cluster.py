@@ -9,13 +9,10 @@ import asyncio
 import hashlib
 import logging
 import os
-import signal
 import sqlite3
-import sys
-import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
@@ -25,6 +22,7 @@ from roboglot.extras import explaining
 from roboglot.hosting.error_text import in_words
 from roboglot.hosting.folder_lock import lock_folder
 from roboglot.shards.actor import Condition, ShardActor
+from roboglot.shards.joining import LOCAL, NAMESPACE
 from roboglot.shards.messages import Beat
 from roboglot.shards.plan import FleetPlan, ShardPlan, save
 from roboglot.shards.ray_processes import RayProcesses
@@ -35,85 +33,17 @@ from roboglot.storage.registry_lease import LEASE, holder_of
 from roboglot.storage.robot_registry import RobotRegistry
 from roboglot.transport.log_limiter import LogLimiter
 
-TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
-
-
-def own_token(environment: Mapping[str, str], home: Path) -> bool:
-    """Return whether the user has a token for Ray; `ray start --head` then requires it, Ray's client never sends it."""
-    return any(map(environment.get, TOKENS)) or (home / ".ray" / "auth_token").is_file()
-
-
 with explaining("--on", "fleet"):
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # no data leaves the machine unasked
-    if own_token(os.environ, Path(os.path.expanduser("~"))):
-        os.environ.setdefault("RAY_AUTH_MODE", "token")
     import ray
     from ray.exceptions import RayActorError, RayError
 
 log = logging.getLogger(__name__)
-LOCAL = "local"
-NAMESPACE = "roboglot"
-CLIENT_PORT = 10001  # default port of ray://HOST
-STORE_BYTES = 80 << 20  # of a cluster that we start: actors share no objects
 PERIOD = 1.0  # s between two checks of each shard
 LOOK_MAX = 5.0  # s for an actor to answer
 START_MAX = 90.0  # s for every shard to report
 STOP_MAX = 15.0
 CORE_EACH, CORES_MAX = 0.05, 1.0  # processors per robot, and per shard: a world runs in one thread
 MEMORY = 256 << 20  # bytes that Ray reserves for a shard
-
-
-def join(where: str) -> None:
-    """Start Ray on this machine (``local``) or join a cluster: ``ray://HOST``, ``HOST:PORT`` or ``auto``.
-
-    Raises OSError in one sentence.
-    """
-    try:
-        if where == LOCAL:
-            ray.init(
-                address="local",
-                namespace=NAMESPACE,
-                include_dashboard=False,
-                object_store_memory=STORE_BYTES,
-                log_to_driver=False,
-                configure_logging=False,
-            )
-            return
-        address = f"{where}:{CLIENT_PORT}" if where.startswith("ray://") and where.count(":") == 1 else where
-        with warnings.catch_warnings(action="ignore"):  # the error has the reason
-            ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
-    except Exception as error:  # noqa: BLE001 - Ray raises bare ones, too
-        lines = str(error).strip().splitlines() or [type(error).__name__]
-        why = f"{lines[0]} {lines[-1]}" if lines[0].endswith(":") else lines[0]  # the server's own error is last
-        if why.endswith("connection timeout"):
-            why = "no Ray head answers there, or it requires a token that this user does not have (RAY_AUTH_TOKEN)"
-        raise OSError(f"--on {where}: {why}") from None
-
-
-@contextmanager
-def joined(where: str) -> Iterator[None]:
-    """Context in which this program is part of a cluster; one that it started ends with the context.
-
-    Meanwhile Ray prints its reports, such as dumps of its state, on standard error: the output is the caller's.
-    """
-    with redirect_stdout(sys.stderr):
-        join(where)
-        try:
-            yield
-        finally:
-            with _undisturbed():
-                ray.shutdown()
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Context that ignores SIGINT and SIGTERM: a second Ctrl-C would leave processes of Ray behind."""
-    before = [(number, signal.signal(number, signal.SIG_IGN)) for number in (signal.SIGINT, signal.SIGTERM)]
-    try:
-        yield
-    finally:
-        for number, handler in before:
-            signal.signal(number, handler)
 
 
 class Reference(Protocol):

@@ -5,7 +5,10 @@ Ray's own health checks would take a minute to report that. This module does not
 
 from __future__ import annotations
 
+import contextlib
 import os
+import signal
+from collections.abc import Collection
 
 from roboglot.hosting.process import has_ended, running
 
@@ -28,3 +31,15 @@ class RayProcesses:
             if has_ended(pid):
                 return f"{name}, a process of Ray, has ended, and Ray with it; start again"
         return ""
+
+
+def children() -> set[int]:
+    """Return the process ids of this program's children."""
+    return {one.pid for one in running() if one.parent == os.getpid() and not one.has_ended}
+
+
+def end_children(*, but: Collection[int]) -> None:
+    """Kill this program's children, except some that it had before."""
+    for pid in children().difference(but):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)

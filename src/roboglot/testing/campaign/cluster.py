@@ -15,7 +15,7 @@ from typing import NamedTuple, Protocol
 import msgspec
 
 from roboglot.extras import explaining
-from roboglot.shards.cluster import LOCAL, joined
+from roboglot.shards.joining import LOCAL, joined
 from roboglot.shards.ray_processes import RayProcesses
 from roboglot.testing.campaign.local import ATTEMPTS_MAX, Ended, Leave, interruptions, play_here
 from roboglot.testing.campaign.trials import Outcome, Result, Trial
