@@ -218,10 +218,19 @@ def test_a_missing_log_is_named(tmp_path: Path) -> None:
         fleet.logs("a1", data=tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("first", "then", "shown"),
+    [((1, 500.0), (2, 3.0), "0.50"), ((1, 500.0), (1, 503.0), "0.50"), ((1, 0.0), (1, 20.0), "-")],
+)
 def test_processor_time_begins_at_zero_after_a_restart(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    first: tuple[int, float],
+    then: tuple[int, float],
+    shown: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    looks = [(1, 500.0), (2, 3.0)]  # processes, s
+    """Of a process (its id and s) without a heartbeat so far, it is unknown what its start took."""
+    looks = [first, then]
 
     def look(*_: object) -> Answer:
         pid, cpu = looks.pop(0)
@@ -231,7 +240,7 @@ def test_processor_time_begins_at_zero_after_a_restart(
     monkeypatch.setattr(fleet, "_ask", look)
     monkeypatch.setattr(fleet, "time", SimpleNamespace(sleep=lambda _: None, monotonic=lambda: next(times)))
     fleet.top(once=True, period=6.0)
-    assert capsys.readouterr().out.splitlines()[1].split()[4] == "0.50"
+    assert capsys.readouterr().out.splitlines()[1].split()[4] == shown
 
 
 async def test_only_robots_that_are_up_are_counted(tmp_path: Path) -> None:

@@ -138,10 +138,9 @@ def top(
         answer, now = _ask("look", data), time.monotonic()
         lines = [HEAD]
         for row in answer.shards:
-            pid, cpu, at = before.get(row.name, (0, 0.0, now))
-            core = (row.cpu - (cpu if row.pid == pid else 0.0)) / (now - at) if now > at else 0.0
+            core = _cores(row, before.get(row.name, (0, 0.0, now)), now)
             lines.append(
-                f"{row.name:6} {row.state:9} {row.pid:8} {len(row.robots):6} {core:6.2f}"
+                f"{row.name:6} {row.state:9} {row.pid:8} {len(row.robots):6} {core:>6}"
                 f" {row.memory / MEGABYTE:6.0f} {row.factor:7.2f} {row.restarts:8}"
             )
             before[row.name] = row.pid, row.cpu, now
@@ -151,6 +150,17 @@ def top(
         print("\n".join(lines) if ends or not terminal else "\x1b[H\x1b[2J" + "\n".join(lines), flush=True)
         if ends:
             return
+
+
+def _cores(row: Row, before: tuple[int, float, float], now: float) -> str:
+    """Return the cores that a shard used since an earlier report: its process, its processor time and their time.
+
+    A dash if that process had not reported its processor time yet: its start is not of this period.
+    """
+    pid, cpu, at = before
+    if row.pid == pid and not cpu:
+        return "-"
+    return f"{(row.cpu - (cpu if row.pid == pid else 0.0)) / (now - at) if now > at else 0.0:.2f}"
 
 
 @app.command()
