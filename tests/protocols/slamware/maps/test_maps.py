@@ -88,6 +88,7 @@ async def test_refused_maps_stop_nothing(robot: Robot, client: httpx.AsyncClient
     assert (await client.post(f"{MULTI}/stcm/:reload")).status_code == 404
     floor = {"building": "", "floor": "9F"}
     assert (await client.put(f"{MULTI}/floors/:current", json=floor)).status_code == 404
+    assert (await client.put(STCM, content=b"nonsense")).status_code == 400
     await forward(seconds=1)
     assert drive.status is ActionStatus.EXECUTING
 

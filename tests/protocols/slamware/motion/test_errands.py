@@ -10,12 +10,14 @@ import httpx
 import pytest
 
 from roboglot.model.actions import ActionStatus
+from roboglot.model.client_context import set_client
 from roboglot.model.components.energy.battery import DockContact
 from roboglot.model.components.logistics.jack import Jack, JackStage
 from roboglot.model.components.mapping.localization import Localization
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.driving import Driving
 from roboglot.model.components.sensing.odometry import Odometry
+from roboglot.model.components.system.lease import Lease
 from roboglot.model.components.system.settings import Settings
 from roboglot.model.geometry import Point, Pose, Twist
 from roboglot.model.robot import Robot
@@ -256,6 +258,21 @@ async def test_recovery_gives_up_in_time_turning_if_allowed(
     turned = abs(math.degrees(world.truth.pose_of("a").yaw - before.yaw))
     assert turned > 20 if turns else turned < 1
     assert robot[Base].velocity.speed < 0.01
+
+
+@pytest.mark.parametrize("name", ["RecoverLocalizationAction", "ManualRelocalizationAction"])
+async def test_refused_search_stops_no_other_client(
+    robot: Robot, client: httpx.AsyncClient, forward: Forward, name: str
+) -> None:
+    """A client without control stopped the one that has it, and was refused then."""
+    await robot[Lease].take("the one in control")
+    set_client("the one in control")
+    drive = robot[Driving].drive(Twist(0.1), source="test")
+    await forward(seconds=1)
+    reply = await client.post(ACTIONS, json={"action_name": f"slamtec.agent.actions.{name}", "options": {}})
+    assert reply.status_code == 400
+    await forward(seconds=1)
+    assert drive.status is ActionStatus.EXECUTING
 
 
 @pytest.mark.parametrize("name", ["RecoverLocalizationAction", "ManualRelocalizationAction"])

@@ -50,7 +50,6 @@ def recover_localization(context: Context, options: RecoverLocalizationOptions) 
                     await robot.clock.sleep(PAUSE_SECONDS)  # wait: several places fit
         raise NotLocalized(f"no matching place was found in {seconds:g} s")
 
-    context.actions.abort()  # it searches at standstill
     return run_errand(context.robot, "recover localization", work, region)
 
 
@@ -68,7 +67,6 @@ def manual_relocalization(context: Context, _: NoOptions) -> Action:
         robot[Localization].set_pose(dock.pose)
         context.events.note(GeneralEvent.RESET_MAP_TO_DOCK)
 
-    context.actions.abort()
     return run_errand(context.robot, "manual relocalization", work)
 
 

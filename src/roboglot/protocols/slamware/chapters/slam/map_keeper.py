@@ -135,12 +135,12 @@ class MapKeeper:
         except BadMap as error:
             raise InvalidGoal(str(error)) from None
 
-    async def use(self, data: bytes, pose: Pose) -> None:
-        """Use the map of a file's start floor from now on, in memory only."""
+    async def use(self, data: bytes, pose: Pose, *, stop: Callable[[], None]) -> None:
+        """Use the map of a file's start floor from now on, in memory only, after calling ``stop``."""
         floor = _start_of(self._robot, await self._parse(data))
         async with self._turn:
             draw = put_drawings(self._robot, floor, {})  # the present drawings belong to no file
-            await self._use(floor, pose, draw)
+            await self._use(floor, pose, draw, stop)
 
     async def upload(self, data: bytes) -> None:
         """Store the file on disk unchanged, without loading it. Raises InvalidGoal unless it could be loaded."""

@@ -62,8 +62,7 @@ def get_composite_map(context: Context) -> bytes:
 @TABLE.on(f"PUT {API}/maps/stcm", right=Right.EDIT, needs=(Localization, MapAnnotations, MapMemory, Mapping, Settings))
 async def set_composite_map(context: Context, body: bytes) -> None:
     """Replace the map and its drawings, in memory only; the robot's pose becomes the origin."""
-    context.actions.abort()
-    await context.maps.use(body, ORIGIN)
+    await context.maps.use(body, ORIGIN, stop=context.actions.abort)  # a refusal stops nothing
     context.events.note(GeneralEvent.SET_MAP_DONE)
 
 
