@@ -22,6 +22,7 @@ from roboglot.model.components.system.firmware import Firmware, FirmwarePackage,
 from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotFound, Refused
 from roboglot.model.events import DiskLow, FirmwareChanged, PowerModeChanged, Rebooted, Rebooting, ShuttingDown
 from roboglot.model.geometry import Pose, Twist
+from roboglot.simulation.components.system.firmware_record import FirmwareRecord
 
 DIGEST = "0123456789abcdef" * 2
 
@@ -79,6 +80,28 @@ async def test_an_update_from_the_download_to_the_reboot(dog):
     kinds = [type(event) for event in events.drain()]
     assert kinds.count(FirmwareChanged) > 200
     assert kinds.index(Rebooting) < kinds.index(Rebooted)
+
+
+async def test_full_disk_keeps_no_robot_from_starting(dog, monkeypatch):
+    """It restarted for ever, if an installed update could not be noted as the running one."""
+    firmware = dog.robot[Firmware]
+    await downloaded(dog)
+    installing = firmware.install(DIGEST)
+    await dog.clock.advance(21.0)
+    assert installing.status is ActionStatus.SUCCEEDED
+
+    async def full(*_):
+        raise Refused("the disk is full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(FirmwareRecord, "_write", full)
+        firmware.reboot()
+        await dog.clock.advance(40.0)
+    assert (firmware.version, firmware.progress.state) == ("2.0", FirmwareState.IDLE)
+    dog.robot[Base].set_velocity(Twist())
+    firmware.reboot()
+    await dog.clock.advance(40.0)
+    assert firmware.version == "2.0"
 
 
 async def test_reboot_ends_work_and_continues_without_its_client(dog):

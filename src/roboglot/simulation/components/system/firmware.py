@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import logging
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -28,7 +29,7 @@ from roboglot.model.components.system.firmware import (
     Module,
 )
 from roboglot.model.components.system.network import Network
-from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotFound, Refused
+from roboglot.model.errors import Blocked, Busy, InvalidGoal, NotFound, Refused, RobotError
 from roboglot.model.events import FirmwareChanged, ModuleRestarted, ModuleRestarting, Rebooted, Rebooting
 from roboglot.model.robot import Robot
 from roboglot.model.sensing import Supply
@@ -38,6 +39,7 @@ from roboglot.simulation.components.motion.base import SimulatedBase
 from roboglot.simulation.components.motion.drive_locks import hold_still, let_move
 from roboglot.simulation.components.system.firmware_record import FirmwareRecord
 
+log = logging.getLogger(__name__)
 PACKAGE = "firmware package"  # the entry that occupies its space on the disk
 CHARGE_MIN = 0.3  # required for an installation
 LOOK_EVERY = 60.0  # s between checks for a newer version
@@ -217,7 +219,10 @@ class SimulatedFirmware(Firmware):
         if Legs in robot:
             await robot[Legs].lie_down().done()
         await self._clock.sleep(seconds)
-        await self._record.boot()
+        try:
+            await self._record.boot()
+        except RobotError as error:  # the disk is full: the update runs, and stays pending until the next reboot
+            log.warning("robot %s: cannot note its update as installed: %s", robot.id, error)
         let_move(self._robot, self._base.locks, "reboot")
         action.report(FirmwareProgress())
         robot.events.publish(Rebooted(stamp=self._clock.time()))
