@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import fcntl
 import functools
@@ -27,6 +28,7 @@ from hypothesis.internal.constants_ast import Constants
 
 from roboglot.cli.warm import installation
 from roboglot.hosting import closing
+from roboglot.storage.settings import StoredSettings
 from tests import warm_start
 
 if TYPE_CHECKING:
@@ -237,6 +239,19 @@ TURN = 180.0  # real s for other tests, of the 240 that a test may take
 STRANGERS = 60.0  # real s for clients of other programs
 PAUSE = 0.1  # real s between two looks
 _strangers_stay: list[str] = []  # for whose sake tests were skipped: later ones wait 1 s
+
+
+@pytest.fixture
+def slow_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let settings be stored some steps of the loop later, as in a database's thread."""
+    put = StoredSettings.put
+
+    async def put_later(store: StoredSettings, key: str, value: object) -> None:
+        for _ in range(5):
+            await asyncio.sleep(0)
+        await put(store, key, value)
+
+    monkeypatch.setattr(StoredSettings, "put", put_later)
 
 
 @pytest.fixture

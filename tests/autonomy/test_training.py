@@ -1,5 +1,7 @@
 """Words are learnt by hearing them three times, and kept."""
 
+import asyncio
+
 import pytest
 
 from roboglot.model.actions import ActionStatus
@@ -47,3 +49,10 @@ async def test_known_words_can_be_replaced_and_forgotten(robot):
         await words.learn(TrainedWord(f"w{number}", "x"))
     with pytest.raises(Refused):
         await words.learn(TrainedWord("one more", "x"))
+
+
+async def test_words_taught_at_once_are_all_kept(robot, slow_settings):
+    words = robot[TrainingWords]
+    await words.learn(TrainedWord("old", "0"))
+    await asyncio.gather(words.learn(TrainedWord("a", "1")), words.learn(TrainedWord("b", "2")), words.forget("old"))
+    assert words.all() == [TrainedWord("a", "1"), TrainedWord("b", "2")]

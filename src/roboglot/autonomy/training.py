@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -32,6 +33,7 @@ class HeardWords(TrainingWords):
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self._turn = asyncio.Lock()  # of changes: each begins with the list that the one before stored
 
     def all(self) -> Sequence[TrainedWord]:
         return [TrainedWord(**row) for row in self._robot[Settings].get(KEY, [])]
@@ -63,17 +65,19 @@ class HeardWords(TrainingWords):
 
     async def learn(self, word: TrainedWord) -> None:
         _check(word)
-        others = [known for known in self.all() if known.trigger != word.trigger]
-        if len(others) >= WORDS_MAX:
-            raise Refused(f"the robot knows {WORDS_MAX} words already")
-        await self._keep([*others, word])
+        async with self._turn:
+            others = [known for known in self.all() if known.trigger != word.trigger]
+            if len(others) >= WORDS_MAX:
+                raise Refused(f"the robot knows {WORDS_MAX} words already")
+            await self._keep([*others, word])
 
     async def forget(self, trigger: str) -> None:
-        words = self.all()
-        left = [word for word in words if word.trigger != trigger]
-        if len(left) == len(words):
-            raise NotFound(f"{trigger!r} was never taught")
-        await self._keep(left)
+        async with self._turn:
+            words = self.all()
+            left = [word for word in words if word.trigger != trigger]
+            if len(left) == len(words):
+                raise NotFound(f"{trigger!r} was never taught")
+            await self._keep(left)
 
     async def _keep(self, words: list[TrainedWord]) -> None:
         await self._robot[Settings].put(KEY, [asdict(word) for word in words])

@@ -1,5 +1,7 @@
 """Wi-Fi networks of the world, joining and leaving them, an access point of one's own, the modem, what is kept."""
 
+import asyncio
+
 import pytest
 
 from roboglot.model.actions import ActionStatus
@@ -110,6 +112,14 @@ async def test_the_way_out_follows_the_priority(robot, forward):
     assert robot[Network].state.route is Uplink.WIFI
     await robot[Network].set_priority(Uplink.MOBILE)
     assert robot[Network].state.route is Uplink.MOBILE
+
+
+@pytest.mark.world("office", body="hermes")
+async def test_changes_at_once_are_all_kept(robot, slow_settings):
+    network = robot[Network]
+    await asyncio.gather(network.set_apn("cmnet"), network.set_priority(Uplink.MOBILE), network.set_dhcp(False))
+    assert network.mobile.apn == "cmnet"
+    assert (network.state.route, network.state.dhcp) == (Uplink.MOBILE, False)
 
 
 @pytest.mark.world("office", body="cyberdog2")

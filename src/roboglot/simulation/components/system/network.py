@@ -5,9 +5,10 @@ Clients in a network that the robot left keep their connections here: doors list
 
 from __future__ import annotations
 
+import asyncio
 import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -76,7 +77,7 @@ class SimulatedNetwork(Network):
         tail = zlib.crc32(robot.id.encode()) & 0xFFFFFF
         self._mac = f"{section.maker}:{tail >> 16:02x}:{tail >> 8 & 255:02x}:{tail & 255:02x}"
         self._own_name = f"{section.name}-{tail:06X}"
-        self._unsaved: dict[str, object] = {}  # for a robot without settings
+        self._record = _Record(robot)
         self._signal = self.strongest = FLOOR_OF_NOISE
         self._ssid = ""  # of the joined network
         self._levels: tuple[tuple[float, float, int], dict[str, float]] | None = None  # place, dBm of all networks
@@ -98,7 +99,7 @@ class SimulatedNetwork(Network):
         by_wifi = False
         match mode:
             case NetworkMode.ACCESS_POINT:
-                ssid, address = self._kept("own_name", self._own_name), section.address
+                ssid, address = self._record.get("own_name", self._own_name), section.address
                 gateway = address
             case NetworkMode.STATION if self._ssid:
                 point = self._radio.network(self._ssid)
@@ -108,7 +109,7 @@ class SimulatedNetwork(Network):
         ways = {Uplink.WIFI: by_wifi, Uplink.MOBILE: mobile is not None and mobile.registered}
         order = sorted(ways, key=lambda way: way is not self.priority)
         route = next((way for way in order if ways[way]), None)
-        dhcp = not self._kept("address", "")
+        dhcp = not self._record.get("address", "")
         return NetworkState(mode, ssid, address, gateway, self._mac, section.wired, dhcp, route is not None, route)
 
     @property
@@ -126,14 +127,14 @@ class SimulatedNetwork(Network):
 
     @property
     def priority(self) -> Uplink:
-        return Uplink(self._kept("priority", Uplink.WIFI))
+        return Uplink(self._record.get("priority", Uplink.WIFI))
 
     @property
     def mobile(self) -> MobileState | None:
         modem, coverage = self._section.modem, self._radio.mobile
         if modem is None:
             return None
-        apn = str(self._kept("apn", modem.apn))
+        apn = str(self._record.get("apn", modem.apn))
         registered = apn in coverage.apns and coverage.signal >= modem.sensitivity
         return MobileState(apn, coverage.signal, registered)
 
@@ -149,8 +150,12 @@ class SimulatedNetwork(Network):
                     raise NotFound(f"there is no network {ssid!r} here")
                 if point.password and password != point.password:
                     raise Refused(f"{ssid} refuses this password")
-                others = [(name, key) for name, key in self._passwords.items() if name != ssid]
-                await self._keep(mode=NetworkMode.STATION, known=[(ssid, password), *others][:KNOWN_MAX])
+                await self._change(
+                    lambda: {
+                        "mode": NetworkMode.STATION,
+                        "known": [(ssid, password), *_all_but(ssid, self._passwords)][:KNOWN_MAX],
+                    }
+                )
                 self._ssid = ssid
             finally:
                 self._joining = False
@@ -161,14 +166,14 @@ class SimulatedNetwork(Network):
     async def forget(self, ssid: str) -> None:
         if ssid not in self._passwords:
             raise NotFound(f"{ssid!r} is not among the known networks")
-        await self._keep(known=[(name, key) for name, key in self._passwords.items() if name != ssid])
+        await self._change(lambda: {"known": _all_but(ssid, self._passwords)})
 
     async def be_station(self) -> None:
         await self._keep(mode=NetworkMode.STATION)
 
     async def be_access_point(self, ssid: str | None = None, password: str | None = None) -> None:
-        name = self._kept("own_name", self._own_name) if ssid is None else ssid
-        key = self._kept("own_password", self._section.password) if password is None else password
+        name = self._record.get("own_name", self._own_name) if ssid is None else ssid
+        key = self._record.get("own_password", self._section.password) if password is None else password
         check_network(name, key)
         await self._keep(mode=NetworkMode.ACCESS_POINT, own_name=name, own_password=key)
 
@@ -204,7 +209,7 @@ class SimulatedNetwork(Network):
         self.strongest = FLOOR_OF_NOISE if self.jammed else max(self._heard.values(), default=SILENCE) + noise
         listening = not self.jammed and not self._joining and self._mode is NetworkMode.STATION
         self._signal, self._ssid = self._best(noise) if listening else (FLOOR_OF_NOISE, "")
-        known = self._ssid, self._radio.mobile, self._document
+        known = self._ssid, self._radio.mobile, self._record.document
         if known != self._known:  # what the state is made of
             self._known = known[0], known[1], dict(known[2])
             if (state := self.state) != self._published:
@@ -236,31 +241,53 @@ class SimulatedNetwork(Network):
 
     def _address(self) -> str:
         """Return the robot's address in its present network."""
-        return self._kept("address", "") or self._radio.lease(self._ssid, self._mac)
+        return self._record.get("address", "") or self._radio.lease(self._ssid, self._mac)
 
     @property
     def _mode(self) -> NetworkMode:
-        return NetworkMode(self._kept("mode", NetworkMode.STATION))
+        return NetworkMode(self._record.get("mode", NetworkMode.STATION))
 
     @property
     def _passwords(self) -> dict[str, str]:
         """Return the passwords by name, the preferred one first."""
-        return dict(self._kept("known", list(self._section.known.items())))
-
-    @property
-    def _document(self) -> dict[str, object]:
-        """Return the settings of the network that differ from the section's."""
-        return self._robot[Settings].get(KEY, {}) if Settings in self._robot else self._unsaved
-
-    def _kept(self, name: str, default: Any) -> Any:
-        return self._document.get(name, default)
+        return dict(self._record.get("known", list(self._section.known.items())))
 
     async def _keep(self, **changes: object) -> None:
-        if Settings in self._robot:
-            await self._robot[Settings].put(KEY, {**self._robot[Settings].get(KEY, {}), **changes})
-        else:
-            self._unsaved.update(changes)
+        await self._change(lambda: changes)
+
+    async def _change(self, changes: Callable[[], Mapping[str, object]]) -> None:
+        await self._record.change(changes)
         self._next = -math.inf  # the link follows at the next measurement
+
+
+class _Record:
+    """The settings of a robot's network that differ from the section's."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._unsaved: dict[str, object] = {}  # for a robot without settings
+        self._turn = asyncio.Lock()  # of changes
+
+    @property
+    def document(self) -> dict[str, object]:
+        return self._robot[Settings].get(KEY, {}) if Settings in self._robot else self._unsaved
+
+    def get(self, name: str, default: Any) -> Any:
+        return self.document.get(name, default)
+
+    async def change(self, changes: Callable[[], Mapping[str, object]]) -> None:
+        """Store what ``changes`` returns in its turn: each change begins with what the one before left."""
+        async with self._turn:
+            document = {**self.document, **changes()}
+            if Settings in self._robot:
+                await self._robot[Settings].put(KEY, document)
+            else:
+                self._unsaved = document
+
+
+def _all_but(ssid: str, passwords: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return names and passwords of the other networks."""
+    return [(name, password) for name, password in passwords.items() if name != ssid]
 
 
 def _fit(fit: Fitting) -> SimulatedNetwork:
