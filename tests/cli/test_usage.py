@@ -25,6 +25,16 @@ def ended(*arguments: str, reader: str = "cat") -> "subprocess.CompletedProcess[
     return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False, timeout=180)
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize("words", [("--version",), ("coverage",), ("test", "--schema")])
+def test_output_to_a_full_disk_is_named(words: tuple[str, ...]) -> None:
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "roboglot", *words]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, timeout=180)
+    assert done.returncode == 1
+    assert done.stderr == f"roboglot {words[0]}: No space left on device\n"
+
+
 @pytest.mark.parametrize("name", ["up", "access"])
 def test_usage_names_the_command_as_it_is_installed(name: str) -> None:
     done = ended(name, "--nonsense")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import errno
 import functools
 import gc
 import importlib
@@ -63,6 +64,7 @@ FOLDERS = (
     | dict.fromkeys(("lease", "stop", "reset"), "control")
     | dict.fromkeys(("program", "lesson"), "programs")
 )
+FULL = errno.ENOSPC, errno.EDQUOT, errno.EFBIG  # of the disk to which the output goes, say
 # The extra to install for a command whose modules are missing, if that brings them.
 EXTRAS = (
     {"demo": "demo", "mcp": "mcp", "export": "recording,logs"}
@@ -129,6 +131,12 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has closed it, as with `| head`
         sys.stderr.close()
         sys.exit(1)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        from roboglot.hosting.error_text import in_words
+
+        sys.exit(f"roboglot {name}: {in_words(error)}")
 
 
 def _without_help(words: list[str]) -> list[str]:
