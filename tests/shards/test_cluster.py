@@ -8,6 +8,7 @@ import importlib
 import inspect
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -142,15 +143,31 @@ async def test_killed_nodes_robots_run_elsewhere_and_none_twice(cluster: Cluster
     assert not ray.is_initialized()
 
 
-def test_failed_client_server_is_named_by_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def head() -> Iterator[str]:
+    """URL at which something listens."""
+    with socket.create_server((free_addresses(1), 0)) as listening:
+        yield "ray://{}:{}".format(*listening.getsockname())
+
+
+@pytest.mark.parametrize("where", ["ray://{}", "ray://{}:1", "{}:1"])
+def test_missing_head_is_named_at_once(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ray itself would try again for minutes."""
+    monkeypatch.setattr(ray, "init", lambda **_: pytest.fail("Ray was asked"))
+    where = where.format(free_addresses(1))
+    with pytest.raises(OSError, match=f"^--on {where}: no Ray head answers there: Connection refused$"):
+        join(where)
+
+
+def test_failed_client_server_is_named_by_its_reason(monkeypatch: pytest.MonkeyPatch, head: str) -> None:
     reason = "RuntimeError: Starting Ray client server failed."
 
     def refuse(**_: object) -> None:
         raise ConnectionAbortedError(f"Initialization failure from server:\nTraceback:\n{reason}")
 
     monkeypatch.setattr(ray, "init", refuse)
-    with pytest.raises(OSError, match=f"^--on ray://head: Initialization failure from server: {reason}$"):
-        join("ray://head")
+    with pytest.raises(OSError, match=f"^--on {head}: Initialization failure from server: {reason}$"):
+        join(head)
 
 
 @pytest.mark.parametrize("failures", [1, 3])
@@ -172,7 +189,7 @@ def test_ray_that_gave_itself_up_is_started_again(failures: int, monkeypatch: py
     assert [process.wait(60) for process in left] == [-signal.SIGKILL] * failures
 
 
-def test_silent_head_is_named_with_both_reasons(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_silent_head_is_named_with_both_reasons(monkeypatch: pytest.MonkeyPatch, head: str) -> None:
     def time_out(**_: object) -> None:
         warnings.warn("Ray Client connection timed out.", stacklevel=1)
         raise ConnectionError("ray client connection timeout")
@@ -180,9 +197,9 @@ def test_silent_head_is_named_with_both_reasons(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(ray, "init", time_out)
     with (
         warnings.catch_warnings(action="error"),
-        pytest.raises(OSError, match=r"^--on ray://head: no Ray head answers there, or it requires a token"),
+        pytest.raises(OSError, match=rf"^--on {head}: no Ray head answers there, or it requires a token"),
     ):
-        join("ray://head")
+        join(head)
 
 
 async def test_late_answer_of_a_shard_is_dropped() -> None:

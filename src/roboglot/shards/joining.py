@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import socket
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
@@ -12,6 +13,7 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 
 from roboglot.extras import explaining
+from roboglot.hosting.error_text import in_words
 from roboglot.shards.ray_processes import children, end_children
 
 TOKENS = "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"
@@ -31,6 +33,8 @@ with explaining("--on", "fleet"):
 log = logging.getLogger(__name__)
 LOCAL = "local"
 NAMESPACE = "roboglot"
+PORT_MAX = 65535
+PROBE_MAX = 5.0  # s
 CLIENT_PORT = 10001  # default port of ray://HOST
 STORE_BYTES = 80 << 20  # of a cluster that we start: actors share no objects
 STARTS_MAX = 3  # of Ray on this machine
@@ -47,6 +51,7 @@ def join(where: str) -> None:
         if where == LOCAL:
             _start_here()
             return
+        _refuse_deaf(where)
         address = f"{where}:{CLIENT_PORT}" if where.startswith("ray://") and where.count(":") == 1 else where
         with warnings.catch_warnings(action="ignore"):  # the error has the reason
             ray.init(address=address, namespace=NAMESPACE, log_to_driver=False, configure_logging=False)
@@ -56,6 +61,18 @@ def join(where: str) -> None:
         if why.endswith("connection timeout"):
             why = "no Ray head answers there, or it requires a token that this user does not have (RAY_AUTH_TOKEN)"
         raise OSError(f"--on {where}: {why}") from None
+
+
+def _refuse_deaf(where: str) -> None:
+    """Raise OSError if nothing listens at ``ray://HOST`` or HOST:PORT, where Ray would try again for minutes."""
+    host, _, port = where.removeprefix("ray://").rpartition(":")
+    if where.startswith("ray://") and not host:
+        host, port = port, str(CLIENT_PORT)
+    if host and port.isascii() and port.isdigit() and int(port) <= PORT_MAX:
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), PROBE_MAX).close()
+        except OSError as error:
+            raise OSError(f"no Ray head answers there: {in_words(error)}") from None
 
 
 def _start_here() -> None:
