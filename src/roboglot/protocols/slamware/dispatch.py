@@ -65,10 +65,10 @@ from roboglot.protocols.slamware.context import Context
 from roboglot.protocols.slamware.errors import REASON, HttpError, bad_request, from_robot, reason_phrase
 from roboglot.protocols.slamware.pages import Pages
 from roboglot.protocols.slamware.parameters import Parameters
-from roboglot.protocols.slamware.routes import BEYOND, Match, Routes
+from roboglot.protocols.slamware.routes import Match, all_routes
 from roboglot.protocols.slamware.table import NO_CONTENT, TABLE, Text, changes_map, concerns_map
 from roboglot.protocols.turns import wait_for_turn
-from roboglot.wire.contracts import Row, contract
+from roboglot.wire.contracts import Row
 
 log = logging.getLogger(__name__)
 LOGGED_MAX = 200  # characters of a path or a refusal in a log line
@@ -100,7 +100,7 @@ class Application:
         self._context = context
         self._tap, self._admission = context.robot.tap, context.robot.admission
         self._browsers = browsers or Browsers("[slamware]")
-        self._routes = Routes((*contract("slamware"), *BEYOND))
+        self._routes = all_routes()
         self._pages = Pages()
         self._encode = msgspec.json.Encoder().encode
         self._parameters = Parameters(context)

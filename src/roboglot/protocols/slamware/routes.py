@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
+from functools import cache
 from urllib.parse import unquote
 
 from roboglot.values import dataclass
-from roboglot.wire.contracts import Row
+from roboglot.wire.contracts import Row, contract
 
 PATH_MAX = 1024  # characters
 # Paths outside the manual that clients use, with their operations.
@@ -92,3 +93,9 @@ class Routes:
             if (values := template.match(segments)) is not None:
                 return Match(template.methods, values)
         return None
+
+
+@cache
+def all_routes() -> Routes:
+    """Return the routes of the contract and beyond, which all robots share."""
+    return Routes((*contract("slamware"), *BEYOND))
