@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import ctypes
 import fcntl
 import functools
 import gc
 import importlib
 import importlib.util
 import inspect
+import itertools
 import os
 import re
 import signal
@@ -25,6 +27,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from hypothesis.internal.constants_ast import Constants
+from hypothesis.internal.entropy import deterministic_PRNG
 
 from roboglot.cli.warm import installation
 from roboglot.hosting import closing
@@ -66,6 +69,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 TESTS = Path(__file__).parent
+TRIM_PERIOD = 50  # tests
 FEW = ("quick", "some")  # profiles
 OF_ITS_OWN = "_hypothesis_internal_use_settings"  # attribute of a property
 NO_CONSTANTS = Constants()
@@ -211,8 +215,20 @@ def _companion_of(file: str) -> str:
 def pytest_collection_finish() -> None:
     """Leave all that was loaded out of garbage collections: it stays. What is garbage of it is not worth a look."""
     gc.freeze()
+    with deterministic_PRNG():  # its first use looks through all objects, twice: up to 6 s after many tests
+        pass
     gc.enable()
     gc.set_threshold(5_000, 5, 5)  # a world is thousands of objects that end together
+
+
+_tests_ended = itertools.count(1)
+_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc's
+
+
+def pytest_runtest_logfinish() -> None:
+    """Return free memory to the system now and then: robots have it kept, and four workers would hold gigabytes."""
+    if _trim is not None and next(_tests_ended) % TRIM_PERIOD == 0:
+        _trim(0)
 
 
 @pytest.fixture(scope="session")
