@@ -19,7 +19,7 @@ from numba.core.registry import cpu_target
 from roboglot.kernels import ahead
 from roboglot.kernels.ahead import compile_ahead
 from roboglot.kernels.arrays import FloatArray
-from roboglot.kernels.compiled import CHECKED, LeanLibrary, kernel
+from roboglot.kernels.compiled import CHECKED, StoredLibrary, kernel
 from roboglot.kernels.linear import invert
 from roboglot.testing.process import child
 
@@ -37,7 +37,7 @@ def test_a_cached_kernel_links_into_a_new_one() -> None:
     cached = kernel("void(float64[:,::1])", error_model=CHECKED)(vars(invert)["__wrapped__"])
     (overload,) = vars(cached)["overloads"].values()
     library = overload.library
-    assert isinstance(library, LeanLibrary)
+    assert isinstance(library, StoredLibrary)
     assert library._shared_module is None
 
     def twice(matrix: FloatArray) -> None:

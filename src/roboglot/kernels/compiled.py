@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 import numpy as np
-from llvmlite.binding import ModuleRef, parse_bitcode
+from llvmlite.binding import ModuleRef, ObjectFileRef, parse_bitcode
 from numba import njit, types
 from numba.core import dispatcher, environment
 from numba.core.caching import CacheImpl, FunctionCache, InTreeCacheLocator, UserProvidedCacheLocator
-from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.codegen import CodeLibrary, JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompileResult
 from numba.core.cpu import CPUContext
 from numba.core.runtime import rtsys
@@ -48,21 +48,44 @@ def _typeof_array(array: np.ndarray[tuple[int, ...], np.dtype[np.generic]], _con
     return types.Array(dtype, array.ndim, map_layout(array), readonly=not array.flags.writeable)
 
 
-class LeanLibrary(JITCodeLibrary):
-    """Library of a kernel; one of the cache has no LLVM module, which only the compiler of another kernel needs.
+class StoredLibrary(JITCodeLibrary):
+    """Library of a kernel from the cache: machine code, linked as it is.
 
-    Numba keeps that parsed: a third of the memory of all. Here it is read again when a kernel is compiled in this
-    process that calls this one.
+    Numba makes an LLVM module for it, parses the one that another kernel's compiler would need, and lists the symbols
+    of both: that takes three times as long, and a third of the memory of all. Here that module is read when a kernel
+    is compiled in this process that calls this one. No kernel calls itself, which would need Numba's own linker.
     """
 
     _shared_module: ModuleRef | None
-    stored: Callable[[], bytes] | None = None
+
+    def __init__(self, codegen: JITCPUCodegen, name: str, code: bytes) -> None:
+        CodeLibrary.__init__(self, codegen, name)  # the classes between make a module
+        self._finalized = self._disable_inspection = True
+        self._shared_module = None
+        self._reload_init: set[object] = set()  # set by a class between, before Numba 0.68
+        self.stored: Callable[[], bytes] | None = None  # returns the module
+        codegen._engine._ee.add_object_file(ObjectFileRef.from_data(code))
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return the address of one of the kernel's functions; called by Numba."""
+        return cast("int", self._codegen._engine.get_function_address(name))
 
     def _get_module_for_linking(self) -> ModuleRef:
         """Return the module for a caller that is compiled; called by Numba."""
-        if self._shared_module is None and self.stored is not None:
+        if self._shared_module is None:
+            assert self.stored is not None
             self._shared_module = parse_bitcode(self.stored())
-        return super()._get_module_for_linking()
+        return self._shared_module
+
+
+class LeanLibrary(JITCodeLibrary):
+    """Library of a kernel that is compiled in this process; those of the cache become a ``StoredLibrary``."""
+
+    @classmethod
+    def _unserialize(cls, codegen: JITCPUCodegen, state: tuple[str, str, tuple[bytes, bytes]]) -> StoredLibrary:
+        """Return a library of the cache; called by Numba."""
+        name, _, (code, _) = state  # the cache has machine code of all
+        return StoredLibrary(codegen, name, code)
 
 
 class ReadableFolder(UserProvidedCacheLocator):
@@ -95,7 +118,6 @@ class LeanCache(FunctionCache):
             found: CompileResult | None = self._load_overload(signature, context)
         if found is not None:
             found = found._replace(type_annotation="")  # 3 MB of all
-            found.library._shared_module = None
             found.library.stored = partial(self._bitcode, self._index_key(signature, context.codegen()))
         return found
 
