@@ -10,7 +10,7 @@ from functools import partial
 
 import pytest
 
-from roboglot.model.clock import LockstepClock
+from roboglot.model.clock import LockstepClock, Timer
 from roboglot.model.components.motion.base import Base
 from roboglot.model.components.motion.gimbal import FollowMode, Gimbal
 from roboglot.model.components.motion.legs import Legs
@@ -170,3 +170,78 @@ async def test_people_walk_past_robots_as_without_the_kernel(simulate: Simulate)
         return found
 
     assert await walked(compiled=True) == await walked(compiled=False)
+
+
+class PassingClock(LockstepClock):
+    """Time that passes by itself, as far as a world can tell."""
+
+    repeats = False
+
+    @property
+    def free_until(self) -> float:
+        return self.time()
+
+    @property
+    def next_due(self) -> float:
+        return min((when for when, _, timer in self._heap if timer.callback), default=math.inf)
+
+    def go_ahead(self, when: float) -> None:
+        assert when <= self.time() + 1e-9
+
+
+async def commanded(body: str, clock: LockstepClock) -> tuple[list[str], float]:
+    """Return what a robot does that is commanded at odd times and rests between, and the world's beats per tick."""
+    world = World(load_world("empty"), [RobotPlacement("a", body, start=Pose(5.0, 5.0))], clock=clock)
+    robot, dice, lines, begun = Robot("a", world.description_of("a"), clock), random.Random(3), list[str](), 0
+    world.equip(robot)
+    await world.prepare(wait=True)
+    advance = world._advance
+
+    def count(fired: Timer | None) -> None:
+        nonlocal begun
+        begun += 1
+        advance(fired)
+
+    world._advance = count  # type: ignore[method-assign]
+    world.start()
+    await clock.advance(1.5)
+    for step in range(40):
+        await clock.advance(dice.uniform(0.0, 0.25))
+        if step % 8 in (1, 6):
+            robot[Base].set_velocity(Twist(0.0, 0.0, dice.choice((-1.0, 1.0))))
+        elif step % 8 in (2, 5) and Gimbal in robot:
+            robot[Gimbal].set_speed(0.0, dice.choice((-1.0, 1.0)))
+        elif step % 4 == 3:
+            robot[Base].set_velocity(Twist())
+            await robot.actions.cancel()
+            await clock.advance(1.2)
+        reading = robot[Odometry].reading
+        angles = robot[Gimbal].angles if Gimbal in robot else None
+        lines.append(f"{world.truth.pose_of('a')} {reading.pose} {reading.twist} {angles}")
+    world.close()
+    return lines, begun / (world.simulated / TICK)
+
+
+@pytest.mark.parametrize(("body", "most"), [("universal", 0.8), ("robomaster_ep", 0.8), ("cyberdog2", 1.01)])
+async def test_rest_in_real_time_moves_no_command(body: str, most: float) -> None:
+    """Ticks that wait while a robot rests are done before it follows a command, as if each had had its time."""
+    (passing, beats), (lockstep, _) = await commanded(body, PassingClock()), await commanded(body, CountingClock())
+    assert passing == lockstep
+    assert len({*passing}) > 12
+    assert beats < most
+
+
+async def test_timers_of_real_time_find_ticks_done() -> None:
+    clock = PassingClock()
+    world = World(load_world("empty"), [RobotPlacement("a", start=Pose(3.0, 2.0))], clock=clock)
+    world.equip(Robot("a", world.description_of("a"), clock))
+    await world.prepare(wait=True)
+    world.start()
+    await clock.advance(2.09)
+    stamps = list[float]()
+    assert world.time == pytest.approx(2.0)  # it rests until the robot has something due
+    for when in (2.125, 2.15, 2.31, 2.33):
+        clock.call_at(when, lambda: stamps.append(world.time))
+    await clock.advance(0.5)
+    assert stamps == [pytest.approx(math.floor(when / TICK) * TICK) for when in (2.125, 2.15, 2.31, 2.33)]
+    world.close()

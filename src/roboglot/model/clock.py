@@ -63,6 +63,14 @@ class RealClock(Clock):
         real, robot = self._anchor
         return min(robot + (time.monotonic() - real) * self._speed, self._until)
 
+    @property
+    def free_until(self) -> float:
+        return self.time()
+
+    @property
+    def next_due(self) -> float:
+        return self._timers.next_due
+
     def epoch(self) -> float:
         return self._epoch + self.time()
 

@@ -55,8 +55,13 @@ class Clock(ABC):
 
     @property
     def free_until(self) -> float:
-        """Time until which nothing is due but the callback under way; -inf: time passes by itself, or it is unknown."""
+        """Time until which nothing is due but the callback under way, or that has passed; -inf: it is unknown."""
         return -math.inf
+
+    @property
+    def next_due(self) -> float:
+        """Time of the earliest timer, if time passes by itself; else inf."""
+        return math.inf
 
     def go_ahead(self, when: float) -> None:  # noqa: B027 - time passes by itself
         """Let time pass until ``when`` within a callback, which does in advance what it would be called for.
@@ -254,6 +259,18 @@ class RealTimers:
             self.arm()
         return timer
 
+    @property
+    def next_due(self) -> float:
+        """Time of the earliest one; inf if there is none."""
+        self._drop_cancelled()
+        return self._heap[0][0] if self._heap else math.inf
+
+    def _drop_cancelled(self) -> None:
+        """Drop those that were cancelled before the earliest that was not."""
+        while self._heap and self._heap[0][2].callback is None:
+            heapq.heappop(self._heap)
+            self._cancelled -= 1
+
     def note_cancelled(self) -> None:
         """Count a cancelled timer in the heap; drop all of them once they are the majority."""
         self._cancelled += 1
@@ -267,9 +284,7 @@ class RealTimers:
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None
-        while self._heap and self._heap[0][2].callback is None:
-            heapq.heappop(self._heap)
-            self._cancelled -= 1
+        self._drop_cancelled()
         if not self._heap:
             return
         self._rings_at = self._heap[0][0]

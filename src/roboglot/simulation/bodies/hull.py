@@ -285,6 +285,7 @@ class Hull(HullState):
 
     def lift(self, height: float | None) -> None:
         """Hold the robot ``height`` m above its present place, or let go (None)."""
+        self.robot_rows.tables.before_change()
         self.support.release()
         self.hand = None if height is None else self.elevation + height
         self.loose = True
@@ -292,6 +293,7 @@ class Hull(HullState):
 
     def push(self, x: float, y: float, z: float) -> None:
         """Apply an impulse (N s, base_link)."""
+        self.robot_rows.tables.before_change()
         self.support.release()
         self.disturbed = True
         c, s = math.cos(self.turned), math.sin(self.turned)

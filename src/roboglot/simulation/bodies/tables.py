@@ -43,13 +43,17 @@ class TickStage:
 
 
 class RobotTables:
-    """Tables for ``robots`` robots. ``kernels``: None until loaded; ``others``: buffer for rows that they leave."""
+    """Tables for ``robots`` robots. ``kernels``: None until loaded; ``others``: buffer for rows that they leave.
+
+    ``before_change`` is called before a robot that may be at rest is moved, or a part of it begins or ends to work.
+    """
 
     def __init__(self, robots: int) -> None:
         self._robots = robots
         self._tables: dict[str, FloatArray] = {}
         self.kernels: Kernels | None = None
         self.others: IntArray = np.zeros(robots, np.int64)
+        self.before_change: Callable[[], None] = lambda: None
 
     def load_kernels(self) -> None:
         """Compute with the compiled kernels from now on; results stay the same, to the last bit."""
@@ -109,7 +113,7 @@ class RobotRows:
 
 @dataclass(frozen=True, slots=True)
 class BatchedControl:
-    """Control of one kind of part of all robots, read_motion ``RobotTables.control``."""
+    """Control of one kind of part of all robots; see ``RobotTables.control``."""
 
     tables: RobotTables
     single: Mapping[int, Control]
@@ -129,7 +133,7 @@ class BatchedControl:
 
 @dataclass(frozen=True, slots=True)
 class BatchedSense:
-    """Sensing of one kind of part of all robots, read_motion ``RobotTables.sense``."""
+    """Sensing of one kind of part of all robots; see ``RobotTables.sense``."""
 
     tables: RobotTables
     single: Mapping[int, Sense]

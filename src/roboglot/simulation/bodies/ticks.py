@@ -18,11 +18,15 @@ class DueSchedules:
     """Finds the schedules with something due in a tick, in their order, without looking at the others.
 
     ``number`` is the index of a schedule. ``before``: for each schedule, the world's tick before its first one.
+    ``before_change``: see ``RobotTables``.
     """
 
-    def __init__(self, schedules: Sequence[Schedule], before: Sequence[int], tick: int) -> None:
+    def __init__(
+        self, schedules: Sequence[Schedule], before: Sequence[int], tick: int, before_change: Callable[[], None]
+    ) -> None:
         """``tick``: the last tick that has passed."""
         self._schedules, self._before, self._tick = schedules, before, tick
+        self._before_change = before_change
         self._booked = [0] * len(schedules)  # the next tick of each in which something is due
         self._due: dict[int, list[int]] = {}  # by tick; entries that differ from ``_booked`` are out of date
         self._left: list[int] = []  # heap of the present tick
@@ -56,6 +60,7 @@ class DueSchedules:
 
     def _change(self, number: int) -> None:
         """Note that a duty of a schedule began or ended."""
+        self._before_change()
         if number != self._at:
             self._book(number, self._tick - (number > self._at))
 
@@ -84,7 +89,7 @@ class RobotTicks:
         self._ahead: list[Callable[[int], None]] = []
         self.gathered = 0  # number of times that these were made
         self._ticks = 0
-        self._controlled = self._sensed = DueSchedules((), (), 0)
+        self._controlled = self._sensed = DueSchedules((), (), 0, tables.before_change)
 
     def control(self, robots: tuple[SimulatedRobot, ...], *, lean: bool = False) -> bool:
         """Run all control of the next tick, before its physics; if ``lean``, only if a robot has something due.
@@ -115,6 +120,13 @@ class RobotTicks:
                 return ahead
         return most
 
+    def idle(self, most: int) -> int:
+        """Return how many of the next ticks, up to ``most``, pass before a robot has something due."""
+        for ahead in range(1, most + 1):
+            if self._sensed.due(self._ticks + ahead) or self._controlled.due(self._ticks + ahead):
+                return ahead - 1
+        return most
+
     def skip(self, ticks: int) -> None:
         """Note that so many ticks have passed; sensing of the last one is still to come."""
         if not ticks:
@@ -122,6 +134,12 @@ class RobotTicks:
         self._ticks += ticks
         self._controlled.skip(self._ticks)
         self._sensed.skip(self._ticks - 1)
+
+    def rest(self, ticks: int) -> None:
+        """Note that so many ticks have passed, in which nothing was due."""
+        self._ticks += ticks
+        self._controlled.skip(self._ticks)
+        self._sensed.skip(self._ticks)
 
     def sense(self, robots: tuple[SimulatedRobot, ...], stamp: float) -> Iterator[None]:
         """Run the sensing that is due in the last tick; yield where other work may come between."""
@@ -156,5 +174,6 @@ class RobotTicks:
             if robot.before is None:
                 robot.before = self._ticks
         before = [robot.before or 0 for robot in robots]
-        self._controlled = DueSchedules([robot.controls for robot in robots], before, self._ticks)
-        self._sensed = DueSchedules([robot.senses for robot in robots], before, self._ticks)
+        change = self._tables.before_change
+        self._controlled = DueSchedules([robot.controls for robot in robots], before, self._ticks, change)
+        self._sensed = DueSchedules([robot.senses for robot in robots], before, self._ticks, change)

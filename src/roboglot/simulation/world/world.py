@@ -20,6 +20,7 @@ from roboglot.config import serial_of
 from roboglot.extras import own_version
 from roboglot.kernels import WORLD
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
+from roboglot.kernels.layouts import DONE
 from roboglot.model.background import load
 from roboglot.model.clock import Clock, PatientClock, RealClock, Timer
 from roboglot.model.geometry import Pose
@@ -61,6 +62,7 @@ from roboglot.values import dataclass
 log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
 AHEAD_MAX = 25  # ticks that are done at once
+REST_MAX = 5  # ticks of real time that are done at once while all robots rest: the period of sensors
 BEHIND_MAX = 25  # ticks by which a slow machine may lag before time is skipped, if the clock does not wait
 ROBOTS_MAX = 200
 
@@ -141,6 +143,9 @@ class World:
         self._ticks = 0
         self._origin = 0.0
         self._timer: Timer | None = None
+        self._calm = False  # whether the last tick needed nothing but the kernel
+        self._resting = 0  # ticks that need not be done one by one before the timer fires
+        self._physics.tables.before_change = self._wake
         speed = lambda: clock.speed if isinstance(clock, RealClock) else 1.0  # noqa: E731
         self._pace = Pace(speed, skips=not isinstance(clock, PatientClock))
 
@@ -244,11 +249,9 @@ class World:
         for robot in self._population.simulated.values():
             robot.detach()
 
-    def _due(self) -> float:
-        return self._origin + (self._ticks + 1) * TICK
-
-    def _arm(self) -> None:
-        self._timer = self._clock.call_at(self._due(), self._beat)
+    def _arm(self, resting: int = 0) -> None:
+        self._resting = resting
+        self._timer = self._clock.call_at(self._origin + (self._ticks + resting + 1) * TICK, self._beat)
 
     def _beat(self) -> None:
         self._clock.in_turn(partial(self._advance, self._timer), first=True)
@@ -260,7 +263,8 @@ class World:
         """
         if self._timer is None or self._timer is not fired:
             return  # closed, and perhaps started again
-        due = int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
+        self._resting = 0
+        due = self._ticks_due()
         if due > BEHIND_MAX:
             self._origin += (due - 1) * TICK
             self._clock.behind += (due - 1) * TICK
@@ -268,14 +272,33 @@ class World:
         self._pace.look(self.simulated, self._clock.behind)
         self._clock.in_steps(self._steps(due > 0, fired))
 
+    def _ticks_due(self) -> int:
+        return int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
+
     def _steps(self, due: bool, fired: Timer) -> Iterator[None]:
         """Do the steps of a tick, if it is ``due``, and schedule the next one."""
+        resting = 0
         if due:
             for _ in self._tick():
                 yield
                 if self._timer is not fired:
                     return  # closed meanwhile, and perhaps started again, with a beat of its own
-        self._clock.reached(self.time)
+            resting = self._ticks_at_rest()
+        self._clock.reached(self.time + resting * TICK)
+        self._arm(resting)
+
+    def _wake(self) -> None:
+        """Do the ticks that have passed while all robots rested, before one of them does something."""
+        if self._timer is None or not self._resting:
+            return
+        passed, self._resting = min(self._ticks_due(), self._resting), 0
+        if passed > 0:
+            left = self._ticking.run(passed, self._ticks, self._origin, followed=True)
+            self._ticks += left.ticks
+            self._robot_ticks.rest(left.ticks)
+            self._environment.sight.moved()
+            self._ticking.end(left, self.time)
+        self._timer.cancel()
         self._arm()
 
     def _tick(self) -> Iterator[None]:
@@ -298,6 +321,7 @@ class World:
             self._clock.go_ahead(self.time)
             self.building.step(self.time, TICK)
         self._environment.sight.moved()
+        self._calm = left.stage == DONE
         now = self.time
         ticking.end(left, now, beads.fly if beads.flying else None)
         yield
@@ -309,9 +333,20 @@ class World:
             return 0
         most = self._robot_ticks.free(AHEAD_MAX) if self.building.rests else 1
         until = min(self._clock.free_until, self.faults.next) if most > 1 else -math.inf
-        if until <= self.time:
-            return 1
-        while most > 1 and self._origin + (self._ticks + most - 1) * TICK > until:
+        return self._ticks_until(until, self._ticks, most) if until > self.time else 1
+
+    def _ticks_at_rest(self) -> int:
+        """Return how many ticks may pass in real time before the next must be done, as all robots rest."""
+        if self._clock.repeats or not (self._calm and self._physics.rests and self.building.rests):
+            return 0
+        if self._environment.beads.flying:
+            return 0
+        until = min(self._clock.next_due, self.faults.next)
+        return self._ticks_until(until, self._ticks + 1, self._robot_ticks.idle(REST_MAX - 1) + 1) - 1
+
+    def _ticks_until(self, until: float, first: int, most: int) -> int:
+        """Return how many ticks from the ``first`` on, 1 to ``most``, end by this time."""
+        while most > 1 and self._origin + (first + most - 1) * TICK > until:
             most -= 1
         return most
 

@@ -140,6 +140,7 @@ class SimulatedBase(Base):
 
     def cut(self) -> None:
         """Block the wheels at once, without a ramp."""
+        self._hull.robot_rows.tables.before_change()
         self._target, self._speeds = STILL, None
         self._turn_wheels(STILL)
 
@@ -205,6 +206,7 @@ class SimulatedBase(Base):
 
     def _take_time(self) -> None:
         """Begin to follow a command; end hard braking, unless it is to stand."""
+        self._hull.robot_rows.tables.before_change()
         self._note_pace()
         if self._target not in (STILL, NO_WHEELS):
             self._haste = 1.0

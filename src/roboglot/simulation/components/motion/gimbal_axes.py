@@ -106,6 +106,7 @@ class GimbalAxes:
 
     def _disturb(self) -> None:
         """Have the next tick computed alone: what the gimbal does has changed."""
+        self._hull.robot_rows.tables.before_change()
         self._resting, self._row[USE] = False, SINGLE
 
     def set_mode(self, mode: FollowMode) -> None:
