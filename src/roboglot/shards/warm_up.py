@@ -14,20 +14,23 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from types import FrameType
 
-PACKAGES = ("runtime", "simulation", "autonomy", "storage", "protocols", "programs", "console", "access")
+PACKAGES = ("runtime", "simulation", "autonomy", "storage", "protocols", "programs", "console", "access", "transport")
 SELDOM = (  # modules that few shards need, or that are programs of their own
     "roboglot.programs.worker",
     "roboglot.protocols.cyberdog.app_link",
     "roboglot.storage.postgresql",
 )
 FOREIGN = (
+    "_strptime",
     "cryptography.hazmat.backends.openssl.backend",
     "encodings.idna",
+    "grpc._utilities",
     "grpc.aio",
     "mujoco",
     "numpy.ma",
     "unicodedata",
     "uvicorn.lifespan.off",
+    "uvicorn.protocols.http.auto",
     "uvicorn.protocols.http.httptools_impl",
     "uvicorn.protocols.websockets.wsproto_impl",
     "uvloop",
