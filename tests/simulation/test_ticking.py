@@ -195,14 +195,14 @@ async def commanded(body: str, clock: LockstepClock) -> tuple[list[str], float]:
     robot, dice, lines, begun = Robot("a", world.description_of("a"), clock), random.Random(3), list[str](), 0
     world.equip(robot)
     await world.prepare(wait=True)
-    advance = world._advance
+    advance = world._beat._advance
 
     def count(fired: Timer | None) -> None:
         nonlocal begun
         begun += 1
         advance(fired)
 
-    world._advance = count  # type: ignore[method-assign]
+    world._beat._advance = count  # type: ignore[method-assign]
     world.start()
     await clock.advance(1.5)
     for step in range(40):

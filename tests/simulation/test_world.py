@@ -18,12 +18,8 @@ from roboglot.model.events import ScanTaken
 from roboglot.model.geometry import Pose, Twist
 from roboglot.model.robot import Robot
 from roboglot.simulation.building.props import OBSTACLES_MAX
-from roboglot.simulation.world.world import (
-    BEHIND_MAX,
-    TICK,
-    RobotPlacement,
-    World,
-)
+from roboglot.simulation.world.timing import BEHIND_MAX
+from roboglot.simulation.world.world import TICK, RobotPlacement, World
 from roboglot.simulation.world.world_files import load_world
 
 

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from roboglot.simulation.world.lag_monitor import CALM, WINDOW, Pace
+from roboglot.simulation.world.timing import CALM, WINDOW, Pace
 
 
 def run(pace: Pace, *losses: float) -> None:

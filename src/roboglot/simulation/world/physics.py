@@ -139,11 +139,6 @@ class Physics:
         """True if a kernel may move the robots."""
         return self._free_motion is not None and self._free_motion.loaded
 
-    @property
-    def rests(self) -> bool:
-        """True if nothing has moved since everything came to rest."""
-        return self._sleep.holds
-
     def course(self) -> Course | None:
         """Return what a kernel needs to do several ticks; None: the next one needs MuJoCo, or there are no kernels."""
         if self._free_motion is None or not self.moves_freely or self._pressed:

@@ -46,10 +46,12 @@ class UnfinishedTick:
 
 
 class Ticking:
-    """Ticks of one world. ``seconds``: length of one."""
+    """Ticks of one world. ``calm``: in the last ones no robot moved, and they needed nothing but the kernel."""
 
     def __init__(self, physics: Physics, crowd: Crowd, rounds: RobotTicks, seconds: float) -> None:
+        """``seconds``: length of a tick."""
         self._physics, self._crowd, self._robot_ticks, self._seconds = physics, crowd, rounds, seconds
+        self.calm = False
         self._run: Callable[..., int] | None = None
         self._gathered = 0  # count of the rounds from which these are
         self._arrays: tuple[object, ...] = ()
@@ -74,6 +76,7 @@ class Ticking:
 
         ``followed``: shared control of the first one has run; ``origin``: stamp of tick 0, s.
         """
+        self.calm = False
         if not ticks:
             return UnfinishedTick(1, DRIVE, 0)
         if self._gathered != self._robot_ticks.gathered:
@@ -103,6 +106,7 @@ class Ticking:
         stage, moved = divmod(rest, STAGE_UNIT)
         if begun > (stage == PEOPLE):
             self._physics.moved(awake=bool(moved), known=known)
+        self.calm = stage == DONE and sleep.holds
         return UnfinishedTick(begun, stage, count)
 
     def _gather(self) -> None:

@@ -11,7 +11,6 @@ import logging
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from typing import cast
 
 import numpy as np
@@ -20,9 +19,8 @@ from roboglot.config import serial_of
 from roboglot.extras import own_version
 from roboglot.kernels import WORLD
 from roboglot.kernels.ahead import KernelsUnavailable, compile_beside
-from roboglot.kernels.layouts import DONE
 from roboglot.model.background import load
-from roboglot.model.clock import Clock, PatientClock, RealClock, Timer
+from roboglot.model.clock import Clock
 from roboglot.model.geometry import Pose
 from roboglot.model.inputs.external import ExternalInputs
 from roboglot.model.inputs.noted_stage import noted
@@ -48,13 +46,13 @@ from roboglot.simulation.world.beads import Beads
 from roboglot.simulation.world.description import WorldDescription
 from roboglot.simulation.world.description_checks import repeated
 from roboglot.simulation.world.environment import Environment
-from roboglot.simulation.world.lag_monitor import Pace
 from roboglot.simulation.world.placing import Places
 from roboglot.simulation.world.population import Population
 from roboglot.simulation.world.randomness import RandomStreams
 from roboglot.simulation.world.sight import Sight
 from roboglot.simulation.world.sightlines import SightLines
 from roboglot.simulation.world.ticking import Ticking
+from roboglot.simulation.world.timing import Beat
 from roboglot.simulation.world.truth import Truth
 from roboglot.simulation.world.world_stage import WorldStage
 from roboglot.values import dataclass
@@ -63,7 +61,6 @@ log = logging.getLogger(__name__)
 TICK = 0.02  # s: controls and sensors
 AHEAD_MAX = 25  # ticks that are done at once
 REST_MAX = 5  # ticks of real time that are done at once while all robots rest: the period of sensors
-BEHIND_MAX = 25  # ticks by which a slow machine may lag before time is skipped, if the clock does not wait
 ROBOTS_MAX = 200
 
 
@@ -140,14 +137,8 @@ class World:
         self.faults = Faults(self, description.faults)
         self._robot_ticks = RobotTicks(self._physics.tables, TICK)
         self._ticking = Ticking(self._physics, self._crowd, self._robot_ticks, TICK)
-        self._ticks = 0
-        self._origin = 0.0
-        self._timer: Timer | None = None
-        self._calm = False  # whether the last tick needed nothing but the kernel
-        self._resting = 0  # ticks that need not be done one by one before the timer fires
+        self._beat = Beat(clock, TICK, self._tick, self._may_wait)
         self._physics.tables.before_change = self._wake
-        speed = lambda: clock.speed if isinstance(clock, RealClock) else 1.0  # noqa: E731
-        self._pace = Pace(speed, skips=not isinstance(clock, PatientClock))
 
     def _make_environment(self, seed: int) -> Environment:
         """Make the objects that the robots' parts share."""
@@ -200,12 +191,12 @@ class World:
     @property
     def time(self) -> float:
         """Robot time of the last tick, s."""
-        return self._origin + self._ticks * TICK
+        return self._beat.time
 
     @property
     def simulated(self) -> float:
         """Robot time simulated since the start, s: less than the clock's on a machine that is too slow."""
-        return self._ticks * TICK
+        return self._beat.simulated
 
     def chance(self, purpose: str) -> np.random.Generator:
         """Return the random generator of one purpose, from the world's seed."""
@@ -233,77 +224,29 @@ class World:
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""
-        if self._timer is None:
-            self._origin = self._clock.time() - self._ticks * TICK
-            self._clock.reached(self.time)
-            self._arm()
+        self._beat.start()
 
     def close(self) -> None:
         """Stop."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-            self._clock.reached(math.inf)
+        self._beat.close()
         if self._loading is not None:
             self._loading.cancel()
         for robot in self._population.simulated.values():
             robot.detach()
 
-    def _arm(self, resting: int = 0) -> None:
-        self._resting = resting
-        self._timer = self._clock.call_at(self._origin + (self._ticks + resting + 1) * TICK, self._beat)
-
-    def _beat(self) -> None:
-        self._clock.in_turn(partial(self._advance, self._timer), first=True)
-
-    def _advance(self, fired: Timer | None) -> None:
-        """Do a tick that is due; other tasks get their turn before the next one, even if it is due as well.
-
-        On a machine that is too slow, a patient clock waits; beside real robots, whose time does not, time is skipped.
-        """
-        if self._timer is None or self._timer is not fired:
-            return  # closed, and perhaps started again
-        self._resting = 0
-        due = self._ticks_due()
-        if due > BEHIND_MAX:
-            self._origin += (due - 1) * TICK
-            self._clock.behind += (due - 1) * TICK
-            due = 1
-        self._pace.look(self.simulated, self._clock.behind)
-        self._clock.in_steps(self._steps(due > 0, fired))
-
-    def _ticks_due(self) -> int:
-        return int((self._clock.time() - self._origin) / TICK + 1e-6) - self._ticks
-
-    def _steps(self, due: bool, fired: Timer) -> Iterator[None]:
-        """Do the steps of a tick, if it is ``due``, and schedule the next one."""
-        resting = 0
-        if due:
-            for _ in self._tick():
-                yield
-                if self._timer is not fired:
-                    return  # closed meanwhile, and perhaps started again, with a beat of its own
-            resting = self._ticks_at_rest()
-        self._clock.reached(self.time + resting * TICK)
-        self._arm(resting)
-
     def _wake(self) -> None:
         """Do the ticks that have passed while all robots rested, before one of them does something."""
-        if self._timer is None or not self._resting:
-            return
-        passed, self._resting = min(self._ticks_due(), self._resting), 0
-        if passed > 0:
-            left = self._ticking.run(passed, self._ticks, self._origin, followed=True)
-            self._ticks += left.ticks
+        if passed := self._beat.end_rest():
+            left = self._ticking.run(passed, self._beat.ticks, self._beat.origin, followed=True)
+            self._beat.ticks += left.ticks
             self._robot_ticks.rest(left.ticks)
             self._environment.sight.moved()
             self._ticking.end(left, self.time)
-        self._timer.cancel()
-        self._arm()
 
     def _tick(self) -> Iterator[None]:
         """Do a tick, and those after it until a robot has something due or anything else happens."""
-        self._ticks += 1
+        beat = self._beat
+        beat.ticks += 1
         robots = tuple(self._population.simulated.values())  # steps lie apart: one may join meanwhile
         beads, rounds, ticking = self._environment.beads, self._robot_ticks, self._ticking
         followed = rounds.control(robots, lean=ticking.lean and not beads.flying)
@@ -311,17 +254,16 @@ class World:
             yield
         self.faults.step(self.time)
         self.building.step(self.time, TICK)
-        left = ticking.run(self._most(), self._ticks - 1, self._origin, followed=followed)
+        left = ticking.run(self._most(), beat.ticks - 1, beat.origin, followed=followed)
         if not left.ticks:
             rounds.control(robots)
-            left = ticking.run(self._most(), self._ticks - 1, self._origin, followed=True)
+            left = ticking.run(self._most(), beat.ticks - 1, beat.origin, followed=True)
         rounds.skip(left.ticks)
         if left.ticks > 1:
-            self._ticks += left.ticks - 1
+            beat.ticks += left.ticks - 1
             self._clock.go_ahead(self.time)
             self.building.step(self.time, TICK)
         self._environment.sight.moved()
-        self._calm = left.stage == DONE
         now = self.time
         ticking.end(left, now, beads.fly if beads.flying else None)
         yield
@@ -333,22 +275,14 @@ class World:
             return 0
         most = self._robot_ticks.free(AHEAD_MAX) if self.building.rests else 1
         until = min(self._clock.free_until, self.faults.next) if most > 1 else -math.inf
-        return self._ticks_until(until, self._ticks, most) if until > self.time else 1
+        return self._beat.fitting(until, self._beat.ticks, most) if until > self.time else 1
 
-    def _ticks_at_rest(self) -> int:
+    def _may_wait(self) -> int:
         """Return how many ticks may pass in real time before the next must be done, as all robots rest."""
-        if self._clock.repeats or not (self._calm and self._physics.rests and self.building.rests):
-            return 0
-        if self._environment.beads.flying:
+        if self._clock.repeats or not (self._ticking.calm and self.building.rests) or self._environment.beads.flying:
             return 0
         until = min(self._clock.next_due, self.faults.next)
-        return self._ticks_until(until, self._ticks + 1, self._robot_ticks.idle(REST_MAX - 1) + 1) - 1
-
-    def _ticks_until(self, until: float, first: int, most: int) -> int:
-        """Return how many ticks from the ``first`` on, 1 to ``most``, end by this time."""
-        while most > 1 and self._origin + (first + most - 1) * TICK > until:
-            most -= 1
-        return most
+        return self._beat.fitting(until, self._beat.ticks + 1, self._robot_ticks.idle(REST_MAX - 1) + 1) - 1
 
     def _sound(self, walker: Walker, step: Say | Clap) -> None:
         """Emit a person's sound, unless there are too many sounds already."""
