@@ -103,4 +103,5 @@ def test_all_variables_that_are_read_are_known() -> None:
     for path in Path(cli.__file__).parents[1].rglob("*.py"):
         read.update(re.findall(r'"ROBOGLOT_([A-Z_]+)"', path.read_text()))
     given = {"ADDRESS", "URL", "PROGRAMS", "CERTIFICATES", "APP_PORT"}  # to the commands of scenarios, which read them
+    given |= {"SCENARIO", "CAMPAIGN_FOLDER"}  # to processes that are to be ended, or that end them
     assert read - given | {"PROGRAMS"} == set(cli.VARIABLES)
