@@ -194,6 +194,23 @@ def test_a_killed_campaign_leaves_no_process(folder: Path) -> None:
     wait_until(lambda: not list((folder / "tmp").iterdir()))
 
 
+@pytest.mark.slow
+def test_trials_do_not_import_the_main_program(folder: Path) -> None:
+    """That of a worker of Ray takes seconds."""
+    (folder / "a.yaml").write_text(STAYS)
+    program = folder / "program.py"
+    program.write_text(
+        "from pathlib import Path\n"
+        "from roboglot.testing.campaign.local import play_here\n"
+        "from roboglot.testing.campaign.trials import trials_of\n"
+        "from roboglot.testing.scenarios.files import find\n"
+        f"trials = trials_of(find([Path({str(folder / 'a.yaml')!r})]), Path({str(folder)!r}), range(1))\n"
+        "play_here(trials, 1, 600.0, lambda _: None, lambda _, result: print(result.outcome, result.attempts))\n"
+    )
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=False, timeout=180)
+    assert done.stdout == "passed 1\n", done.stderr
+
+
 @pytest.mark.slow  # in short: tests/testing/test_scenarios.py::test_leftovers_of_a_command_end_with_its_scenario
 def test_leftovers_of_scenarios_end_with_them(folder: Path) -> None:
     (folder / "scenarios/leaves.yaml").write_text(LEAVES_TWO)

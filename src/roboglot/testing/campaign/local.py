@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from types import ModuleType
 
 import msgspec
 
@@ -30,6 +31,7 @@ ATTEMPTS_MAX = 3  # for a trial whose process dies
 PRELOADED = ["roboglot.testing.campaign.warmed"]
 FOLDER = "ROBOGLOT_CAMPAIGN_FOLDER"  # environment variable with multiprocessing's own temporary folder
 _OUTER = os.environ.get(MARK, "")  # of a scenario that runs this campaign
+_MAIN = threading.Lock()  # held while our main program is hidden
 Leave = Callable[[Trial], Path | None]
 Ended = Callable[[Trial, Result], None]
 
@@ -87,9 +89,19 @@ def _start(context: ForkServerContext, trial: Trial, attempt: int, folder: Path 
     receiver, sender = context.Pipe(duplex=False)
     scratch = tempfile.mkdtemp(prefix="roboglot-trial-")
     process = context.Process(target=_play, args=(trial, folder, scratch, sender), daemon=False)
-    process.start()
+    _begin(process)
     sender.close()
     return _Running(trial, attempt, process, receiver, _now() + seconds_max, scratch)
+
+
+def _begin(process: BaseProcess) -> None:
+    """Start a process that does not import our main program: Ray's takes seconds."""
+    with _MAIN:
+        main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
+        try:
+            process.start()
+        finally:
+            sys.modules["__main__"] = main
 
 
 def _done(running: list[_Running], interrupted: Connection) -> list[_Running]:
@@ -115,7 +127,7 @@ def _wait_for_fork_server(context: ForkServerContext, interrupted: Connection) -
 
     def fork() -> None:
         with contextlib.suppress(EOFError, OSError):  # it was ended
-            context.Process(target=_now).start()
+            _begin(context.Process(target=_now))
         sender.close()
 
     threading.Thread(target=fork, daemon=True).start()
