@@ -48,6 +48,21 @@ async def test_peer_that_asked_costs_no_second_look(
     assert ("127.0.0.2 was refused on port 50052" in caplog.text) is not asks
 
 
+async def test_peers_soon_after_another_are_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = Table(LISTENER)
+    monkeypatch.setattr(handshakes, "TABLES", (table,))
+    begun = Handshakes("127.0.0.1", 50052)
+    begun.begun()
+    table.rows = (LISTENER, PHONE)
+    for _ in range(5):
+        begun.begun()
+    while not begun._watched:
+        await settle()
+    assert begun._watched == {PEER}
+    assert table.reads == 2
+    begun.close()
+
+
 def test_port_of_the_second_table_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(handshakes, "TABLES", (Table(), Table(LISTENER, PHONE)))
     assert handshakes._peers(None, 50052) == {PEER: "01"}

@@ -40,19 +40,22 @@ class Handshakes:
         self._loop = asyncio.get_running_loop()
         self._watched: set[str] = set()
         self._looked = -LOOK_PERIOD
+        self._next: asyncio.TimerHandle | None = None  # at the end of LOOK_PERIOD, if there were more handshakes in it
         self._asked: dict[str, None] = {}  # oldest first
         self._logged_at: dict[str, float] = {}  # time by host
         self._looks: set[asyncio.TimerHandle] = set()
 
     def begun(self) -> None:
-        """Record the start of a handshake; skipped in a flood, when the table is long."""
+        """Record the start of a handshake; the table, which is long in a flood, is read once in LOOK_PERIOD."""
         now = self._loop.time()
-        if now - self._looked < LOOK_PERIOD:
+        if self._loop.is_closed():
+            return
+        if (early := self._looked + LOOK_PERIOD - now) > 0.0:
+            if self._next is None:
+                self._loop.call_soon_threadsafe(self._look_later, early)
             return
         self._looked = now
-        peers = _peers(self._own, self.port)
-        if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._watch, peers)
+        self._loop.call_soon_threadsafe(self._watch, _peers(self._own, self.port))
 
     def note_request(self, peer: str) -> None:
         """Record a request from ``peer`` (in gRPC's form): its handshake succeeded."""
@@ -65,6 +68,17 @@ class Handshakes:
         """Stop watching."""
         for look in self._looks:
             look.cancel()
+        if self._next is not None:
+            self._next.cancel()
+
+    def _look_later(self, seconds: float) -> None:
+        """Look for those whose handshakes began too soon after the last look."""
+        if self._next is None:
+            self._next = self._loop.call_later(seconds, self._look_now)
+
+    def _look_now(self) -> None:
+        self._next, self._looked = None, self._loop.time()
+        self._watch(_peers(self._own, self.port))
 
     def _watch(self, peers: dict[str, str]) -> None:
         new = [peer for peer in peers if peer not in self._watched and peer not in self._asked]
