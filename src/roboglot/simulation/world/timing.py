@@ -86,8 +86,12 @@ class Beat:
 
     @property
     def simulated(self) -> float:
-        """Robot time simulated since the start, s: less than the clock's on a machine that is too slow."""
-        return self.ticks * self._seconds
+        """Robot time simulated since the start, s: less than the clock's on a machine that is too slow.
+
+        Time that passes while robots rest counts.
+        """
+        rested = min(self._clock.time() - self.time, self._resting * self._seconds) if self._resting else 0.0
+        return self.ticks * self._seconds + max(0.0, rested)
 
     def start(self) -> None:
         """Let time pass; needs the running loop."""
@@ -100,7 +104,7 @@ class Beat:
         """Stop."""
         if self._timer is not None:
             self._timer.cancel()
-            self._timer = None
+            self._timer, self._resting = None, 0
             self._clock.reached(math.inf)
 
     def fitting(self, until: float, first: int, most: int) -> int:
