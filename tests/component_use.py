@@ -1,4 +1,4 @@
-"""Components of the model that a handler's source asks its robot for: ``robot[Base]`` and the like.
+"""Components of the model that a handler's source asks its robot for: ``robot[Base]``, ``robot.require(Base)``.
 
 Follows the functions of the handler's door, and methods and properties whose name only one class there has.
 ``X in robot`` makes X optional, for then the handler knows what to do without.
@@ -27,6 +27,7 @@ def used_by(handler: Callable[..., Any]) -> frozenset[type[Component]]:
     """Return the components without which ``handler`` cannot do its work."""
     required: set[type[Component]] = set()
     optional: set[type[Component]] = set()
+    itself: set[type[Component]] = set()  # taken in the handler's own source, whatever others ask
     seen: set[FunctionType] = set()
     waiting: list[tuple[Any, int]] = [(handler, 0)]
     while waiting:
@@ -36,10 +37,12 @@ def used_by(handler: Callable[..., Any]) -> frozenset[type[Component]]:
             continue
         seen.add(function)
         for node in _nodes(function):
-            required |= set(_subscripts(node, function))
+            required |= {*_subscripts(node, function), *_requirements(node, function)}
             optional |= set(_questions(node, function))
             waiting += [(called, depth + 1) for called in _calls(node, function)]
-    return frozenset(required - optional)
+        if depth == 0:
+            itself = required - optional
+    return frozenset(required - optional | itself)
 
 
 @cache
@@ -50,6 +53,14 @@ def _nodes(function: FunctionType) -> list[ast.AST]:
 def _subscripts(node: ast.AST, function: FunctionType) -> Iterator[type[Component]]:
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Name):
         yield from _component(node.slice.id, function)
+
+
+def _requirements(node: ast.AST, function: FunctionType) -> Iterator[type[Component]]:
+    match node:
+        case ast.Call(func=ast.Attribute(attr="require"), args=args):
+            for arg in args:
+                if isinstance(arg, ast.Name):
+                    yield from _component(arg.id, function)
 
 
 def _questions(node: ast.AST, function: FunctionType) -> Iterator[type[Component]]:

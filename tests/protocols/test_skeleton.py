@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import re
 from pathlib import Path
 from types import ModuleType
 
@@ -40,24 +39,6 @@ def test_things_have_the_same_names(door: DoorType) -> None:
     assert table.implemented()
     assert isinstance(table.partly(), dict)
     assert inspect.isclass(module(door, "context").Context)
-
-
-@DOOR
-def test_handlers_declare_components_that_they_take(door: DoorType) -> None:
-    """The table of capabilities had operations that robots without the component refuse."""
-    module(door, "dispatch")
-    undeclared = {}
-    for operation in module(door, "table").TABLE:
-        handler = inspect.unwrap(operation.handler)
-        source = inspect.getsource(handler)
-        required = re.findall(r"robot\.require\(([\w, ]+)\)", source)
-        names = [*re.findall(r"\brobot\[(\w+)\]", source), *", ".join(required).split(", ")]
-        taken = {handler.__globals__.get(name) for name in names}
-        if_there = {handler.__globals__.get(name) for name in re.findall(r"\b(\w+) (?:not )?in [\w.]*robot\b", source)}
-        kinds = {kind for kind in taken - if_there if inspect.isclass(kind)}
-        if missing := kinds - operation.needs - operation.some:
-            undeclared[operation.key] = sorted(kind.__name__ for kind in missing)
-    assert undeclared == {}
 
 
 @DOOR

@@ -45,13 +45,14 @@ class CubeConfig(msgspec.Struct, forbid_unknown_fields=True):
 )
 async def set_cube_config(context: Context, body: bytes) -> None:
     """Configure the machine; 400 for unknown settings or values beyond the robot's limits."""
+    robot = context.robot
+    robot.require(Base, Settings)
     try:
         config = decode_json(body, CubeConfig)
     except msgspec.DecodeError as error:
         raise InvalidGoal(
             f"this robot cannot read the configuration: {why_invalid(error, wanted=CubeConfig)}"
         ) from None
-    robot = context.robot
     if config.disabled_sensors:
         known = {sensor.id for sensor in robot[SensorMasks].sensors}
         if missing := set(config.disabled_sensors) - known:
