@@ -64,8 +64,7 @@ BLIND = np.diag((0.5**2, 0.5**2, 0.3**2))  # variances after a gap in the scans
 SURE_QUALITY = 0.85  # agreement from which contradictions of the map need not be checked
 SILENCE_PERIOD = 0.5  # s between two checks for silence of the lidar
 STILL, STILL_YAW = 0.002, math.radians(0.1)  # less motion than this between scans is standing
-STILL_PERIOD, STILL_PERIOD_LONG = 0.5, 1.0  # s between two matches while standing, and after STANDS_LONG
-STANDS_LONG = 5.0  # s
+STILL_PERIOD = 0.5  # s between two matches while standing
 LOST_QUALITY = 0.4  # quality below which to search around
 NARROW = (0.2, math.radians(5.0))  # m, rad searched around the believed pose after a doubtful step
 DOUBT_SIGMAS = 3.0  # a pose this far from odometry's: match without it
@@ -112,7 +111,7 @@ class Slam:
         self._belief = belief
         self._matched_odometry: Pose | None = None
         self._motion = Motion()  # at the last match
-        self._matched_at = self._searched_at = self._drove_at = -math.inf
+        self._matched_at = self._searched_at = -math.inf
         self._agreement = self._known = 1.0
         self._newest: ScanTaken | None = None
         self.odometry = OdometryLearner(belief.odometry.noise)
@@ -216,10 +215,7 @@ class Slam:
             self._excursions.forget()
             self.whereabouts.lose(LostReason.NO_SCANS, event.stamp)
         motion = motion_between(self._matched_odometry or odometry, odometry, event.stamp - self._matched_at)
-        if motion.drives or self._matched_odometry is None:
-            self._drove_at = event.stamp
-        period = STILL_PERIOD if event.stamp - self._drove_at < STANDS_LONG else STILL_PERIOD_LONG
-        stands = not motion.drives and event.stamp - self._matched_at < period
+        stands = not motion.drives and event.stamp - self._matched_at < STILL_PERIOD
         if stands and not (self._is_unsure or belief.asked):
             return
         # Objects known to stand there are no evidence on the map, nor on a loaded one the dock that the robot touches.
