@@ -104,7 +104,13 @@ def test_pages_in_a_wheel_equal_the_sources(core: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["console/studio/labels.toml", "protocols/slamware/page/page.js", "wire/contracts/slamware.json"]
+    "name",
+    [
+        "console/studio/labels.toml",
+        "protocols/slamware/page/page.js",
+        "simulation/worlds/office.toml",
+        "wire/contracts/slamware.json",
+    ],
 )
 def test_texts_in_a_wheel_equal_the_sources(core: Path, name: str) -> None:
     code = "import sys, roboglot; from pathlib import Path; from roboglot.text_files import content_of"

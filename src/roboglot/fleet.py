@@ -53,6 +53,7 @@ from roboglot.storage.members import StoredMembers
 from roboglot.storage.places import StoredPlaces
 from roboglot.storage.settings import StoredSettings
 from roboglot.storage.transactions import Transactions
+from roboglot.text_files import content_of
 from roboglot.values import dataclass
 
 if TYPE_CHECKING:
@@ -189,7 +190,7 @@ def origin_of(config: Config, version: str, *, has_data: bool = False) -> Origin
         facts["redact"] = ", ".join(config.record.redact)
     bodies = {robot.body for robot in config.robots if robot.is_simulated}
     sources = [*world_sources(config.world), *(body_source(body) for body in sorted(bodies))]
-    files = [Attachment(path.name, "application/octet-stream", path.read_bytes()) for path in sources]
+    files = [Attachment(path.name, "application/octet-stream", content_of(path)) for path in sources]
     return Origin(facts, [Attachment("config.json", "application/json", settings.encode()), *files])
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from yaml import SafeLoader
 
 TEXT_MAX = 16 << 20  # characters of a file
+PACKAGE = Path(__file__).parent
 OF_THE_SHELL = "/dev/fd/", "/dev/stdin", "/proc/self/fd/"
 T = TypeVar("T")
 
@@ -75,7 +76,18 @@ def text_of(path: Path, most: int = TEXT_MAX, encoding: str = "utf-8") -> str:
 def content_of(path: Path) -> bytes:
     """Return the content of a file of the package; a wheel stores some compressed (``wheel_pages``)."""
     packed = path.with_name(f"{path.name}.gz")
-    return gzip.decompress(packed.read_bytes()) if packed.exists() else path.read_bytes()
+    return path.read_bytes() if path.exists() or not packed.exists() else gzip.decompress(packed.read_bytes())
+
+
+def own_text_of(path: Path, most: int = TEXT_MAX) -> str:
+    """Return the text of a file that may be one of the package; raises what ``text_of`` does."""
+    ours = path.parent.is_relative_to(PACKAGE)
+    return content_of(path).decode() if ours else text_of(path, most)
+
+
+def tables_in(folder: Path) -> list[Path]:
+    """Return the TOML files of a folder, in order; ``own_text_of`` reads those that a wheel stores compressed."""
+    return sorted(folder.glob("*.toml")) or sorted(file.with_suffix("") for file in folder.glob("*.toml.gz"))
 
 
 def bytes_of(path: Path, most: int) -> bytes:

@@ -6,7 +6,6 @@ import asyncio
 import re
 import sys
 import tempfile
-import tomllib
 from collections import defaultdict
 from collections.abc import Sequence
 from ipaddress import ip_address
@@ -31,6 +30,7 @@ from roboglot.recording.comparing.trees import kind_of, leaves, tree
 from roboglot.recording.lines import Target
 from roboglot.recording.probing import probe
 from roboglot.runtime import Runtime
+from roboglot.text_files import own_text_of, parse_toml
 
 PAGE = Path("docs/fidelity.md")
 PUBLISHED = Path(__file__).with_name("published.toml")
@@ -79,7 +79,7 @@ def command(write: Annotated[bool, typer.Option("--write", help="Write docs/fide
 
 def published(door: str = "") -> tuple[Session, ...]:
     """Return the published sessions of real robots, or of those with one protocol."""
-    found = tomllib.loads(PUBLISHED.read_text(encoding="utf-8"))
+    found = parse_toml(own_text_of(PUBLISHED))
     sessions = msgspec.convert(found["session"], tuple[Session, ...])
     return tuple(session for session in sessions if door in ("", session.door))
 

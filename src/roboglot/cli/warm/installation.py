@@ -19,7 +19,7 @@ OF_THE_INTERPRETER = (
     *("FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS", "TERMINAL_WIDTH", "_TYPER_", "TYPER_"),  # read by Typer
 )
 IN_CI = ("CI", "BUILD_BUILDID", "CODEBUILD_BUILD_ID", "JENKINS_URL", "TEAMCITY_VERSION", "TF_BUILD")
-LOADED = (".py", ".toml", ".json", ".sql")  # files of the package that a parent may have read
+LOADED = (".py", ".toml", ".json", ".sql", ".gz")  # files of the package that a parent may have read
 CREDENTIALS = ("Uid:", "Gid:", "Groups:", "CapEff:", "CapBnd:", "NoNewPrivs:", "Seccomp:")
 NAMESPACES = ("cgroup", "ipc", "mnt", "net", "pid", "user", "uts")
 PATH_MAX = 107  # bytes of a socket's path

@@ -17,7 +17,7 @@ from roboglot.programs.functions.table import ABILITIES
 from roboglot.programs.language import Problem
 from roboglot.programs.rehearsing import Act, Played, Scene
 from roboglot.spelling import meant
-from roboglot.text_files import convert_toml
+from roboglot.text_files import convert_toml, own_text_of, tables_in
 from roboglot.validation import why_invalid
 
 log = logging.getLogger(__name__)
@@ -157,11 +157,9 @@ def load(folders: Sequence[Path]) -> dict[str, Lesson]:
     """Return all missions of these folders by file name, in order; unreadable ones are logged and skipped."""
     found: dict[str, Lesson] = {}
     for folder in folders:
-        for path in sorted(folder.glob("*.toml"))[:LESSONS_MAX] if folder.is_dir() else ():
+        for path in tables_in(folder)[:LESSONS_MAX] if folder.is_dir() else ():
             try:
-                if path.stat().st_size > FILE_MAX:
-                    raise ValueError(f"it has more than {FILE_MAX} bytes")
-                found[path.stem] = read(path.read_text("utf-8"))
+                found[path.stem] = read(own_text_of(path, FILE_MAX))
             except (OSError, ValueError) as error:
                 log.warning("left out the lesson %s: %s", path, error)
     return found

@@ -13,6 +13,7 @@ from roboglot.simulation.bodies.part import parts
 from roboglot.simulation.bodies.realism import PRESETS, USUAL, with_realism
 from roboglot.simulation.world.declarations import BadFile, read_toml
 from roboglot.spelling import instead
+from roboglot.text_files import tables_in
 
 BODIES = Path(__file__).parent
 
@@ -22,8 +23,7 @@ def load_body(name: str) -> Body:
     sets the realism of its sensors. Raises BadFile.
     """
     path, (name, preset) = body_source(name), split_realism(name)
-    if not name.endswith(".toml") and (not name.isidentifier() or not path.is_file()):
-        known = sorted(file.stem for file in BODIES.glob("*.toml"))
+    if not name.endswith(".toml") and name not in (known := [file.stem for file in tables_in(BODIES)]):
         raise BadFile(f"no body is named {name!r}, and it is not a .toml file{instead(name, known)}")
     content: Any = read_toml(path, _file_type())
     sections = {part.name: getattr(content, part.name) for part in parts() if part.section is not None}

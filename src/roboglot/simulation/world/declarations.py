@@ -13,7 +13,7 @@ from typing import TypeVar, cast
 
 import msgspec
 
-from roboglot.text_files import convert_toml, text_of
+from roboglot.text_files import convert_toml, own_text_of
 from roboglot.validation import why_invalid
 
 T = TypeVar("T")
@@ -40,7 +40,7 @@ def read_toml(path: Path, structure: type[T]) -> T:
 def text_below(path: Path, most: int) -> str:
     """Return the text of a file of at most so many characters. Raises BadFile."""
     try:
-        return text_of(path, most)
+        return own_text_of(path, most)
     except OSError as error:
         raise BadFile(f"{path}: {error.strerror}") from None
     except ValueError as error:

@@ -31,7 +31,7 @@ from roboglot.simulation.world.description import (
 )
 from roboglot.simulation.world.description_checks import completed
 from roboglot.spelling import instead
-from roboglot.text_files import parse_yaml
+from roboglot.text_files import parse_yaml, tables_in
 from roboglot.validation import why_invalid
 
 WORLDS = Path(__file__).parent.parent / "worlds"
@@ -62,7 +62,7 @@ class RosMap(Struct, frozen=True):
 def load_world(name_or_path: str | Path) -> WorldDescription:
     """Load a shipped world by name, a TOML file, or a ROS map (yaml). Raises BadFile (a ValueError)."""
     name = str(name_or_path)
-    known = sorted(file.stem for file in WORLDS.glob("*.toml"))
+    known = [file.stem for file in tables_in(WORLDS)]
     path = WORLDS / f"{name}.toml" if name in known else Path(name)
     match path.suffix:
         case ".toml":
@@ -76,7 +76,7 @@ def load_world(name_or_path: str | Path) -> WorldDescription:
 def world_sources(name_or_path: str) -> list[Path]:
     """Return the files of a world: its TOML file, or a ROS map and its image."""
     shipped = WORLDS / f"{name_or_path}.toml"
-    path = shipped if shipped.is_file() else Path(name_or_path)
+    path = shipped if shipped in tables_in(WORLDS) else Path(name_or_path)
     return [path] if path.suffix == ".toml" else [path, path.parent / _read(path).image]
 
 
