@@ -27,7 +27,7 @@ def used_by(handler: Callable[..., Any]) -> frozenset[type[Component]]:
     """Return the components without which ``handler`` cannot do its work."""
     required: set[type[Component]] = set()
     optional: set[type[Component]] = set()
-    itself: set[type[Component]] = set()  # taken in the handler's own source, whatever others ask
+    itself: set[type[Component]] = set()  # taken in the handler's own source, even if others ask first
     seen: set[FunctionType] = set()
     waiting: list[tuple[Any, int]] = [(handler, 0)]
     while waiting:

@@ -1,4 +1,4 @@
-"""A PostgreSQL server that hangs, or that nobody reaches, keeps no work waiting."""
+"""A PostgreSQL server that hangs or cannot be reached keeps no work waiting."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.storage.postgresql_server import PostgreSQLServer, needs_postgresql
 async def test_silent_server_fails_what_waits_for_it(
     db_server: PostgreSQLServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A server that hangs keeps its connections, and takes new ones: only the time tells."""
+    """A server that hangs keeps its connections, and takes new ones: only a time limit shows it."""
     database = open_database(tmp_path / "unused", db_server.url)
     settings = StoredSettings(database, "a")
     await settings.put("x", 1)
