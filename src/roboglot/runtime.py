@@ -272,7 +272,7 @@ class Runtime:
             self.console.open()
         await self.fleet.start(wait=self.config.lockstep)
         if self._engine is not None:
-            self._engine.open_soon()
+            self._engine.open_later()
         gc.freeze()  # everything loaded stays: the collector need not scan it again
 
     async def close(self) -> None:

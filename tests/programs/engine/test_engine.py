@@ -133,6 +133,25 @@ async def test_opening_in_the_background_does_not_wait() -> None:
     await engine.close()
 
 
+async def test_opening_later_takes_nothing_from_the_start() -> None:
+    before = children_of(os.getpid())
+    engine, other = Engine(), Engine()
+    engine.open_later()
+    assert (await play(other, "print(1)")).output == "1\n"
+    assert len(children_of(os.getpid()) - before) == 1  # the other's
+    await other.close()
+    assert (await play(engine, "print(1)")).output == "1\n"  # a program does not wait for that delay
+    await engine.close()
+
+
+async def test_opening_later_needs_no_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboglot.programs.engine.engine.OPENS_AFTER", 0.05)
+    engine = Engine()
+    engine.open_later()
+    await until(lambda: "seccomp" in engine.layers)
+    await engine.close()
+
+
 async def test_without_a_filter_nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Machines with unknown system calls, and with a filter that loads but doesn't hold."""
     for trick in (

@@ -54,6 +54,8 @@ ANSWER_MAX = 60.0
 """Longest wait for a worker's start and for a program's check, in the machine's seconds."""
 ENDS_MAX = 5.0
 """Longest wait for killed programs before the zygote is ended, in the machine's seconds."""
+OPENS_AFTER = 5.0
+"""Delay of ``open_later``: by then, doors and worlds that start beside this one are open; in the machine's seconds."""
 STEPS_BACK_AFTER = 0.5
 """Delay before a program moves to the control group, which is slow in the kernel, and before the zygote's session
 yields, so that the first program begins soon; in the machine's seconds."""
@@ -64,7 +66,9 @@ _DEFAULT = Limits()
 
 
 class Engine:
-    """The program engine of a server. ``open``, ``open_soon`` or the first use starts the zygote, ``close`` ends all.
+    """The program engine of a server. ``open``, ``open_soon``, ``open_later`` or the first use starts the zygote.
+
+    ``close`` ends all.
 
     ``policy=False`` switches the language's rules off and allows all of Python inside the jail; it exists so that
     tests can show that the jail alone holds. ``filter_required=False`` runs programs even if the kernel can't filter
@@ -103,6 +107,11 @@ class Engine:
         """Start the zygote in the background; a failure is raised at the first use."""
         if self._background is None:
             self._background = asyncio.create_task(self._try_open())
+
+    def open_later(self) -> None:
+        """Start the zygote in the background once this program has started, so that it takes no time from that."""
+        if self._background is None:
+            self._background = asyncio.create_task(self._try_open(OPENS_AFTER))
 
     async def open(self) -> None:
         """Start the zygote if it isn't running. Raises SandboxUnavailable, EngineError after ``close``."""
@@ -218,7 +227,8 @@ class Engine:
         await asyncio.gather(*ends, *self._asked, return_exceptions=True)
         await asyncio.to_thread(self._group.close)
 
-    async def _try_open(self) -> None:
+    async def _try_open(self, delay: float = 0.0) -> None:
+        await asyncio.sleep(delay)
         try:
             await self.open()
         except (SandboxUnavailable, EngineError):

@@ -77,9 +77,9 @@ class ProgramService:
     def start(self) -> None:
         """Start the schedule: first overdue tasks and those with ``@reboot``, then the others at their time.
 
-        The engine warms up in the background, so that the first program starts as fast as the others.
+        The engine warms up a little later, in the background; an earlier program waits 0.2 s for it.
         """
-        self._engine.open_soon()
+        self._engine.open_later()
         self._turns.closed = False
         if self._turns.lost:
             self._fires.add(self._turns.restore(), "revive")

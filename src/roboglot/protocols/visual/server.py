@@ -58,7 +58,7 @@ class VisualDoor:
         self._recording: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
-        """Start to report on tasks; the program engine warms up in the background."""
+        """Start to report on tasks; the program engine warms up a little later."""
         if self._socket is not None:
             await self._socket.start()
         if self._cloud is not None:
