@@ -228,7 +228,7 @@ class Engine:
         await asyncio.to_thread(self._group.close)
 
     async def _try_open(self, delay: float = 0.0) -> None:
-        await asyncio.sleep(delay)
+        await asyncio.sleep(delay)  # noqa: TID251 - the machine starts, not the robot
         try:
             await self.open()
         except (SandboxUnavailable, EngineError):
