@@ -121,6 +121,16 @@ def test_a_mask_says_what_counts() -> None:
     assert not compare(original, gone, Mask((Rule(ComparisonMode.IGNORED, "GET *", "$.y"),))).differs
 
 
+def test_redacted_values_are_not_compared() -> None:
+    asked = Exchange(0.0, "a", "slamware", "x:1", "x", Direction.REQUEST, "GET /wifi", b"GET /wifi\n\n")
+    reply = asked._replace(direction=Direction.REPLY, payload=b'{"ssid": "[redacted]", "up": true}', status="200")
+    live = reply._replace(payload=b'{"ssid": "roboglot", "up": true}')
+    for one, other in ((reply, live), (live, reply), (reply, reply)):
+        assert not compare([asked, one], [asked, other]).differs
+    assert compare([asked, reply], [asked, live._replace(payload=b'{"up": true}')]).differs
+    assert compare([asked, reply], [asked, live._replace(payload=b'{"ssid": "roboglot", "up": false}')]).differs
+
+
 def test_reports_name_what_differs() -> None:
     original = session()
     changed = [e._replace(status="fail") if e.status == "ok" and e.door == "cyberdog" else e for e in original]

@@ -219,6 +219,24 @@ async def test_new_name_of_a_thing_is_no_difference() -> None:
     ]  # fmt: skip
 
 
+async def test_requests_of_several_connections_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though the first connection takes longer than the next requests are away."""
+    heard, texts = list[str](), [f"GET /{n}\n\n" for n in range(9)]
+    delays = itertools.chain([0.1], itertools.repeat(0.0))
+
+    class Slow(ToNumbered):
+        async def open(self) -> None:
+            await asyncio.sleep(next(delays))
+
+    asked = Exchange(0.0, "a", "slamware", "", "x", Direction.REQUEST, "GET", b"")
+    recorded = [
+        asked._replace(stamp=0.001 * n, connection=f"x:{n % 3}", payload=text.encode()) for n, text in enumerate(texts)
+    ]
+    monkeypatch.setattr(Target, "line", lambda *_: Slow(Numbered(1), heard))
+    await Replay(recorded, Target("slamware://h"), RealClock()).run()
+    assert heard == texts
+
+
 @pytest.mark.parametrize("muddle", ["stuck", "ahead"])
 async def test_name_of_another_thing_is_a_difference(muddle: str) -> None:
     comparison = await repeated(Numbered(7, muddle), [])

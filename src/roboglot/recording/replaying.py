@@ -31,6 +31,7 @@ class Replay:
 
     def __init__(self, recorded: Sequence[Exchange], target: Target, clock: Clock, *, fast: bool = False) -> None:
         self._asked = [asked for asked in pair(sendable(recorded)[0])[0] if asked.request.door == target.door]
+        self._turns = [asyncio.Event() for _ in range(len(self._asked) + 1)]  # by number of the request
         self._target, self._clock, self._fast = target, clock, fast
         self._found: list[Exchange] = []
         self._ids: dict[Id, str] = {}
@@ -41,12 +42,13 @@ class Replay:
     async def run(self) -> list[Exchange]:
         """Run the replay and return the new session. Raises ClientError if the robot was never reached."""
         self._started = self._clock.time()
+        self._turns[0].set()
         if self._fast:
-            await self._one_line(self._asked)
+            await self._one_line(list(enumerate(self._asked)))
         else:
-            lines: dict[str, list[AnsweredRequest]] = {}
-            for asked in self._asked:
-                lines.setdefault(asked.request.connection, []).append(asked)
+            lines: dict[str, list[tuple[int, AnsweredRequest]]] = {}
+            for number, asked in enumerate(self._asked):
+                lines.setdefault(asked.request.connection, []).append((number, asked))
             async with asyncio.TaskGroup() as tasks:
                 for mine in lines.values():
                     tasks.create_task(self._one_line(mine))
@@ -54,19 +56,22 @@ class Replay:
             raise self._lost
         return sorted(self._found, key=lambda exchange: exchange.stamp)
 
-    async def _one_line(self, mine: Sequence[AnsweredRequest]) -> None:
+    async def _one_line(self, mine: Sequence[tuple[int, AnsweredRequest]]) -> None:
+        """Send the requests of one connection, with their numbers in the session."""
         if not mine:
             return
         first = self._asked[0].request.stamp
-        name = mine[0].request.connection
-        line = self._target.line(self._clock, lambda op, data: self._note(name, Direction.PUSH, op, data))
+        begin = mine[0][1].request
+        line = self._target.line(self._clock, lambda op, data: self._note(begin.connection, Direction.PUSH, op, data))
         if not self._fast:
-            await self._clock.sleep_until(self._started + mine[0].request.stamp - first)
+            await self._clock.sleep_until(self._started + begin.stamp - first)
         await line.open()
         try:
-            for asked in mine:
+            for number, asked in mine:
                 if not self._fast:
                     await self._clock.sleep_until(self._started + asked.request.stamp - first)
+                await self._turns[number].wait()  # none overtakes a request of another connection
+                self._turns[number + 1].set()
                 await self._ask(line, asked)
         finally:
             await line.close()

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from roboglot.model.tap import Direction, Exchange
 from roboglot.recording.comparing.ids import IdMap
-from roboglot.recording.comparing.masks import ComparisonMode, Mask
+from roboglot.recording.comparing.masks import ComparisonMode, Mask, is_redacted
 from roboglot.recording.comparing.trees import leaves, tree
 from roboglot.recording.matching import normal
 from roboglot.recording.reader import AnsweredRequest, pair
@@ -202,6 +202,8 @@ def _compare_payloads(row: Row, one: bytes, other: bytes, mask: Mask, ids: IdMap
             good = True
         elif path not in mine or path not in theirs:
             good = False
+        elif is_redacted(a) != is_redacted(b):
+            continue  # one of them is not known
         else:
             named = ids.agree(path, a, b) if ids is not None and mask.how(row.operation, path) is None else None
             good = mask.agree(row.operation, path, a, b) if named is None else named

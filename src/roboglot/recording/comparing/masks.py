@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import msgspec
 
 from roboglot.recording.comparing.trees import kind_of
+from roboglot.recording.secrets import REDACTED
 from roboglot.text_files import convert_toml, text_of
 from roboglot.validation import why_invalid
 
@@ -116,3 +117,8 @@ def is_volatile(value: object) -> bool:
     if isinstance(value, int | float):
         return bool(1.5e9 <= abs(value) < 2e9 or 1.5e12 <= abs(value) < 2e12 or 1.5e15 <= abs(value) < 2e15)
     return isinstance(value, str) and bool(_volatile.fullmatch(value))
+
+
+def is_redacted(value: object) -> bool:
+    """Return whether a recording left out this value, or part of it."""
+    return isinstance(value, str) and REDACTED.decode() in value
